@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fixtures that keep tests apart from each other and from any other ROS graph."""
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from helpers import claim_domain
+from hypothesis import settings
+
+# A busy machine is not a failure: no property has a time limit of its own.
+settings.register_profile('mfba', deadline=None)
+settings.load_profile('mfba')
+
+
+@pytest.fixture(scope='session', autouse=True)
+def _ros_at_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep discovery on this machine and ROS logs out of the user's home."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        patch.setenv('ROS_LOG_DIR', str(tmp_path_factory.mktemp('ros_log')))
+        for name in ('ROS_DOMAIN_ID', 'ROS_STATIC_PEERS', 'RMW_IMPLEMENTATION'):
+            patch.delenv(name, raising=False)
+        yield
+
+
+@pytest.fixture
+def domain_id() -> Iterator[int]:
+    """Hold a ROS domain of this test's own."""
+    domain, lock = claim_domain()
+    with lock:
+        yield domain
+
+
+@pytest.fixture
+def ros_context(domain_id: int) -> Iterator[Any]:
+    """Open a fresh rclpy Context in a domain of its own."""
+    from rclpy.context import Context
+
+    context = Context()
+    context.init(domain_id=domain_id)
+    yield context
+    context.try_shutdown()
+    context.destroy()
+
+
+@pytest.fixture
+def ros_env(domain_id: int) -> dict[str, str]:
+    """Return the environment for a subprocess in this test's own domain."""
+    return {**os.environ, 'ROS_DOMAIN_ID': str(domain_id)}
