@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bat swarm: BA (eq. 3-9) and MFBA (eq. 10), ask/tell, with the paper's gaps as options."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from numpy.random import Generator
+
+from .errors import ConfigError, InputError
+from .options import check, option
+
+Vector = list[float]
+
+
+class Algorithm(Enum):
+    """Which law draws beta of eq. 4."""
+
+    BA = "ba"
+    MFBA = "mfba"
+
+
+class Velocity(Enum):
+    """Eq. 5 as printed flies away from the best; the literature's sign flies towards it."""
+
+    TOWARDS_BEST = "towards_best"
+    AS_PRINTED = "as_printed"
+
+
+class Schedule(Enum):
+    """Eq. 10's t: t/T stays in [0, 1] as eq. 4 demands; the raw t is what is printed."""
+
+    NORMALIZED = "normalized"
+    RAW = "raw"
+
+
+class Bounds(Enum):
+    """Whether a bat that leaves the search region is put back onto its edge."""
+
+    CLAMP = "clamp"
+    NONE = "none"
+
+
+class Epsilon(Enum):
+    """Whether epsilon of eq. 7 is drawn per coordinate or once for all of them."""
+
+    PER_COORDINATE = "per_coordinate"
+    SCALAR = "scalar"
+
+
+class Initial(Enum):
+    """Eq. 3 with the sign that lands inside the box, or as printed (mirrored outside)."""
+
+    INSIDE = "inside"
+    AS_PRINTED = "as_printed"
+
+
+class Walk(Enum):
+    """Where the local walk of eq. 7 starts: the best ever seen, or the bat itself."""
+
+    BEST = "best"
+    SELF = "self"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatParams:
+    """Constants of section 6.2 and the reading `robust` of what the paper leaves open."""
+
+    algorithm: Algorithm = option(Algorithm.MFBA, "beta is random (ba) or follows eq. 10 (mfba)")
+    population: int = option(5, "number of bats", minimum=2, maximum=10_000)
+    iterations: int = option(5, "iterations T of one run", minimum=1, maximum=1_000_000)
+    a0: float = option(1.0, "initial loudness A_i(0)", minimum=0.0, maximum=100.0)
+    r0: float = option(0.5, "initial pulse rate r_i(0)", minimum=0.0, maximum=1.0)
+    alpha: float = option(0.98, "loudness decay of eq. 8", minimum=0.0, maximum=1.0)
+    gamma: float = option(0.8, "pulse rate growth of eq. 9", minimum=0.0, maximum=100.0)
+    f_min: float = option(0.0, "lowest frequency of eq. 4", minimum=0.0, maximum=1000.0)
+    f_max: float = option(10.0, "highest frequency of eq. 4", minimum=0.0, maximum=1000.0)
+    sigma: float = option(
+        0.3, "scale of the local walk of eq. 7", unit="of x", minimum=0.0, maximum=1e6
+    )
+    rho: float = option(0.01, "rho of eq. 10", minimum=0.0, maximum=100.0)
+    velocity: Velocity = option(Velocity.TOWARDS_BEST, "sign of eq. 5")
+    schedule: Schedule = option(Schedule.NORMALIZED, "t of eq. 10: t/T or the raw t")
+    bounds: Bounds = option(Bounds.CLAMP, "what happens at the edge of the search region")
+    epsilon: Epsilon = option(Epsilon.PER_COORDINATE, "how epsilon of eq. 7 is drawn")
+    initial: Initial = option(Initial.INSIDE, "sign of eq. 3")
+    walk: Walk = option(Walk.BEST, "start of the local walk of eq. 7")
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+        if self.f_min > self.f_max:
+            raise ConfigError(
+                f"f_min={self.f_min:g}: above f_max={self.f_max:g}; give f_min <= f_max"
+            )
+
+
+class Region(Protocol):
+    """Where the bats search."""
+
+    def span(self) -> tuple[Vector, Vector]:
+        """Return x_min and x_max of eq. 3, d floats each."""
+
+    def clamp(self, x: Vector) -> Vector:
+        """Return x, or the point of the edge that replaces an x outside."""
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Axis-aligned box [lower, upper], d floats each; raises ConfigError if empty or infinite."""
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse a box in which nothing can be searched."""
+        if not self.lower or len(self.lower) != len(self.upper):
+            raise ConfigError(
+                f"box of {len(self.lower)} lower and {len(self.upper)} upper bounds: "
+                "give d >= 1 of each"
+            )
+        for low, high in zip(self.lower, self.upper):
+            if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+                raise ConfigError(f"bounds [{low}, {high}]: give finite lower <= upper")
+
+    def span(self) -> tuple[Vector, Vector]:
+        """The box itself."""
+        return list(self.lower), list(self.upper)
+
+    def clamp(self, x: Vector) -> Vector:
+        """Each coordinate is cut to its interval."""
+        return [min(high, max(low, v)) for v, low, high in zip(x, self.lower, self.upper)]
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """Disc in the plane: the points a robot can reach in one step."""
+
+    radius: float
+    center: tuple[float, float] = (0.0, 0.0)
+
+    def span(self) -> tuple[Vector, Vector]:
+        """The disc's bounding square."""
+        (cx, cy), r = self.center, self.radius
+        return [cx - r, cy - r], [cx + r, cy + r]
+
+    def clamp(self, x: Vector) -> Vector:
+        """A point outside is drawn back along its radius."""
+        cx, cy = self.center
+        dx, dy = x[0] - cx, x[1] - cy
+        norm = math.sqrt(dx * dx + dy * dy)
+        if norm <= self.radius:
+            return x
+        scale = self.radius / norm
+        return [cx + dx * scale, cy + dy * scale]
+
+
+class BatSwarm:
+    """One swarm that minimises: `ask()` for n candidates, `tell()` their n values, repeat.
+
+    The first ask returns the initial population of eq. 3, each later one the candidates of
+    iteration t = 1, 2, ... (eq. 4-7); tell accepts or refuses them (eq. 8, 9). Synchronous:
+    all bats of an iteration see the best of the iterations before.
+    """
+
+    __slots__ = (
+        "_a",
+        "_r",
+        "_rng",
+        "_told",
+        "_uniforms",
+        "_v",
+        "_values",
+        "_x",
+        "best_value",
+        "best_x",
+        "candidates",
+        "params",
+        "region",
+        "t",
+    )
+
+    def __init__(self, params: BatParams, region: Region, rng: Generator) -> None:
+        """Draw the initial population (eq. 3) from rng, the only source of randomness."""
+        self.params = params
+        self.t = 0
+        self.best_x: Vector = []
+        self.best_value = math.inf
+        self.region = region
+        self._rng = rng
+        n = params.population
+        x_min, x_max = region.span()
+        d = len(x_min)
+        sign = 1.0 if params.initial is Initial.INSIDE else -1.0
+        draws = rng.random(n * d).tolist()
+        self._x = [
+            self._bounded(
+                [
+                    low + sign * draws[i * d + j] * (high - low)
+                    for j, (low, high) in enumerate(zip(x_min, x_max))
+                ]
+            )
+            for i in range(n)
+        ]
+        self._v = [[0.0] * d for _ in range(n)]
+        self._a = [params.a0] * n
+        self._r = [params.r0] * n
+        self._values = [math.inf] * n
+        self._uniforms: Vector = []
+        self.candidates = self._x
+        self._told = False
+
+    def ask(self) -> list[Vector]:
+        """Return n candidates of d floats; asking twice without tell returns the same ones."""
+        if self._told:
+            self._told = False
+            self.t += 1
+            self.candidates = self._fly()
+        return self.candidates
+
+    def tell(self, values: Sequence[float]) -> None:
+        """Take the n objective values of the candidates last asked for; lower is better.
+
+        Raises InputError for a wrong count; a NaN is never accepted and never the best.
+        """
+        n = self.params.population
+        if len(values) != n:
+            raise InputError(f"{len(values)} values told for {n} bats: tell one per candidate")
+        if self._told:
+            raise InputError("tell without ask: call ask() for the next candidates first")
+        self._told = True
+        if self.t == 0:
+            self._values = [v if v == v else math.inf for v in values]
+        else:
+            self._accept(values)
+        for x, value in zip(self.candidates, values):
+            if value < self.best_value or not self.best_x:
+                self.best_x, self.best_value = x, value if value == value else math.inf
+
+    def beta(self, u: float) -> float:
+        """Beta of eq. 4 from a uniform draw u: u itself (BA), or eq. 10 (MFBA)."""
+        p = self.params
+        if p.algorithm is Algorithm.BA:
+            return u
+        t = self.t / p.iterations if p.schedule is Schedule.NORMALIZED else float(self.t)
+        return t * math.exp(-p.rho * u)
+
+    def _fly(self) -> list[Vector]:
+        """Candidates of one iteration, eq. 4-7.
+
+        Every bat draws beta, gate, acceptance and d epsilons each time, used or not, so that
+        one draw more or less never shifts the others.
+        """
+        p, best = self.params, self.best_x
+        n, d = p.population, len(best)
+        stride = 3 + d
+        u = self._uniforms = self._rng.random(n * stride).tolist()
+        towards = p.velocity is Velocity.TOWARDS_BEST
+        walk_scale = p.sigma * math.fsum(self._a) / n
+        candidates = []
+        for i in range(n):
+            k = i * stride
+            x, v = self._x[i], self._v[i]
+            f = p.f_min + (p.f_max - p.f_min) * self.beta(u[k])  # eq. 4
+            if towards:
+                v = [vj + (bj - xj) * f for vj, xj, bj in zip(v, x, best)]  # eq. 5, mended
+            else:
+                v = [vj + (xj - bj) * f for vj, xj, bj in zip(v, x, best)]  # eq. 5, printed
+            self._v[i] = v
+            candidate = [xj + vj for xj, vj in zip(x, v)]  # eq. 6
+            if u[k + 1] > self._r[i]:
+                candidate = self._walk(candidate, u[k + 3 : k + stride], walk_scale)
+            candidates.append(self._bounded(candidate))
+        return candidates
+
+    def _walk(self, candidate: Vector, u: Vector, scale: float) -> Vector:
+        """Local walk of eq. 7; scale = sigma times the mean loudness."""
+        start = self.best_x if self.params.walk is Walk.BEST else candidate
+        if self.params.epsilon is Epsilon.SCALAR:
+            step = scale * (2.0 * u[0] - 1.0)
+            return [s + step for s in start]
+        return [s + scale * (2.0 * uj - 1.0) for s, uj in zip(start, u)]
+
+    def _accept(self, values: Sequence[float]) -> None:
+        """Take candidates that are not worse, with probability A_i; then eq. 8 and 9."""
+        p = self.params
+        stride = 3 + len(self.best_x)
+        rate = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
+        for i, value in enumerate(values):
+            if value <= self._values[i] and self._uniforms[i * stride + 2] < self._a[i]:
+                self._x[i] = self.candidates[i]
+                self._values[i] = value
+                self._a[i] *= p.alpha  # eq. 8
+                self._r[i] = rate
+
+    def _bounded(self, x: Vector) -> Vector:
+        return x if self.params.bounds is Bounds.NONE else self.region.clamp(x)
+
+
+def minimize(
+    objective: Callable[[Vector], float], region: Region, params: BatParams, rng: Generator
+) -> BatSwarm:
+    """Run one swarm for params.iterations and return it; see best_x and best_value."""
+    swarm = BatSwarm(params, region, rng)
+    for _ in range(params.iterations + 1):
+        swarm.tell([objective(x) for x in swarm.ask()])
+    return swarm

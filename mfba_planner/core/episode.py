@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The one currency: a run as scenario, parameters, seed and ticks; and the core driver."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+
+from .geometry import Point, Pose2D, distance
+from .planner import NANO, Decision, Mode, Observation, Planner, PlannerParams
+from .sensing import Ranges, SensorParams, sense_circles
+from .world import Scenario
+
+
+class Outcome(Enum):
+    """How a run ended."""
+
+    GOAL_REACHED = "goal_reached"
+    TIME_LIMIT = "time_limit"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episode:
+    """A run, whatever drove it: one Decision per tick, the first at tick 0."""
+
+    scenario: Scenario
+    sensor: SensorParams = field(default_factory=SensorParams)
+    planner: PlannerParams = field(default_factory=PlannerParams)
+    seed: int
+    driver: str
+    ticks: tuple[Decision, ...]
+    outcome: Outcome
+
+    def time_s(self, stamp_ns: int) -> float:
+        """Time since the first tick in seconds, the t of the obstacles' motion."""
+        return (stamp_ns - self.planner.tick_ns) * NANO
+
+
+def stamp_of(tick: int, tick_ns: int) -> int:
+    """Stamp of tick k = 0, 1, ...: (k + 1) tick_ns, since ROS reads a stamp of 0 as unset."""
+    return (tick + 1) * tick_ns
+
+
+def advance(pose: Pose2D, velocity: Point, tick_ns: int) -> Pose2D:
+    """The omnidirectional robot after one tick at constant velocity (m/s); yaw is kept."""
+    dt = tick_ns * NANO
+    return Pose2D(pose.x + velocity[0] * dt, pose.y + velocity[1] * dt, pose.yaw)
+
+
+class World:
+    """The simulated world between two ticks: all that world_sim knows, without ROS."""
+
+    def __init__(self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float) -> None:
+        """Put the robot at the start, at tick 0."""
+        self.scenario = scenario
+        self.tick_ns = tick_ns
+        self.goal_tolerance_m = goal_tolerance_m
+        self.tick = 0
+        self.pose = Pose2D(*scenario.start_m)
+
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp of the present tick."""
+        return stamp_of(self.tick, self.tick_ns)
+
+    @property
+    def time_s(self) -> float:
+        """Time of the obstacles' motion, 0 at tick 0."""
+        return self.tick * self.tick_ns * NANO
+
+    def outcome(self) -> Outcome | None:
+        """How the run has ended by the present tick, None while it goes on."""
+        if distance(self.pose.position, self.scenario.goal_m) <= self.goal_tolerance_m:
+            return Outcome.GOAL_REACHED
+        if self.time_s >= self.scenario.time_limit_s:
+            return Outcome.TIME_LIMIT
+        return None
+
+    def step(self, velocity: Point) -> None:
+        """Move robot and time on by one tick."""
+        self.pose = advance(self.pose, velocity, self.tick_ns)
+        self.tick += 1
+
+
+def sense(world: World, params: SensorParams) -> Ranges:
+    """What the ring of virtual sensors measures at the present tick."""
+    return sense_circles(world.pose.position, world.scenario.enlarged(world.time_s), params)
+
+
+def run(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams | None = None,
+    sensor: SensorParams | None = None,
+    seed: int = 0,
+) -> Episode:
+    """The core driver: Algorithm 1 from start to goal or time limit, without ROS."""
+    planner = planner or PlannerParams()
+    sensor = sensor or SensorParams()
+    world = World(scenario, planner.tick_ns, planner.goal_tolerance_m)
+    ticks = tuple(_ticks(world, Planner(planner, seed), sensor))
+    return Episode(
+        scenario=scenario,
+        sensor=sensor,
+        planner=planner,
+        seed=seed,
+        driver="core",
+        ticks=ticks,
+        outcome=world.outcome() or Outcome.INTERRUPTED,
+    )
+
+
+def _ticks(world: World, brain: Planner, sensor: SensorParams) -> Iterator[Decision]:
+    """Yield a decision per tick; the last is the one taken where the run has ended."""
+    while True:
+        decision = brain.decide(
+            Observation(
+                stamp_ns=world.stamp_ns,
+                pose=world.pose,
+                ranges_m=sense(world, sensor),
+                goal=world.scenario.goal_m,
+                now_ns=world.stamp_ns,
+            )
+        )
+        yield decision
+        if world.outcome() is not None or decision.mode is Mode.ARRIVED:
+            return
+        world.step(decision.velocity)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The gap vector Vg (eq. 12, 13, Table 1) and the choice of the gap nearest to the goal."""
+
+from __future__ import annotations
+
+import math
+
+from .geometry import wrap_angle
+from .sensing import Bits
+
+
+def gap_vector(vs: Bits) -> Bits:
+    """Vg of Table 1: b(i) = a(i) or a(i+1); the ring wraps (Fig. 5 closes gap 12 by sector 1)."""
+    return tuple(a | b for a, b in zip(vs, vs[1:] + vs[:1]))
+
+
+def gap_heading(gap: int, count: int) -> float:
+    """Heading of gap i (from 1) in radians: the boundary of sectors i and i+1 (Fig. 6)."""
+    return wrap_angle(2.0 * math.pi * gap / count)
+
+
+def nearest_free_gap(vg: Bits, goal_heading_rad: float) -> int | None:
+    """Number (from 1) of the free gap nearest in angle to the goal; the lower of two equals.
+
+    None when every gap is closed: the robot then holds its position (the paper is silent).
+    """
+    n = len(vg)
+    best, smallest = None, math.inf
+    for gap, closed in enumerate(vg, start=1):
+        if not closed:
+            turn = abs(wrap_angle(gap_heading(gap, n) - goal_heading_rad))
+            if turn < smallest:
+                best, smallest = gap, turn
+    return best

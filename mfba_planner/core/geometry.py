@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Angles and distances in the plane; the one home of angle arithmetic."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+Point = tuple[float, float]
+
+
+class Pose2D(NamedTuple):
+    """Planar pose in the odom frame: x, y in metres, yaw in radians (REP-103)."""
+
+    x: float
+    y: float
+    yaw: float = 0.0
+
+    @property
+    def position(self) -> Point:
+        """(x, y) in metres."""
+        return (self.x, self.y)
+
+
+def wrap_angle(angle_rad: float) -> float:
+    """Bring an angle into (-pi, pi]."""
+    wrapped = math.remainder(angle_rad, 2.0 * math.pi)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+def distance(a: Point, b: Point) -> float:
+    """Euclidean distance, eq. 1 (sqrt is exact in IEEE-754, so every machine agrees)."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    return math.sqrt(dx * dx + dy * dy)
+
+
+def bearing(a: Point, b: Point) -> float:
+    """Direction from a to b in radians, counter-clockwise from +x; 0 when they coincide."""
+    return math.atan2(b[1] - a[1], b[0] - a[0])
+
+
+def towards(a: Point, heading_rad: float, length_m: float) -> Point:
+    """The point length_m from a along a heading."""
+    return (a[0] + length_m * math.cos(heading_rad), a[1] + length_m * math.sin(heading_rad))
+
+
+def tangent_half_angle(distance_m: float, radius_m: float) -> float:
+    """Half the angle between the two tangents from a point to a circle (Fig. 5).
+
+    On or inside the circle there are no tangents: the limit, pi/2, is returned (every
+    direction that leads further in).
+    """
+    if distance_m <= radius_m:
+        return math.pi / 2.0
+    return math.asin(radius_m / distance_m)
+
+
+def ray_circle_distance(distance_m: float, radius_m: float, offset_rad: float) -> float:
+    """Distance along a ray to a circle whose centre lies offset_rad off the ray.
+
+    inf when the ray misses; 0 when the ray starts on or inside the circle.
+    """
+    if distance_m <= radius_m:
+        return 0.0
+    along = distance_m * math.cos(offset_rad)
+    across = distance_m * math.sin(offset_rad)
+    under_root = radius_m * radius_m - across * across
+    if along <= 0.0 or under_root < 0.0:
+        return math.inf
+    return along - math.sqrt(under_root)
+
+
+def closest_approach(a0: Point, a1: Point, b0: Point, b1: Point) -> float:
+    """Smallest distance between two points moving uniformly from a0 to a1 and b0 to b1."""
+    px, py = b0[0] - a0[0], b0[1] - a0[1]
+    qx, qy = b1[0] - a1[0] - px, b1[1] - a1[1] - py
+    speed_squared = qx * qx + qy * qy
+    s = 0.0 if speed_squared == 0.0 else -(px * qx + py * qy) / speed_squared
+    s = min(1.0, max(0.0, s))
+    dx, dy = px + s * qx, py + s * qy
+    return math.sqrt(dx * dx + dy * dy)

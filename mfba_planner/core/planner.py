@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Algorithm 1: switch between path generation (bats) and obstacle avoidance (gap vector)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from .bat import BatParams, BatSwarm, Disc, Vector
+from .gaps import gap_heading, gap_vector, nearest_free_gap
+from .geometry import Point, Pose2D, bearing, distance, towards
+from .options import check, option
+from .sensing import Bits, Ranges, sensory_vector
+
+NANO = 1e-9
+PLANNER_STREAM = 1  # spawn key of the planner's SeedSequence child; one number per purpose
+
+
+class Mode(Enum):
+    """What the planner is doing."""
+
+    IDLE = "idle"
+    PATH_GENERATION = "path_generation"
+    OBSTACLE_AVOIDANCE = "obstacle_avoidance"
+    BLOCKED = "blocked"
+    STOPPED = "stopped"
+    ARRIVED = "arrived"
+
+
+class Event(Enum):
+    """What the planner has just learned; one event per tick."""
+
+    NO_GOAL = "no_goal"
+    NEW_GOAL = "new_goal"
+    INVALID = "invalid"
+    STALE = "stale"
+    AT_GOAL = "at_goal"
+    CLEAR = "clear"
+    OBSTACLE = "obstacle"
+    NO_GAP = "no_gap"
+
+
+_NEXT = {
+    Event.NO_GOAL: Mode.IDLE,
+    Event.NEW_GOAL: Mode.IDLE,
+    Event.INVALID: Mode.STOPPED,
+    Event.STALE: Mode.STOPPED,
+    Event.AT_GOAL: Mode.ARRIVED,
+    Event.CLEAR: Mode.PATH_GENERATION,
+    Event.OBSTACLE: Mode.OBSTACLE_AVOIDANCE,
+    Event.NO_GAP: Mode.BLOCKED,
+}
+
+
+def transition(mode: Mode, event: Event) -> Mode:
+    """Next mode: Algorithm 1 has no memory, except that it ends on arrival.
+
+    Once ARRIVED, only a new (or withdrawn) goal leads out: the while loop is over.
+    """
+    if mode is Mode.ARRIVED and event not in (Event.NEW_GOAL, Event.NO_GOAL):
+        return Mode.ARRIVED
+    return _NEXT[event]
+
+
+class Swarm(Enum):
+    """Fresh bats in the step's disc at every step, or one swarm that lives over the trip."""
+
+    FRESH = "fresh"
+    PERSISTENT = "persistent"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannerParams:
+    """The reading `section6` of Algorithm 1 and section 6.2."""
+
+    speed_mps: float = option(0.82, "robot speed", unit="m/s", minimum=0.01, maximum=100.0)
+    step_length_m: float = option(
+        0.3, "longest goal step, in both modes", unit="m", minimum=0.001, maximum=100.0
+    )
+    goal_tolerance_m: float = option(
+        0.02, "distance at which the goal counts as reached", unit="m", minimum=1e-6, maximum=10.0
+    )
+    input_timeout_s: float = option(
+        1.0, "age at which odometry or sectors are stale", unit="s", minimum=0.001, maximum=3600.0
+    )
+    swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
+    bat: BatParams = field(default_factory=BatParams)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+    @property
+    def tick_ns(self) -> int:
+        """Duration of one decision, step length / speed, in whole nanoseconds."""
+        return round(self.step_length_m / self.speed_mps / NANO)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """What the planner knows at one tick; now_ns - stamp_ns is the age of the inputs."""
+
+    stamp_ns: int
+    pose: Pose2D
+    ranges_m: Ranges
+    goal: Point | None
+    now_ns: int
+    refused: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """One answer of the planner and why; gap counts from 1, 0 is none; lengths in metres."""
+
+    stamp_ns: int
+    mode: Mode
+    reason: str
+    pose: Pose2D
+    goal: Point | None
+    ranges_m: Ranges
+    vs: Bits
+    vg: Bits
+    gap: int
+    waypoint: Point
+    velocity: Point
+    candidates: tuple[Point, ...] = ()
+
+
+Generate = Callable[[Point, Point], tuple[Point, tuple[Point, ...]]]
+
+
+def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Generate) -> Decision:
+    """One turn of Algorithm 1's loop: a pure function of its arguments.
+
+    generate(position, goal) returns the bats' next point and all their candidates; it is
+    called in path generation only. Standing still is the answer to everything that is not
+    path generation or obstacle avoidance.
+    """
+    vs = sensory_vector(obs.ranges_m)
+    vg = gap_vector(vs)
+    position = obs.pose.position
+    event, reason, gap = _assess(obs, vs, vg, params)
+    mode = transition(mode, event)
+    waypoint, candidates = position, ()
+    if mode is Mode.PATH_GENERATION:
+        assert obs.goal is not None
+        waypoint, candidates = generate(position, obs.goal)
+    elif mode is Mode.OBSTACLE_AVOIDANCE:
+        assert obs.goal is not None
+        length = min(params.step_length_m, distance(position, obs.goal))
+        waypoint = towards(position, gap_heading(gap, len(vg)), length)
+    dt = params.tick_ns * NANO
+    return Decision(
+        stamp_ns=obs.stamp_ns,
+        mode=mode,
+        reason=reason,
+        pose=obs.pose,
+        goal=obs.goal,
+        ranges_m=obs.ranges_m,
+        vs=vs,
+        vg=vg,
+        gap=gap,
+        waypoint=waypoint,
+        velocity=((waypoint[0] - position[0]) / dt, (waypoint[1] - position[1]) / dt),
+        candidates=candidates,
+    )
+
+
+def _assess(
+    obs: Observation, vs: Bits, vg: Bits, params: PlannerParams
+) -> tuple[Event, str, int]:
+    """Reduce an observation to one event, its reason and the chosen gap (0 when none)."""
+    if obs.refused:
+        return Event.INVALID, f"refused input: {obs.refused}", 0
+    age_s = (obs.now_ns - obs.stamp_ns) * NANO
+    if age_s > params.input_timeout_s:
+        return Event.STALE, f"input is {age_s:.3f} s old", 0
+    if obs.goal is None:
+        return Event.NO_GOAL, "no goal given", 0
+    position = obs.pose.position
+    left = distance(position, obs.goal)
+    if left <= params.goal_tolerance_m:
+        return Event.AT_GOAL, "goal reached", 0
+    if not any(vs):
+        return Event.CLEAR, "no obstacle within SR", 0
+    sensed = "+".join(str(i) for i, bit in enumerate(vs, start=1) if bit)
+    gap = nearest_free_gap(vg, bearing(position, obs.goal))
+    if gap is None:
+        return Event.NO_GAP, f"sectors {sensed} set: every gap is closed", 0
+    return Event.OBSTACLE, f"sectors {sensed} set: gap {gap} is nearest to the goal", gap
+
+
+class Planner:
+    """Algorithm 1 with its memory: the mode, and the swarm where a reading keeps one.
+
+    The random stream of a decision depends on (seed, stamp) only, so a planner that is
+    restarted, or fed from a recording, decides as the first one did (fresh swarms).
+    """
+
+    def __init__(self, params: PlannerParams, seed: int) -> None:
+        """Start idle; seed is any non-negative integer."""
+        self.params = params
+        self.seed = seed
+        self.mode = Mode.IDLE
+        self._goal: Point | None = None
+        self._swarm: BatSwarm | None = None
+        self._stamp_ns = 0
+
+    def reset(self) -> None:
+        """Forget everything but parameters and seed (a jump of time, a new trip)."""
+        self.mode, self._goal, self._swarm = Mode.IDLE, None, None
+
+    def decide(self, obs: Observation) -> Decision:
+        """Answer one observation and remember the mode."""
+        if obs.goal != self._goal:
+            self.mode = transition(self.mode, Event.NEW_GOAL)
+            self._goal, self._swarm = obs.goal, None
+        self._stamp_ns = obs.stamp_ns
+        decision = decide(obs, self.mode, self.params, self._generate)
+        self.mode = decision.mode
+        return decision
+
+    def _generate(self, position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
+        if self.params.swarm is Swarm.PERSISTENT:
+            return self._fly_on(position, goal)
+        return fresh_step(position, goal, self.params, stream(self.seed, self._stamp_ns))
+
+    def _fly_on(self, position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
+        """Fig. 1 read literally: one bat iteration per robot step, within the robot's reach.
+
+        The bats stay where they are in the world and are drawn into the disc of one step
+        around the robot, as is the best point they ever saw; the robot goes to that point.
+        """
+        reach = self.params.step_length_m
+        if distance(position, goal) <= reach:
+            return goal, ()
+        disc = Disc(reach, position)
+        if self._swarm is None:
+            self._swarm = BatSwarm(self.params.bat, disc, stream(self.seed, self._stamp_ns))
+        self._swarm.region = disc
+        points = self._swarm.ask()
+        self._swarm.tell([distance((x, y), goal) for x, y in points])
+        x, y = disc.clamp(self._swarm.best_x)
+        return (x, y), tuple((px, py) for px, py in points)
+
+
+def stream(seed: int, stamp_ns: int) -> np.random.Generator:
+    """The random stream of one decision: a child of the seed named by purpose and stamp."""
+    sequence = np.random.SeedSequence(seed, spawn_key=(PLANNER_STREAM, stamp_ns))
+    return np.random.Generator(np.random.PCG64(sequence))
+
+
+def fresh_step(
+    position: Point, goal: Point, params: PlannerParams, rng: np.random.Generator
+) -> tuple[Point, tuple[Point, ...]]:
+    """Next point by a fresh swarm in the disc of one step; the last step is cut to the goal.
+
+    Objective: distance of the candidate to GP (eq. 1; eq. 2 is its reciprocal).
+    """
+    if distance(position, goal) <= params.step_length_m:
+        return goal, ()
+    px, py = position
+    gx, gy = goal[0] - px, goal[1] - py
+
+    def cost(x: Vector) -> float:
+        dx, dy = x[0] - gx, x[1] - gy
+        return math.sqrt(dx * dx + dy * dy)
+
+    swarm = BatSwarm(params.bat, Disc(params.step_length_m), rng)
+    for _ in range(params.bat.iterations + 1):
+        swarm.tell([cost(x) for x in swarm.ask()])
+    bx, by = swarm.best_x
+    return (px + bx, py + by), tuple((px + x, py + y) for x, y in swarm.candidates)

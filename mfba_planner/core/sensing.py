@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sensory vector Vs: tangent spans of enlarged circles on equal sectors (eq. 11, Fig. 4, 5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError
+from .geometry import Point, ray_circle_distance, tangent_half_angle
+from .options import check, option
+
+Bits = tuple[int, ...]
+Ranges = tuple[float, ...]
+
+TWO_PI = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorParams:
+    """The ring of virtual sensors (Fig. 3)."""
+
+    sectors: int = option(12, "number of equal sectors", minimum=3, maximum=3600)
+    sensing_range_m: float = option(
+        0.8, "SR, measured to the enlarged edge", unit="m", minimum=0.01, maximum=1000.0
+    )
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+def sensory_vector(ranges_m: Iterable[float]) -> Bits:
+    """Vs of eq. 11: a(i) = 1 where sector i holds an obstacle, that is a finite range."""
+    return tuple(1 if math.isfinite(r) else 0 for r in ranges_m)
+
+
+def longest_range_m(params: SensorParams, enlarged_radius_m: float) -> float:
+    """Largest finite range a sector can report: along the tangent of a circle at SR.
+
+    A circle whose near edge is SR away also sets the sectors its tangents reach into, where
+    it is further than SR.
+    """
+    centre = params.sensing_range_m + enlarged_radius_m
+    return math.sqrt(centre * centre - enlarged_radius_m * enlarged_radius_m)
+
+
+def sense_circles(
+    position: Point, circles: Iterable[tuple[Point, float]], params: SensorParams
+) -> Ranges:
+    """Range per sector to the nearest enlarged circle, inf when free; single precision.
+
+    Sector i (from 1) covers [i-1, i) times 2 pi / n, counter-clockwise from +x. A sector is
+    set when the tangent span of a circle in range touches it. circles holds (centre,
+    enlarged radius) in metres. The ranges are rounded to what a LaserScan message can carry,
+    so that a planner decides the same with and without messages between. Fig. 4, 5.
+    """
+    n = params.sectors
+    ranges = [math.inf] * n
+    px, py = position
+    for (cx, cy), radius in circles:
+        dx, dy = cx - px, cy - py
+        d = math.sqrt(dx * dx + dy * dy)
+        if d - radius <= params.sensing_range_m:
+            _mark(ranges, d, radius, math.atan2(dy, dx))
+    return single_precision(ranges)
+
+
+def single_precision(ranges: Sequence[float]) -> Ranges:
+    """Round to float32 and back, as a message does."""
+    return tuple(np.asarray(ranges, dtype=np.float32).tolist())
+
+
+def _mark(ranges: list[float], d: float, radius: float, direction: float) -> None:
+    """Lower the range of every sector that the tangent span of one circle touches."""
+    n = len(ranges)
+    width = TWO_PI / n
+    half = tangent_half_angle(d, radius)
+    first = math.floor((direction - half) / width)
+    last = math.floor((direction + half) / width)
+    for sector in range(first, min(last, first + n - 1) + 1):
+        nearest = min(max(direction, sector * width), (sector + 1) * width)
+        r = ray_circle_distance(d, radius, nearest - direction)
+        if not math.isfinite(r):  # a tangent that only touches: rounding put it just outside
+            r = math.sqrt(max(0.0, d * d - radius * radius))
+        index = sector % n
+        if r < ranges[index]:
+            ranges[index] = r
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scan:
+    """A planar laser scan: beam k looks along angle_min_rad + k * angle_increment_rad."""
+
+    ranges_m: np.ndarray
+    angle_min_rad: float
+    angle_increment_rad: float
+    range_min_m: float
+    range_max_m: float
+
+
+def sense_scan(
+    scan: Scan, yaw_rad: float, robot_radius_m: float, params: SensorParams
+) -> Ranges:
+    """Range per sector from any laser scan; every return is a point enlarged by the robot.
+
+    yaw_rad turns the scan's frame into the sectors' frame. As in REP-117, +inf is free space,
+    -inf an obstacle nearer than range_min (taken at range_min), NaN and values outside
+    [range_min, range_max] are no measurement and are passed over. Raises InputError for a
+    scan without a single usable beam or with unusable geometry: blind is not free.
+    """
+    geometry = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m, yaw_rad)
+    if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:
+        raise InputError(
+            f"scan geometry angle_min={scan.angle_min_rad}, increment={scan.angle_increment_rad},"
+            f" range=[{scan.range_min_m}, {scan.range_max_m}], yaw={yaw_rad}: unusable;"
+            " check the lidar driver"
+        )
+    r = np.asarray(scan.ranges_m, dtype=np.float64)
+    near = np.isneginf(r)
+    hits = near | ((r >= scan.range_min_m) & (r <= scan.range_max_m) & np.isfinite(r))
+    if not (hits | np.isposinf(r)).any():
+        raise InputError(f"scan of {r.size} beams without one usable range; check the lidar")
+    d = np.where(near, scan.range_min_m, r)
+    hits &= np.where(hits, d, np.inf) - robot_radius_m <= params.sensing_range_m
+    angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hits) + yaw_rad
+    ranges = [math.inf] * params.sectors
+    for distance_m, angle in zip(d[hits].tolist(), angles.tolist()):
+        _mark(ranges, distance_m, robot_radius_m, angle)
+    return single_precision(ranges)

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Circles that move as closed-form functions of time, walls they bounce from, and contact."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+from .errors import ConfigError
+from .geometry import Point, closest_approach, distance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Obstacle:
+    """A row of Table 4 or 6: centre at t = 0 (m), radius (m), speed (m/s), heading (rad)."""
+
+    center_m: Point
+    radius_m: float
+    speed_mps: float = 0.0
+    heading_rad: float = 0.0
+
+    @property
+    def velocity(self) -> Point:
+        """(vx, vy) in m/s while no wall is met."""
+        return (
+            self.speed_mps * math.cos(self.heading_rad),
+            self.speed_mps * math.sin(self.heading_rad),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Walls:
+    """A rectangle that obstacles bounce from, in metres; the robot is free to cross it."""
+
+    lower_m: Point
+    upper_m: Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """A task: start, goal, robot, obstacles, walls and a limit of simulated time."""
+
+    name: str
+    start_m: Point
+    goal_m: Point
+    robot_radius_m: float = 0.3
+    obstacles: tuple[Obstacle, ...] = ()
+    walls: Walls | None = None
+    time_limit_s: float = 120.0
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a task that makes no sense from the first moment."""
+        if self.start_m == self.goal_m:
+            raise ConfigError(f"goal_m={list(self.goal_m)}: equal to start_m; move one of them")
+        for number, obstacle in enumerate(self.obstacles, start=1):
+            gap = distance(self.start_m, obstacle.center_m) - self.enlarged_radius(obstacle)
+            if gap < 0.0:
+                raise ConfigError(
+                    f"start_m={list(self.start_m)}: the robot starts {-gap:.3g} m inside obstacle "
+                    f"{number} (radii added); move start_m or the obstacle"
+                )
+            if self.walls is not None:
+                _check_inside(number, obstacle, self.walls)
+
+    def enlarged_radius(self, obstacle: Obstacle) -> float:
+        """Obstacle radius plus robot radius (Fig. 4), metres."""
+        return obstacle.radius_m + self.robot_radius_m
+
+    def centers(self, t_s: float) -> list[Point]:
+        """Centres of all obstacles at time t, in scenario order."""
+        return [center_at(obstacle, t_s, self.walls) for obstacle in self.obstacles]
+
+    def enlarged(self, t_s: float) -> list[tuple[Point, float]]:
+        """(centre, enlarged radius) of all obstacles at time t."""
+        return [
+            (center_at(obstacle, t_s, self.walls), self.enlarged_radius(obstacle))
+            for obstacle in self.obstacles
+        ]
+
+
+def _check_inside(number: int, obstacle: Obstacle, walls: Walls) -> None:
+    for axis, value in enumerate(obstacle.center_m):
+        low = walls.lower_m[axis] + obstacle.radius_m
+        high = walls.upper_m[axis] - obstacle.radius_m
+        if not low <= value <= high:
+            raise ConfigError(
+                f"obstacle {number} center_m={list(obstacle.center_m)}: not inside the walls; "
+                "move it or widen the walls"
+            )
+
+
+def center_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
+    """Centre at time t in metres: straight, or folded back into the walls; no drift with t."""
+    x, y = (
+        position + velocity * t_s
+        for position, velocity in zip(obstacle.center_m, obstacle.velocity)
+    )
+    if walls is None:
+        return (x, y)
+    r = obstacle.radius_m
+    return (
+        _fold(x, walls.lower_m[0] + r, walls.upper_m[0] - r),
+        _fold(y, walls.lower_m[1] + r, walls.upper_m[1] - r),
+    )
+
+
+def _fold(value: float, low: float, high: float) -> float:
+    """Reflect an unbounded coordinate into [low, high] (a triangle wave)."""
+    length = high - low
+    if length <= 0.0:
+        return low
+    offset = math.fmod(value - low, 2.0 * length)
+    if offset < 0.0:
+        offset += 2.0 * length
+    return low + (offset if offset <= length else 2.0 * length - offset)
+
+
+def bounce_times(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:
+    """Times strictly within (t0, t1) at which the obstacle meets a wall, ascending."""
+    if walls is None:
+        return []
+    times = set()
+    for axis in (0, 1):
+        position, velocity = obstacle.center_m[axis], obstacle.velocity[axis]
+        low = walls.lower_m[axis] + obstacle.radius_m
+        length = walls.upper_m[axis] - obstacle.radius_m - low
+        if velocity == 0.0 or length <= 0.0:
+            continue
+        u0, u1 = sorted((position + velocity * t - low) / length for t in (t0_s, t1_s))
+        for crossing in range(math.ceil(u0), math.floor(u1) + 1):
+            t = (low + crossing * length - position) / velocity
+            if t0_s < t < t1_s:
+                times.add(t)
+    return sorted(times)
+
+
+def step_clearances(
+    scenario: Scenario, t0_s: float, t1_s: float, start: Point, end: Point
+) -> list[float]:
+    """Smallest gap (m) to each obstacle while the robot moves uniformly from start to end.
+
+    Continuous in time, not only at the ends, and exact through bounces: between two bounces
+    both motions are uniform. Negative means contact.
+    """
+    clearances = []
+    for obstacle in scenario.obstacles:
+        times = [t0_s, *bounce_times(obstacle, t0_s, t1_s, scenario.walls), t1_s]
+        smallest = math.inf
+        duration = t1_s - t0_s
+        for ta, tb in pairwise(times):
+            sa, sb = ((t - t0_s) / duration if duration else 0.0 for t in (ta, tb))
+            gap = closest_approach(
+                _between(start, end, sa),
+                _between(start, end, sb),
+                center_at(obstacle, ta, scenario.walls),
+                center_at(obstacle, tb, scenario.walls),
+            )
+            smallest = min(smallest, gap)
+        clearances.append(smallest - scenario.enlarged_radius(obstacle))
+    return clearances
+
+
+def _between(a: Point, b: Point, s: float) -> Point:
+    return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]))

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Named readings of what the paper leaves open: of the swarm, and of the path planning."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from ..core.bat import BatParams, Bounds, Epsilon, Initial, Schedule, Velocity
+from ..core.errors import ConfigError
+from ..core.options import did_you_mean
+from ..core.planner import PlannerParams, Swarm
+
+T = TypeVar("T")
+
+# The paper says what the swarm does in words; `robust` is the core's default.
+SWARMS: dict[str, BatParams] = {
+    "robust": BatParams(),
+    # Comes nearest to the printed Table 3: bats may leave the box, raw t tamed by rho = 3.
+    "table3": BatParams(
+        population=50,
+        iterations=200,
+        f_max=2.0,
+        rho=3.0,
+        schedule=Schedule.RAW,
+        bounds=Bounds.NONE,
+        epsilon=Epsilon.SCALAR,
+    ),
+    # Every equation as printed, slips included.
+    "literal": BatParams(
+        schedule=Schedule.RAW,
+        bounds=Bounds.NONE,
+        velocity=Velocity.AS_PRINTED,
+        initial=Initial.AS_PRINTED,
+    ),
+}
+
+# speed, step and iterations are not in the paper: they were fitted to Tables 5 and 7.
+PLANNERS: dict[str, PlannerParams] = {
+    "section6": PlannerParams(),
+    # Fig. 1 literally: one swarm for the trip, one bat iteration per robot step.
+    "fig1": PlannerParams(
+        step_length_m=0.1, swarm=Swarm.PERSISTENT, bat=BatParams(iterations=1)
+    ),
+}
+
+
+def swarm(name: str) -> BatParams:
+    """Return a named reading of eq. 3-10; ConfigError for an unknown name."""
+    return _named("swarm reading", name, SWARMS)
+
+
+def planner(name: str) -> PlannerParams:
+    """Return a named reading of section 6.2; ConfigError for an unknown name."""
+    return _named("planner reading", name, PLANNERS)
+
+
+def _named(kind: str, name: str, table: dict[str, T]) -> T:
+    if name not in table:
+        raise ConfigError(f"{name!r}: unknown {kind}; {did_you_mean(name, list(table))}")
+    return table[name]
