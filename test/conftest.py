@@ -10,17 +10,17 @@ from helpers import claim_domain
 from hypothesis import settings
 
 # A busy machine is not a failure: no property has a time limit of its own.
-settings.register_profile('mfba', deadline=None)
-settings.load_profile('mfba')
+settings.register_profile("mfba", deadline=None)
+settings.load_profile("mfba")
 
 
-@pytest.fixture(scope='session', autouse=True)
+@pytest.fixture(scope="session", autouse=True)
 def _ros_at_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Keep discovery on this machine and ROS logs out of the user's home."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        patch.setenv('ROS_LOG_DIR', str(tmp_path_factory.mktemp('ros_log')))
-        for name in ('ROS_DOMAIN_ID', 'ROS_STATIC_PEERS', 'RMW_IMPLEMENTATION'):
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("ros_log")))
+        for name in ("ROS_DOMAIN_ID", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION"):
             patch.delenv(name, raising=False)
         yield
 
@@ -48,4 +48,4 @@ def ros_context(domain_id: int) -> Iterator[Any]:
 @pytest.fixture
 def ros_env(domain_id: int) -> dict[str, str]:
     """Return the environment for a subprocess in this test's own domain."""
-    return {**os.environ, 'ROS_DOMAIN_ID': str(domain_id)}
+    return {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}

@@ -19,12 +19,12 @@ def claim_domain() -> tuple[int, socket.socket]:
     for domain in itertools.islice(_candidates, len(_DOMAINS)):
         lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
-            lock.bind(f'\0mfba_planner_test_domain_{domain}')
+            lock.bind(f"\0mfba_planner_test_domain_{domain}")
         except OSError:
             lock.close()
         else:
             return domain, lock
-    raise AssertionError(f'all {len(_DOMAINS)} ROS domains are taken; end other test runs')
+    raise AssertionError(f"all {len(_DOMAINS)} ROS domains are taken; end other test runs")
 
 
 def spin_until(executor: Any, condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
@@ -40,5 +40,5 @@ def wait_until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
 def _until(condition: Callable[[], bool], timeout_s: float, turn: Callable[[], None]) -> None:
     deadline = time.monotonic() + timeout_s
     while not condition():
-        assert time.monotonic() < deadline, f'not so after {timeout_s} s: {condition}'
+        assert time.monotonic() < deadline, f"not so after {timeout_s} s: {condition}"
         turn()

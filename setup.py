@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+import re
+from glob import glob
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "mfba_planner"
+SHARE = f"share/{NAME}"
+INIT = (Path(__file__).parent / NAME / "__init__.py").read_text(encoding="utf-8")
+PROGRAMS = (
+    "planner",
+    "world_sim",
+    "virtual_sensor",
+    "recorder",
+    "replay",
+    "launcher",
+    "mfba",
+)
+
+setup(
+    name=NAME,
+    version=re.findall(r'^__version__ = "(.+)"$', INIT, re.MULTILINE)[0],
+    description="Path planning among moving obstacles with the modified frequency bat algorithm",
+    long_description=Path("README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
+    author="Mfba Planner Maintainers",
+    author_email="maintainers@mfba-planner.example",
+    maintainer="Mfba Planner Maintainers",
+    maintainer_email="maintainers@mfba-planner.example",
+    license="Apache-2.0",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (SHARE, ["package.xml"]),
+        (f"{SHARE}/config", glob("config/*.yaml")),
+        (f"{SHARE}/config/scenarios", glob("config/scenarios/*.yaml")),
+        (f"{SHARE}/launch", glob("launch/*launch.py")),
+        (f"{SHARE}/layout", glob("layout/*")),
+    ],
+    entry_points={
+        "console_scripts": [f"{program} = {NAME}.entry:{program}" for program in PROGRAMS],
+    },
+    python_requires=">=3.10",
+    # Each has its line in docs/dependencies.md. rclpy and the messages are not here: a sourced
+    # workspace brings its own, requirements-ros.txt the wheels.
+    install_requires=[
+        "matplotlib>=3.8",
+        "mcap>=1.2",
+        "mcap-ros2-support>=0.5.5",
+        "numpy>=1.26,<3",
+        "pydantic>=2,<3",
+        "PyYAML>=6",
+        "rich>=13",
+    ],
+    # Not tests_require: with it `colcon test` runs no test and stays green.
+    extras_require={
+        "test": [
+            "hypothesis>=6.100",
+            "pybag-sdk>=0.13",
+            "pytest>=8",
+            "pytest-cov>=6",
+            "pytest-xdist>=3.6",
+            "rosbags>=0.10",
+            "small-mcap>=0.10",
+        ],
+        "lint": [
+            "mypy>=2.4,<2.5",
+            "ruff>=0.17,<0.18",
+            "types-PyYAML",
+        ],
+    },
+    zip_safe=False,
+)
