@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The doors: one function per program, and the one place where errors become exit codes."""
+
+import errno
+import os
+import signal
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from types import FrameType
+
+from mfba_planner.core.errors import MfbaError
+
+_HERE = "mfba_planner"
+_ROS_ARGS = "after --ros-args give -p NAME:=VALUE, -r FROM:=TO or --params-file FILE"
+
+_SIGINT_CODE = 128 + signal.SIGINT
+_SIGPIPE_CODE = 128 + signal.SIGPIPE
+_SIGTERM_CODE = 128 + signal.SIGTERM
+
+_REMEDIES = {
+    errno.ENOSPC: "free some space or write elsewhere",
+    errno.EDQUOT: "free some space or write elsewhere",
+    errno.EROFS: "write elsewhere",
+    errno.EACCES: "give a path this user may use",
+    errno.EPERM: "give a path this user may use",
+}
+
+
+def planner() -> int:
+    """Run the planner node."""
+    return _node("planner")
+
+
+def world_sim() -> int:
+    """Run the simulated world."""
+    return _node("world_sim")
+
+
+def virtual_sensor() -> int:
+    """Run the node that turns obstacles or a scan into sectors."""
+    return _node("virtual_sensor")
+
+
+def recorder() -> int:
+    """Run the node that writes a bag."""
+    return _node("recorder")
+
+
+def replay() -> int:
+    """Run the node that plays a bag."""
+    return _node("replay")
+
+
+def launcher() -> int:
+    """Run every node as a process of its own, for one episode."""
+    return _command("launcher", "mfba_planner.launcher")
+
+
+def mfba() -> int:
+    """Run the user command."""
+    return _command("mfba", "mfba_planner.cli")
+
+
+def guarded_main(run: Callable[[], int], program: str, interrupted: int = _SIGINT_CODE) -> int:
+    """Return run's exit code; an error the user can mend becomes one line on stderr and 1.
+
+    Ctrl-C gives `interrupted`, a reader that went away gives 141; a bug keeps its traceback.
+    """
+    try:
+        code = run()
+    except (KeyboardInterrupt, Exception) as error:
+        code = _judge(error, program, interrupted)
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:
+        # Python flushes once more at exit: let that go nowhere instead of failing again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = code or _judge(error, program, interrupted)
+    return code
+
+
+def _judge(error: BaseException, program: str, interrupted: int) -> int:
+    """Return the exit code for an error, said in one line; raise it again when it is a bug."""
+    if isinstance(error, KeyboardInterrupt):
+        return interrupted
+    if isinstance(error, BrokenPipeError):
+        return _SIGPIPE_CODE
+    line = _one_line(error)
+    if line is None:
+        raise error
+    print(f"{program}: {' '.join(line.splitlines())}", file=sys.stderr)
+    return 1
+
+
+def _node(name: str) -> int:
+    """Run a node, which ends with 0 on SIGINT and SIGTERM; its runtime takes both over."""
+    _start(on_sigint=0, on_sigterm=0)
+    code = guarded_main(
+        lambda: int(import_module(f"mfba_planner.ros.{name}").main(sys.argv[1:])),
+        name,
+        interrupted=0,
+    )
+    for signum in (signal.SIGINT, signal.SIGTERM):
+        # A late one must not spoil the exit code while the interpreter winds down.
+        signal.signal(signum, signal.SIG_IGN)
+    return code
+
+
+def _command(name: str, module: str) -> int:
+    """Run a command; once it is loaded both signals unwind it, so that `finally` is reached."""
+    _start(on_sigint=_SIGINT_CODE, on_sigterm=_SIGTERM_CODE)
+
+    def run() -> int:
+        main = import_module(module).main
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, _unwind)
+        return int(main(sys.argv[1:]))
+
+    return guarded_main(run, name)
+
+
+def _unwind(_signum: int, _frame: FrameType | None) -> None:
+    sys.exit(_SIGTERM_CODE)
+
+
+def _start(on_sigint: int, on_sigterm: int) -> None:
+    """Set the scene before the heavy imports, and leave at once if told to during them."""
+    # Logs are what a node prints; stderr is for what went wrong.
+    os.environ.setdefault("RCUTILS_LOGGING_USE_STDOUT", "1")
+    if "HOME" not in os.environ:
+        # rclpy writes its logs below the home directory and fails without one.
+        os.environ.setdefault("ROS_LOG_DIR", f"/tmp/ros_log_{os.getuid()}")
+    # Nothing is open yet, and an exception could end up inside an import's except clause.
+    signal.signal(signal.SIGINT, lambda *_: os._exit(on_sigint))
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(on_sigterm))
+
+
+def _one_line(error: BaseException) -> str | None:
+    """Value, reason and remedy of an error that the user can mend; None for a bug."""
+    if isinstance(error, MfbaError):
+        return str(error)
+    if isinstance(error, OSError) and error.errno in _REMEDIES:
+        name = error.filename or "output"
+        return f"{name}: {error.strerror}; {_REMEDIES[error.errno]}"
+    if isinstance(error, ImportError) and not (error.name or _HERE).startswith(_HERE):
+        return f"{error}; pip install what setup.py and requirements-ros.txt name"
+    if type(error).__module__.startswith("rclpy."):
+        return _explain_rclpy(type(error).__name__, str(error))
+    return None
+
+
+def _explain_rclpy(kind: str, text: str) -> str | None:
+    """What rclpy.init refuses: its arguments and its environment."""
+    if kind == "UnknownROSArgsError":
+        return f"{text}: unknown ROS arguments; {_ROS_ARGS}"
+    if not text.startswith("failed to initialize"):
+        return None
+    reason = text.partition(", at /")[0]
+    if "log" in reason and "directory" in reason:
+        return f"{reason}; set ROS_LOG_DIR to a directory that can be written"
+    return f"{reason}; {_ROS_ARGS}"
