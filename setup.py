@@ -22,8 +22,6 @@ setup(
     name=NAME,
     version=re.findall(r'^__version__ = "(.+)"$', INIT, re.MULTILINE)[0],
     description="Path planning among moving obstacles with the modified frequency bat algorithm",
-    long_description=Path("README.md").read_text(encoding="utf-8"),
-    long_description_content_type="text/markdown",
     author="Mfba Planner Maintainers",
     author_email="maintainers@mfba-planner.example",
     maintainer="Mfba Planner Maintainers",

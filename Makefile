@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+# Everything happens in .venv, made on first use; needs Python 3.10 to 3.13, git and make.
+
+# PYTHON=/path/to/python3 chooses; otherwise the first of these that really works.
+CANDIDATES := $(or $(PYTHON),python3.12 python3.13 python3.11 python3.10 python3)
+VENV := .venv
+PIP := $(VENV)/bin/python -m pip --disable-pip-version-check install --quiet
+# The tests wait more than they compute.
+WORKERS ?= 2
+
+# .venv brings its own ROS 2: nothing of a sourced workspace may reach into it.
+unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH RMW_IMPLEMENTATION
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.PHONY: help demo test lint colcon venv clean
+
+help:
+	@echo "make demo    run case study 1 and record it under runs/"
+	@echo "make test    lint, then all tests with branch coverage"
+	@echo "make lint    ruff and mypy"
+	@echo "make colcon  build with colcon under build/colcon and check what it installed"
+	@echo "make venv    only set up .venv (PYTHON=/path/to/python3 chooses the interpreter)"
+	@echo "make clean   remove what the other targets made, recordings under runs/ excepted"
+
+demo: $(VENV)/.runtime
+	$(VENV)/bin/mfba run case1 --seed 1
+
+test: lint
+	$(VENV)/bin/python -m pytest -n $(WORKERS) --cov --cov-fail-under=95
+
+lint: $(VENV)/.dev
+	$(VENV)/bin/ruff check
+	$(VENV)/bin/mypy
+
+colcon: $(VENV)/.dev
+	tools/colcon_check.sh $(VENV)
+
+venv: $(VENV)/.dev
+
+clean:
+	rm -rf $(VENV) build install log *.egg-info .coverage .mypy_cache .pytest_cache .ruff_cache \
+	  .hypothesis
+
+# pip is the last thing a venv gets: without it the venv is not whole, so begin anew.
+$(VENV)/bin/pip:
+	@python=$$(tools/find_python.sh $(CANDIDATES)) && echo "setting up $(VENV) with $$python" && \
+	  "$$python" -m venv --clear $(VENV)
+
+$(VENV)/.runtime: setup.py requirements-ros.txt | $(VENV)/bin/pip
+	$(PIP) --upgrade setuptools --constraint requirements-colcon.txt
+	$(PIP) --no-build-isolation -r requirements-ros.txt -e .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.runtime requirements-colcon.txt
+	$(PIP) --no-build-isolation -r requirements-ros.txt -r requirements-colcon.txt \
+	  -e '.[lint,test]'
+	@touch $@

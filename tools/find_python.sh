@@ -1,0 +1,27 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# Print the first of the given interpreters that can carry the project; else one line, exit 1.
+# Each is really run: a name on PATH may be a shim that fails, or lie about its version.
+check='
+import platform, sys
+if not (3, 10) <= sys.version_info[:2] <= (3, 13):
+    sys.exit("is Python %d.%d" % sys.version_info[:2])
+if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
+    sys.exit("is not on Linux x86_64, for which alone there are ROS 2 wheels")
+try:
+    import ensurepip, venv
+except ImportError:
+    sys.exit("lacks the venv module (Debian, Ubuntu: apt install python3-venv)")
+print(sys.executable)
+'
+for candidate in "$@"; do
+    if answer=$("$candidate" -c "$check" 2>&1); then
+        echo "${answer:-$(command -v "$candidate")}" # without PATH Python does not know itself
+        exit 0
+    elif [ "$(printf '%s' "$answer" | wc -l)" -gt 0 ] || [ -z "$answer" ]; then
+        answer="does not run" # nothing, or a shim's or traceback's many lines
+    fi
+    said="$said$candidate ${answer##*: }; "
+done
+echo "no usable Python: ${said}install Python 3.10 to 3.13 or name it: make PYTHON=/path/to/python3" >&2
+exit 1
