@@ -47,7 +47,7 @@ $(VENV)/bin/pip:
 	  "$$python" -m venv --clear $(VENV)
 
 $(VENV)/.runtime: setup.py requirements-ros.txt | $(VENV)/bin/pip
-	$(PIP) --upgrade setuptools --constraint requirements-colcon.txt
+	$(PIP) --upgrade setuptools wheel --constraint requirements-colcon.txt
 	$(PIP) --no-build-isolation -r requirements-ros.txt -e .
 	@touch $@
 
