@@ -32,14 +32,17 @@ class _Obstacle(_Strict):
     center_m: _Point
     radius_m: _Positive
     speed_mps: _NotNegative = 0.0
-    heading_deg: _Number = 0.0
+    heading_deg: _Number | None = None
+    heading_rad: _Number | None = None  # what programs write: degrees would lose the last bit
 
     def build(self) -> Obstacle:
+        if self.heading_deg is not None and self.heading_rad is not None:
+            raise ConfigError("obstacles: heading_deg and heading_rad given; keep one of them")
         return Obstacle(
             center_m=self.center_m,
             radius_m=self.radius_m,
             speed_mps=self.speed_mps,
-            heading_rad=math.radians(self.heading_deg),
+            heading_rad=self.heading_rad or math.radians(self.heading_deg or 0.0),
         )
 
 
@@ -110,7 +113,9 @@ def parse_scenario(text: str, origin: str) -> Scenario:
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f" line {mark.line + 1}" if mark else ""
-        raise ConfigError(f"{origin}{where}: not YAML; compare config/scenarios/case1.yaml") from None
+        raise ConfigError(
+            f"{origin}{where}: not YAML; compare config/scenarios/case1.yaml"
+        ) from None
     if data is None:
         raise ConfigError(f"{origin}: empty; compare config/scenarios/case1.yaml")
     if not isinstance(data, dict):
@@ -145,28 +150,9 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
 
 
 def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain data in the YAML's own schema; load it again without loss.
-
-    heading_deg is written so that the same heading_rad comes back.
-    """
-    data = asdict(scenario)
-    data["obstacles"] = [
-        {**row, "heading_deg": _degrees(row.pop("heading_rad"))}
-        for row in (dict(obstacle) for obstacle in data["obstacles"])
-    ]
-    return json.loads(json.dumps(data))
-
-
-def _degrees(heading_rad: float) -> float:
-    """Degrees that math.radians turns back into exactly this heading."""
-    degrees = round(math.degrees(heading_rad), 9)
-    if math.radians(degrees) == heading_rad:
-        return degrees
-    degrees = math.degrees(heading_rad)
-    for candidate in (degrees, math.nextafter(degrees, math.inf), math.nextafter(degrees, -math.inf)):
-        if math.radians(candidate) == heading_rad:
-            return candidate
-    return degrees
+    """The scenario as plain data that load_scenario accepts and turns into an equal one."""
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(scenario)))
+    return plain
 
 
 def scenario_to_json(scenario: Scenario) -> str:

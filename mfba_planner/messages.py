@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a message says, in the core's terms: for live messages and for those decoded from a bag.
+
+Only attributes are read, so no ROS is needed. Everything is checked: InputError names what
+is wrong. ros/convert.py holds the other direction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from .core.errors import InputError
+from .core.geometry import Point, Pose2D
+from .core.planner import Decision, Mode
+from .core.sensing import Bits, Ranges, Scan
+
+SECOND_NS = 1_000_000_000
+
+
+def stamp_ns(stamp: Any) -> int:
+    """builtin_interfaces/Time as integer nanoseconds."""
+    return int(stamp.sec) * SECOND_NS + int(stamp.nanosec)
+
+
+def _finite(what: str, values: Iterable[float]) -> None:
+    for value in values:
+        if not math.isfinite(value):
+            raise InputError(f"{what} holds {value}; send finite numbers")
+
+
+def pose2d(pose: Any, what: str) -> Pose2D:
+    """geometry_msgs/Pose as planar pose; yaw from the quaternion (REP-103).
+
+    Raises InputError for NaN, inf or a quaternion without direction.
+    """
+    p, q = pose.position, pose.orientation
+    _finite(f"{what} position", (p.x, p.y))
+    _finite(f"{what} orientation", (q.x, q.y, q.z, q.w))
+    norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
+    if norm < 1e-6:
+        raise InputError(f"{what} orientation is all zero; send a unit quaternion (w=1)")
+    yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y) / norm, 1.0 - 2.0 * (q.y**2 + q.z**2) / norm)
+    return Pose2D(p.x, p.y, yaw)
+
+
+def robot_pose(odometry: Any) -> Pose2D:
+    """nav_msgs/Odometry to the robot's pose; InputError for NaN or inf."""
+    return pose2d(odometry.pose.pose, "odom")
+
+
+def goal_point(pose_stamped: Any) -> Point:
+    """geometry_msgs/PoseStamped to GP; InputError for NaN or inf (orientation is not used)."""
+    p = pose_stamped.pose.position
+    _finite("goal_pose position", (p.x, p.y))
+    return (p.x, p.y)
+
+
+def obstacle_centers(pose_array: Any) -> list[Point]:
+    """geometry_msgs/PoseArray to centres; InputError for NaN or inf."""
+    centers = []
+    for number, pose in enumerate(pose_array.poses, start=1):
+        _finite(f"obstacles pose {number}", (pose.position.x, pose.position.y))
+        centers.append((pose.position.x, pose.position.y))
+    return centers
+
+
+def sector_ranges(laser_scan: Any) -> Ranges:
+    """The sectors topic to ranges; inf is free; InputError for NaN, -inf or < 3 sectors."""
+    ranges = tuple(float(r) for r in laser_scan.ranges)
+    if len(ranges) < 3:
+        raise InputError(f"sectors hold {len(ranges)} ranges; send one per sector, at least 3")
+    for number, r in enumerate(ranges, start=1):
+        if math.isnan(r) or r < 0.0:
+            raise InputError(f"sector {number} holds {r}; the sensor was blind")
+    return ranges
+
+
+def laser_scan(message: Any) -> Scan:
+    """sensor_msgs/LaserScan to a Scan; core.sensing.sense_scan judges it."""
+    return Scan(
+        ranges_m=np.asarray(message.ranges, dtype=np.float64),
+        angle_min_rad=message.angle_min,
+        angle_increment_rad=message.angle_increment,
+        range_min_m=message.range_min,
+        range_max_m=message.range_max,
+    )
+
+
+def velocity(twist: Any) -> tuple[float, float, float]:
+    """geometry_msgs/Twist(Stamped) to (vx, vy, wz) in the body frame; InputError for NaN or inf."""
+    twist = getattr(twist, "twist", twist)
+    values = (twist.linear.x, twist.linear.y, twist.angular.z)
+    _finite("cmd_vel", values)
+    return values
+
+
+def rotated(vector: Point, angle_rad: float) -> Point:
+    """A plane vector turned counter-clockwise; by 0 exactly itself."""
+    if angle_rad == 0.0:
+        return vector
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1])
+
+
+def bits_text(bits: Bits) -> str:
+    """Bits as text, sector 1 first: '110000111000'."""
+    return "".join(map(str, bits))
+
+
+def points_text(points: Iterable[Point]) -> str:
+    """Points as text that gives back the same floats: 'x,y x,y'."""
+    return " ".join(f"{x!r},{y!r}" for x, y in points)
+
+
+def points(text: str) -> tuple[Point, ...]:
+    """Inverse of points_text; InputError for anything else."""
+    try:
+        pairs = [tuple(map(float, part.split(","))) for part in text.split()]
+        return tuple((x, y) for x, y in pairs)
+    except ValueError:
+        raise InputError(f"{text!r}: not a list of points 'x,y x,y'") from None
+
+
+def decision(diagnostics: Any, pose: Pose2D, ranges_m: Ranges) -> Decision:
+    """planner/decision (with its inputs) to a Decision; InputError if a field is missing."""
+    fields = {item.key: item.value for item in diagnostics.status[0].values}
+    try:
+        goal = points(fields["goal"])
+        return Decision(
+            stamp_ns=stamp_ns(diagnostics.header.stamp),
+            mode=Mode(fields["mode"]),
+            reason=diagnostics.status[0].message,
+            pose=pose,
+            goal=goal[0] if goal else None,
+            ranges_m=ranges_m,
+            vs=tuple(map(int, fields["vs"])),
+            vg=tuple(map(int, fields["vg"])),
+            gap=int(fields["gap"]),
+            waypoint=points(fields["waypoint"])[0],
+            velocity=points(fields["velocity"])[0],
+            candidates=points(fields["candidates"]),
+        )
+    except (KeyError, ValueError, IndexError) as error:
+        raise InputError(f"planner/decision lacks or garbles {error}; was it edited?") from None

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options as ROS parameters: declared with description, type and range; checked in the core."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from enum import Enum
+from typing import Any, TypeVar
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ..core.errors import ConfigError
+from ..core.options import Spec, override, walk
+
+T = TypeVar("T")
+
+
+def declare(node: Node, defaults: T, *, read_only: bool = False) -> T:
+    """Declare every option of a dataclass as a parameter; return it with the values given.
+
+    Raises ConfigError in one line for a value of the wrong type or out of range.
+    """
+    values: dict[str, Any] = {}
+    for name, default, item in walk(defaults):
+        spec: Spec = item.metadata["spec"]
+        plain = default.value if isinstance(default, Enum) else default
+        try:
+            values[name] = node.declare_parameter(
+                name, plain, _descriptor(spec, default, read_only)
+            ).value
+        except InvalidParameterTypeException as error:
+            kind = type(plain).__name__
+            hint = " (write 1.0, not 1)" if kind == "float" else ""
+            raise ConfigError(
+                f"parameter {name}={error._parameter.value!r}: wrong type; give a {kind}{hint}"
+            ) from None
+        except InvalidParameterValueException as error:
+            override(defaults, {name: error._value})  # says it better, if it is out of range
+            raise ConfigError(f"parameter {name}={error._value!r}: refused; {spec.doc}") from None
+    return override(defaults, values)
+
+
+def _descriptor(spec: Spec, default: Any, read_only: bool) -> ParameterDescriptor:
+    unit = f" [{spec.unit}]" if spec.unit else ""
+    choices = ""
+    if isinstance(default, Enum):
+        choices = f" ({' | '.join(str(member.value) for member in type(default))})"
+    descriptor = ParameterDescriptor(description=spec.doc + choices + unit, read_only=read_only)
+    if spec.minimum is None and spec.maximum is None:
+        return descriptor
+    if isinstance(default, float):
+        low = -sys.float_info.max if spec.minimum is None else spec.minimum
+        high = sys.float_info.max if spec.maximum is None else spec.maximum
+        descriptor.floating_point_range = [
+            FloatingPointRange(from_value=float(low), to_value=float(high), step=0.0)
+        ]
+    elif isinstance(default, int) and not isinstance(default, bool):
+        low_i = -(2**63) if spec.minimum is None else int(spec.minimum)
+        high_i = 2**63 - 1 if spec.maximum is None else int(spec.maximum)
+        descriptor.integer_range = [IntegerRange(from_value=low_i, to_value=high_i, step=0)]
+    return descriptor
+
+
+def follow(node: Node, current: Callable[[], Any], apply: Callable[[Any], None]) -> None:
+    """Let parameters of a dataclass be set later: checked as a whole, refused with the reason."""
+
+    def on_set(parameters: list[Parameter]) -> SetParametersResult:
+        known = {name for name, _, _ in walk(current())}
+        changes = {p.name: p.value for p in parameters if p.name in known}
+        try:
+            changed = override(current(), changes)
+        except ConfigError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        if changes:
+            apply(changed)
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(on_set)
+
+
+def declare_radii(node: Node, default: list[float]) -> list[float]:
+    """Declare obstacle_radii_m, the one parameter that is a list; ConfigError if unusable."""
+    name = "obstacle_radii_m"
+    descriptor = ParameterDescriptor(
+        description="radius per obstacle, in the order of obstacles; one stands for all [m]",
+        read_only=True,
+    )
+    try:
+        radii = list(node.declare_parameter(name, default, descriptor).value)
+    except InvalidParameterTypeException as error:
+        raise ConfigError(
+            f"parameter {name}={error._parameter.value!r}: wrong type; give [0.3, 0.3]"
+        ) from None
+    if not all(math.isfinite(r) and r > 0.0 for r in radii):
+        raise ConfigError(f"parameter {name}={radii}: give finite radii above 0")
+    return radii

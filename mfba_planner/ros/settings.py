@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each node can be told besides the core's parameters; fixed once the node runs.
+
+No ROS here: the launcher, the documentation and the nodes read the same declarations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from ..core.options import check, option
+from ..core.planner import PlannerParams
+from ..core.world import Scenario
+
+_WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
+
+
+class Source(Enum):
+    """What the virtual sensor measures from."""
+
+    OBSTACLES = "obstacles"
+    SCAN = "scan"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldSimSettings:
+    """Settings of world_sim."""
+
+    scenario: str = option("case1", "scenario: a shipped name, a .yaml file, or JSON text")
+    lockstep: bool = option(False, "wait for each tick's cmd_vel; false: tick on a wall timer")
+    speed_factor: float = option(
+        1.0, "simulated seconds per wall second, not in lockstep", minimum=0.01, maximum=1000.0
+    )
+    tick_ns: int = option(
+        PlannerParams().tick_ns, "duration of a tick", unit="ns", minimum=1000, maximum=10**12
+    )
+    goal_tolerance_m: float = option(
+        PlannerParams().goal_tolerance_m,
+        "distance at which the run is over",
+        unit="m",
+        minimum=1e-6,
+        maximum=10.0,
+    )
+    run_on: bool = option(False, "keep ticking at the goal and past the time limit")
+    start_paused: bool = option(False, "wait for ~/pause (false) or ~/step before tick 0")
+    answer_timeout_s: float = option(
+        2.0, "lockstep: publish a tick again after this", unit="s", minimum=0.05, maximum=3600.0
+    )
+    answer_retries: int = option(
+        4, "lockstep: give up after so many repetitions", minimum=0, maximum=1_000_000
+    )
+    enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
+    odom_frame: str = option("odom", "frame of all poses (REP-105)")
+    base_frame: str = option("base_link", "frame of the robot (REP-105)")
+    view_period_s: float = option(
+        0.2, "markers and trail: simulated time between two", unit="s", minimum=0.0, maximum=3600.0
+    )
+    wait_for: str = option("", _WAIT_FOR)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VirtualSensorSettings:
+    """Settings of virtual_sensor."""
+
+    source: Source = option(Source.OBSTACLES, "obstacles (the paper) or scan (any LaserScan)")
+    robot_radius_m: float = option(
+        Scenario.__dataclass_fields__["robot_radius_m"].default,
+        "added to every obstacle (Fig. 4)",
+        unit="m",
+        minimum=0.0,
+        maximum=100.0,
+    )
+    scan_yaw: float = option(
+        0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
+    )
+    lockstep: bool = option(False, "pair odom with scan by stamp; false: newest odom")
+    odom_frame: str = option("odom", "frame the sectors are aligned with")
+    wait_for: str = option("", _WAIT_FOR)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannerSettings:
+    """Settings of planner; PlannerParams are its parameters too."""
+
+    seed: int = option(0, "seed of all its randomness", minimum=0, maximum=2**63 - 1)
+    lockstep: bool = option(False, "answer pairs of one stamp; false: newest odom, stop on stale")
+    enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
+    odom_frame: str = option("odom", "frame of all poses (REP-105)")
+    base_frame: str = option("base_link", "frame of the robot (REP-105)")
+    view_period_s: float = option(
+        0.2, "markers: time between two", unit="s", minimum=0.0, maximum=3600.0
+    )
+    wait_for: str = option("", _WAIT_FOR)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecorderSettings:
+    """Settings of recorder."""
+
+    output: str = option("", "bag directory to create; empty: a new one below ./runs")
+    nodes: str = option("", "nodes whose parameters go into the bag, separated by commas")
+    sim_time: bool = option(False, "log times are /clock's (as rosbag2 --use-sim-time)")
+    run: str = option("{}", "JSON of whatever else explains the run (driver, versions)")
+    enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
+    wait_for: str = option("", _WAIT_FOR)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+def names(text: str) -> set[str]:
+    """Split a comma-separated setting."""
+    return {part.strip() for part in text.split(",") if part.strip()}

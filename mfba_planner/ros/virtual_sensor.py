@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""virtual_sensor: turns obstacle poses, or any laser scan, into the sensory vector (eq. 11)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ..core.errors import InputError
+from ..core.geometry import Point, Pose2D
+from ..core.sensing import (
+    Ranges,
+    Scan,
+    SensorParams,
+    sense_circles,
+    sense_scan,
+    sensory_vector,
+)
+from ..messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
+from . import params, topics
+from .convert import sectors_msg, sensory_vector_msg
+from .pairing import StampPairs
+from .runtime import GraphNode, Refusals, spin_node
+from .settings import Source, VirtualSensorSettings, names
+
+_DEFAULT_RADII = [0.3]
+
+
+class VirtualSensor(GraphNode):
+    """The ring of virtual sensors; a refused input becomes NaN sectors, never free ones."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Raise ConfigError for a parameter that cannot be accepted."""
+        super().__init__(topics.VIRTUAL_SENSOR, **kwargs)
+        self.settings = s = params.declare(self, VirtualSensorSettings(), read_only=True)
+        self.sensor = params.declare(self, SensorParams())
+        self.radii = params.declare_radii(self, _DEFAULT_RADII)
+        params.follow(self, lambda: self.sensor, self._set_sensor)
+        self._refusals = Refusals(self)
+        self._pairs: StampPairs[Pose2D | None, Any] = StampPairs()
+        self._pose: Pose2D | None = None
+        self._sectors = self.advertise(topics.SECTORS)
+        self._vector = self.advertise(topics.SENSORY_VECTOR)
+        self.listen(topics.ODOM, self._on_odom)
+        if s.source is Source.OBSTACLES:
+            self.listen(topics.OBSTACLES, self._on_measurement)
+        else:
+            self.listen(topics.SCAN, self._on_measurement)
+        self.offer_ready(names(s.wait_for))
+
+    def _set_sensor(self, sensor: SensorParams) -> None:
+        self.sensor = sensor
+
+    def _on_odom(self, message: Any) -> None:
+        self._pose = None
+        try:
+            self._pose = robot_pose(message)
+        except InputError as error:
+            self._refusals.add(error)
+        self._join(self._pairs.add_a, stamp_ns(message.header.stamp), self._pose)
+
+    def _on_measurement(self, message: Any) -> None:
+        stamp = stamp_ns(message.header.stamp)
+        if self.settings.lockstep or self.settings.source is Source.OBSTACLES:
+            self._join(self._pairs.add_b, stamp, message)
+        else:
+            self._answer(stamp, self._pose, message)
+
+    def _join(self, add: Any, stamp: int, value: Any) -> None:
+        try:
+            pair = add(stamp, value)
+        except InputError as error:
+            self._refusals.add(error)
+            return
+        if pair is not None:
+            self._answer(stamp, *pair)
+
+    def _answer(self, stamp: int, pose: Pose2D | None, message: Any) -> None:
+        """Publish sectors for one stamp; NaN where the inputs were refused."""
+        ranges: Ranges = (math.nan,) * self.sensor.sectors
+        try:
+            if pose is None:
+                raise InputError("no usable odom yet; the sectors are blind")
+            ranges = self._measure(pose, message)
+        except InputError as error:
+            self._refusals.add(error)
+        s = self.settings
+        self._sectors.publish(
+            sectors_msg(ranges, self.sensor, s.robot_radius_m, stamp, s.odom_frame)
+        )
+        if not math.isnan(ranges[0]):
+            self._vector.publish(sensory_vector_msg(sensory_vector(ranges)))
+
+    def _measure(self, pose: Pose2D, message: Any) -> Ranges:
+        s = self.settings
+        if s.source is Source.SCAN:
+            scan: Scan = laser_scan(message)
+            return sense_scan(scan, pose.yaw + s.scan_yaw, s.robot_radius_m, self.sensor)
+        centers = obstacle_centers(message)
+        circles = zip(centers, self._enlarged(centers))
+        return sense_circles(pose.position, circles, self.sensor)
+
+    def _enlarged(self, centers: Sequence[Point]) -> list[float]:
+        """One radius stands for all; otherwise there must be one per obstacle."""
+        radii = self.radii * len(centers) if len(self.radii) == 1 else self.radii
+        if len(radii) != len(centers):
+            raise InputError(
+                f"{len(centers)} obstacles but {len(radii)} obstacle_radii_m; give one per obstacle"
+            )
+        return [r + self.settings.robot_radius_m for r in radii]
+
+
+def main(args: list[str]) -> int:
+    """Entry point."""
+    return spin_node(VirtualSensor, args)

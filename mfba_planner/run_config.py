@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run, whatever drives it: what each node is told, and what explains it afterwards."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from . import __version__
+from .core.options import Scalar, check, flatten, option
+from .core.planner import PlannerParams
+from .core.sensing import SensorParams
+from .core.world import Scenario
+from .scenarios import scenario_to_json
+
+Parameters = dict[str, dict[str, Any]]
+
+NODES = ("world_sim", "virtual_sensor", "planner")
+
+
+class Driver(Enum):
+    """Who turns the loop; the decisions are the same."""
+
+    CORE = "core"
+    IN_PROCESS = "in-process"
+    MULTI_PROCESS = "multi-process"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunConfig:
+    """Everything that decides how a run goes."""
+
+    scenario: Scenario
+    planner: PlannerParams = field(default_factory=PlannerParams)
+    sensor: SensorParams = field(default_factory=SensorParams)
+    seed: int = option(0, "seed of all randomness", minimum=0, maximum=2**63 - 1)
+    driver: Driver = option(Driver.MULTI_PROCESS, "who turns the loop")
+    real_time: bool = option(False, "tick on a wall timer; false: lockstep")
+    speed_factor: float = option(
+        1.0, "simulated seconds per wall second in real time", minimum=0.01, maximum=1000.0
+    )
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+def run_facts(config: RunConfig) -> dict[str, Scalar]:
+    """What explains a run besides parameters: driver, mode of time, versions."""
+    return {
+        "driver": config.driver.value,
+        "real_time": config.real_time,
+        "mfba_planner": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
+def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
+    """What each node is told: {node: {parameter: value}}.
+
+    peers names all nodes that must be matched before the first tick.
+    """
+    lockstep = not config.real_time
+    # In lockstep nobody watches, and markers cost more than the decisions.
+    common = {"lockstep": lockstep, "wait_for": ",".join(peers)}
+    viewed = common | {"view_period_s": 2.0 if lockstep else 0.2}
+    radii = [obstacle.radius_m for obstacle in config.scenario.obstacles]
+    return {
+        "world_sim": viewed
+        | {
+            "scenario": scenario_to_json(config.scenario),
+            "speed_factor": config.speed_factor,
+            "tick_ns": config.planner.tick_ns,
+            "goal_tolerance_m": config.planner.goal_tolerance_m,
+            "start_paused": True,
+        },
+        "virtual_sensor": common
+        | flatten(config.sensor)
+        | {
+            "robot_radius_m": config.scenario.robot_radius_m,
+            **({"obstacle_radii_m": radii} if radii else {}),
+        },
+        "planner": viewed | flatten(config.planner) | {"seed": config.seed},
+    }
