@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The effective configuration a bag carries, so that it explains itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from mfba_planner.core.errors import BagError, OutputError
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.writer import BagWriter
+
+ATTACHMENT_NAME = "mfba_planner/configuration.json"
+MEDIA_TYPE = "application/json"
+SCHEMA_VERSION = 1
+
+
+def attach_configuration(writer: BagWriter, configuration: Mapping[str, Any]) -> None:
+    """Store the configuration in a bag, with its schema_version. Raises OutputError."""
+    content = {"schema_version": SCHEMA_VERSION, **configuration}
+    try:
+        text = json.dumps(content, indent=1, sort_keys=True, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise OutputError(
+            f"configuration: cannot be stored as JSON ({error}); use finite numbers and text"
+        ) from error
+    writer.attach(ATTACHMENT_NAME, MEDIA_TYPE, text.encode())
+
+
+def read_configuration(reader: BagReader) -> dict[str, Any]:
+    """The configuration a bag carries. Raises BagError where it has none we know."""
+    data = reader.attachment(ATTACHMENT_NAME)
+    if data is None:
+        raise BagError(
+            f"{reader.path}: carries no {ATTACHMENT_NAME}, so it was not recorded by mfba; "
+            "give a bag that `mfba run` recorded"
+        )
+    try:
+        content = json.loads(data)
+    except ValueError as error:
+        raise BagError(
+            f"{reader.path}: {ATTACHMENT_NAME} is not JSON ({error}); record the bag again"
+        ) from error
+    version = content.get("schema_version") if isinstance(content, dict) else None
+    if version != SCHEMA_VERSION:
+        raise BagError(
+            f"{reader.path}: {ATTACHMENT_NAME} has schema_version {version!r}, only "
+            f"{SCHEMA_VERSION} can be read; use the mfba that recorded it"
+        )
+    return dict(content)

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One open MCAP file and where in it everything is."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from mcap.opcode import Opcode
+from mcap.records import Attachment, AttachmentIndex, Channel, Metadata, MetadataIndex, Schema
+
+from mfba_planner.recording import records
+from mfba_planner.recording.records import FRAME, Message, reading
+
+
+class Piece(NamedTuple):
+    """A chunk, or a run of messages outside chunks; times in ns."""
+
+    offset: int
+    length: int
+    start_ns: int
+    end_ns: int
+    is_chunk: bool
+
+
+@dataclass
+class McapFile:
+    """The index of one open file; `damage` says in words what of it cannot be read."""
+
+    path: Path
+    stream: BinaryIO
+    size: int
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    counts: Counter[int] = field(default_factory=Counter)
+    pieces: list[Piece] = field(default_factory=list)
+    attachments: list[AttachmentIndex] = field(default_factory=list)
+    metadata: list[MetadataIndex] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+    bytes_lost: int = 0
+    complete: bool = False
+
+    def messages(self, piece: Piece) -> list[Message]:
+        """The messages of a piece in file order. Raises BagError."""
+        with reading(self.path, f"the chunk at byte {piece.offset}"):
+            if piece.is_chunk:
+                return records.messages(records.chunk_data(self.body(piece.offset, Opcode.CHUNK)))
+            return records.messages(self.bytes_at(piece.offset, piece.length))
+
+    def attachment(self, index: AttachmentIndex) -> Attachment:
+        """One attachment with its data. Raises BagError."""
+        with reading(self.path, f"the attachment {index.name!r}"):
+            return records.attachment(self.body(index.offset, Opcode.ATTACHMENT))
+
+    def metadata_record(self, index: MetadataIndex) -> dict[str, str]:
+        """The content of one metadata record. Raises BagError."""
+        with reading(self.path, f"the metadata record {index.name!r}"):
+            body = self.body(index.offset, Opcode.METADATA)
+            return dict(Metadata.read(records.parsed(body)).metadata)
+
+    def define(self, opcode: int, body: bytes) -> None:
+        """Take a schema or channel record; others are left alone, repetitions too."""
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(records.parsed(body))
+            self.schemas.setdefault(schema.id, schema)
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(records.parsed(body))
+            self.channels.setdefault(channel.id, channel)
+
+    def is_defined(self, channel: Channel) -> bool:
+        """Whether the channel's schema is known (0 stands for none)."""
+        return channel.schema_id == 0 or channel.schema_id in self.schemas
+
+    def body(self, offset: int, opcode: int) -> bytes:
+        """The body of the record at `offset`. Raises ValueError for another kind of record."""
+        found, length = FRAME.unpack(self.bytes_at(offset, FRAME.size))
+        if found != opcode:
+            raise ValueError(f"record type {found} instead of {int(opcode)} at byte {offset}")
+        return self.bytes_at(offset + FRAME.size, length)
+
+    def bytes_at(self, offset: int, length: int) -> bytes:
+        """Exactly `length` bytes. Raises ValueError where the file is shorter."""
+        if offset + length > self.size:
+            raise ValueError(f"{length} bytes wanted at byte {offset} of {self.size}")
+        self.stream.seek(offset)
+        data = self.stream.read(length)
+        if len(data) != length:
+            raise ValueError(f"the file became shorter than {self.size} bytes")
+        return data

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a bag says about itself: metadata.yaml version 9 and MCAP's `rosbag2` record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from mfba_planner.core.errors import BagError
+from mfba_planner.recording import qos as qos_words
+from mfba_planner.recording.qos import OfferedQos
+
+FILE_NAME = "metadata.yaml"
+RECORD_NAME = "rosbag2"
+RECORD_KEY = "serialized_metadata"
+ROS_DISTRO = "jazzy"
+VERSION = 9
+NO_TIME_NS = 2**63 - 1  # what rosbag2 writes as the start of a bag without messages
+_ROOT = "rosbag2_bagfile_information"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagTopic:
+    """One topic of a bag: name, type, offered QoS, RIHS01 hash ("" unknown), count."""
+
+    name: str
+    type_name: str
+    qos: tuple[OfferedQos, ...] = ()
+    type_hash: str = ""
+    message_count: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagFile:
+    """One storage file of a bag; start and duration in ns."""
+
+    path: str
+    start_ns: int = NO_TIME_NS
+    duration_ns: int = 0
+    message_count: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagMetadata:
+    """The content of metadata.yaml."""
+
+    topics: tuple[BagTopic, ...]
+    files: tuple[BagFile, ...]
+    ros_distro: str = ROS_DISTRO
+
+    @property
+    def message_count(self) -> int:
+        """Messages in all files."""
+        return sum(file.message_count for file in self.files)
+
+
+def dump_record(bag: BagMetadata) -> str:
+    """YAML text of the `rosbag2` metadata record: metadata.yaml without its root key."""
+    return str(yaml.safe_dump(_content(bag), sort_keys=False)).strip()
+
+
+def dump_file(bag: BagMetadata) -> str:
+    """YAML text of metadata.yaml."""
+    return str(yaml.safe_dump({_ROOT: _content(bag)}, sort_keys=False))
+
+
+def _content(bag: BagMetadata) -> dict[str, Any]:
+    starts = [file.start_ns for file in bag.files if file.message_count]
+    ends = [file.start_ns + file.duration_ns for file in bag.files if file.message_count]
+    start_ns = min(starts, default=NO_TIME_NS)
+    return {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        "duration": {"nanoseconds": max(ends, default=start_ns) - start_ns},
+        "starting_time": {"nanoseconds_since_epoch": start_ns},
+        "message_count": bag.message_count,
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.type_name,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": qos_words.to_list(topic.qos),
+                    "type_description_hash": topic.type_hash,
+                },
+                "message_count": topic.message_count,
+            }
+            for topic in bag.topics
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.path for file in bag.files],
+        "files": [
+            {
+                "path": file.path,
+                "starting_time": {"nanoseconds_since_epoch": file.start_ns},
+                "duration": {"nanoseconds": file.duration_ns},
+                "message_count": file.message_count,
+            }
+            for file in bag.files
+        ],
+        "custom_data": {},
+        "ros_distro": bag.ros_distro,
+    }
+
+
+def load_file(text: str, where: str) -> BagMetadata:
+    """Parse metadata.yaml of versions 1 to 9; `where` names it in errors. Raises BagError."""
+    try:
+        content = yaml.safe_load(text)[_ROOT]
+        version = int(content["version"])
+    except (yaml.YAMLError, TypeError, KeyError, ValueError) as error:
+        raise _broken(where, error) from error
+    if not 1 <= version <= VERSION:
+        raise BagError(
+            f"{where}: version {version} is not known (1 to {VERSION} are); "
+            "give the .mcap file itself"
+        )
+    try:
+        return _parse(content, where)
+    except (TypeError, KeyError, ValueError, AttributeError) as error:
+        raise _broken(where, error) from error
+
+
+def _broken(where: str, error: Exception) -> BagError:
+    reason = f"{type(error).__name__}: {error}".split("\n")[0]
+    return BagError(
+        f"{where}: not a readable metadata.yaml ({reason}); "
+        "give the .mcap file itself, or run `mfba recover` on the directory"
+    )
+
+
+def _parse(content: Mapping[str, Any], where: str) -> BagMetadata:
+    storage = content["storage_identifier"]
+    if storage != "mcap":
+        raise BagError(
+            f"{where}: storage {storage!r}, only mcap can be read; "
+            "convert the bag with `rosbags-convert --dst-storage mcap`"
+        )
+    mode = str(content.get("compression_mode") or "none").lower()
+    if mode != "none":
+        raise BagError(
+            f"{where}: compressed by {mode}, only MCAP's own chunk compression can be read; "
+            "convert the bag with `ros2 bag convert`"
+        )
+    # Before version 5 there are no per-file facts, so the whole bag's count stands for them.
+    per_file = content.get("files") or [
+        {"path": path, "message_count": content["message_count"] if i == 0 else 0}
+        for i, path in enumerate(content["relative_file_paths"])
+    ]
+    by_path = {str(file["path"]): file for file in per_file}
+    return BagMetadata(
+        topics=tuple(_topic(item, where) for item in content["topics_with_message_count"] or ()),
+        files=tuple(
+            _file(str(path), by_path.get(str(path), {})) for path in content["relative_file_paths"]
+        ),
+        ros_distro=str(content.get("ros_distro") or "unknown"),
+    )
+
+
+def _topic(item: Mapping[str, Any], where: str) -> BagTopic:
+    topic = item["topic_metadata"]
+    encoding = topic["serialization_format"]
+    if encoding != "cdr":
+        raise BagError(
+            f"{where}: topic {topic['name']} is serialized as {encoding!r}, only cdr can be read; "
+            "convert the bag with `ros2 bag convert`"
+        )
+    return BagTopic(
+        name=str(topic["name"]),
+        type_name=str(topic["type"]),
+        qos=qos_words.from_list(topic.get("offered_qos_profiles")),
+        type_hash=str(topic.get("type_description_hash") or ""),
+        message_count=int(item["message_count"]),
+    )
+
+
+def _file(path: str, item: Mapping[str, Any]) -> BagFile:
+    return BagFile(
+        path=path,
+        start_ns=int(item.get("starting_time", {}).get("nanoseconds_since_epoch", NO_TIME_NS)),
+        duration_ns=int(item.get("duration", {}).get("nanoseconds", 0)),
+        message_count=int(item.get("message_count", 0)),
+    )

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MCAP records out of bytes, checked: frames, messages, chunks, attachments."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import NamedTuple
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Chunk
+from mcap.stream_reader import get_chunk_data_stream
+
+from mfba_planner.core.errors import BagError
+
+FRAME = struct.Struct("<BQ")  # opcode, length of the body
+_MESSAGE = struct.Struct("<HIQQ")  # channel id, sequence, log time, publish time
+
+# mcap parses what it is given without looking: broken bytes surface as any of these.
+_PARSE_ERRORS = (
+    McapError,
+    ValueError,
+    KeyError,
+    RuntimeError,
+    MemoryError,
+    OverflowError,
+    struct.error,
+    zstandard.ZstdError,
+)
+
+
+class Message(NamedTuple):
+    """One stored message; times in ns."""
+
+    channel_id: int
+    sequence: int
+    log_time_ns: int
+    publish_time_ns: int
+    data: bytes
+
+
+@contextmanager
+def reading(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever broken bytes or a failing disk raise inside into a BagError."""
+    try:
+        yield
+    except OSError as error:
+        raise BagError(
+            f"{path}: cannot be read ({error.strerror}); copy it to a sound disk"
+        ) from error
+    except _PARSE_ERRORS as error:
+        reason = str(error).split("\n")[0] or type(error).__name__
+        raise BagError(
+            f"{path}: damaged, {what} cannot be read ({reason}); run `mfba recover {path}`"
+        ) from error
+
+
+def parsed(body: bytes) -> ReadDataStream:
+    """A record's body as the stream the `read` functions of mcap.records take."""
+    return ReadDataStream(BytesIO(body))
+
+
+def frames(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """(opcode, start, end) of each record's body in `data`. Raises ValueError, struct.error."""
+    position = 0
+    while position < len(data):
+        opcode, length = FRAME.unpack_from(data, position)
+        start = position + FRAME.size
+        position = start + length
+        if position > len(data):
+            raise ValueError(f"a record of {length} bytes runs over the end")
+        yield opcode, start, position
+
+
+def messages(data: bytes) -> list[Message]:
+    """The messages among the records of `data`, in their order there."""
+    return [
+        Message._make((*_MESSAGE.unpack_from(data, start), data[start + _MESSAGE.size : end]))
+        for opcode, start, end in frames(data)
+        if opcode == Opcode.MESSAGE
+    ]
+
+
+def chunk_data(body: bytes) -> bytes:
+    """The records inside a chunk, uncompressed, size and CRC checked."""
+    chunk = Chunk.read(parsed(body))
+    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+    if length != chunk.uncompressed_size:
+        raise ValueError(f"a chunk of {length} bytes instead of {chunk.uncompressed_size}")
+    return stream.read(length)
+
+
+def attachment(body: bytes) -> Attachment:
+    """An attachment, CRC checked (mcap reads past it without looking)."""
+    stored = int.from_bytes(body[-4:], "little")
+    if stored not in (0, zlib.crc32(body[:-4])):
+        raise ValueError("wrong CRC")
+    return Attachment.read(parsed(body))

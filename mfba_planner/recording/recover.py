@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Make an ordinary bag of one that was killed, truncated or damaged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mfba_planner.core.errors import BagError
+from mfba_planner.recording import metadata
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.writer import BagWriter
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecoverReport:
+    """What came over: messages and source chunks; what did not: bytes, and `problems`."""
+
+    source: Path
+    output: Path
+    messages: int
+    chunks: int
+    attachments: int
+    bytes_lost: int
+    problems: tuple[str, ...]
+
+
+def recover(path: str | Path, out_dir: str | Path) -> RecoverReport:
+    """Copy all that is whole of a bag into a new one, streaming; the source stays as it is.
+
+    Raises BagError when there is nothing, OutputError when `out_dir` exists or is full.
+    """
+    with BagReader(path, salvage=True) as reader:
+        if not reader.message_count and not reader.complete:
+            raise BagError(
+                f"{path}: not one whole chunk in {reader.size_bytes} bytes, "
+                "there is nothing to recover; record again"
+            )
+        writer = BagWriter(out_dir, ros_distro=reader.ros_distro)
+        try:
+            attachments = _copy(reader, writer)
+            writer.close()
+        except BaseException:
+            # The source is still there: half a copy helps nobody.
+            writer.discard()
+            raise
+        return RecoverReport(
+            source=reader.path,
+            output=Path(out_dir),
+            messages=writer.message_count,
+            chunks=reader.chunk_count,
+            attachments=attachments,
+            bytes_lost=reader.bytes_lost,
+            problems=tuple(reader.problems),
+        )
+
+
+def _copy(reader: BagReader, writer: BagWriter) -> int:
+    """Copy everything and return the number of attachments."""
+    attachments = 0
+    for attachment in reader.iter_attachments():
+        writer.attach(
+            attachment.name,
+            attachment.media_type,
+            attachment.data,
+            log_time_ns=attachment.log_time,
+            create_time_ns=attachment.create_time,
+        )
+        attachments += 1
+    for name, content in reader.metadata_records():
+        if name != metadata.RECORD_NAME:  # the writer makes its own
+            writer.add_metadata(name, content)
+    for topic in reader.topics.values():
+        definition = reader.definitions[topic.type_name]
+        writer.add_topic(topic.name, topic.type_name, topic.qos, definition=definition)
+    for message in reader.messages(in_file_order=True):
+        writer.write(
+            message.topic,
+            message.data,
+            message.log_time_ns,
+            message.publish_time_ns,
+            sequence=message.sequence,
+        )
+    return attachments

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Message definitions and RIHS01 type hashes from the installed interface packages."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from mfba_planner.core.errors import InputError
+
+_SEPARATOR = "\n" + "=" * 80 + "\n"
+_FIELD_TYPE = re.compile(r"\s*(?:([A-Za-z]\w*)/(?:msg/)?)?([A-Za-z]\w*)")
+_PRIMITIVES = frozenset(
+    ("bool", "byte", "char", "float32", "float64", "int8", "uint8", "int16", "uint16")
+    + ("int32", "uint32", "int64", "uint64", "string", "wstring")
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """A message type as a bag carries it: `pkg/msg/Name`, schema text, RIHS01 hash."""
+
+    type_name: str
+    text: str
+    type_hash: str
+    encoding: str = "ros2msg"
+
+
+def definition_of(type_name: str) -> Definition:
+    """The definition of an installed type. Raises InputError for one that is not installed."""
+    return _definition(type_name, _prefixes())
+
+
+def _prefixes() -> tuple[str, ...]:
+    # A sourced workspace names its prefixes; the wheels put share/ under sys.prefix.
+    ament = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return (*(prefix for prefix in ament if prefix), sys.prefix)
+
+
+@cache
+def _definition(type_name: str, prefixes: tuple[str, ...]) -> Definition:
+    parts = type_name.split("/")
+    if len(parts) != 3 or parts[1] != "msg" or not all(parts):
+        raise InputError(
+            f"{type_name!r}: not a message type; write it in three parts, like std_msgs/msg/String"
+        )
+    path = _msg_file(parts[0], parts[2], prefixes)
+    own, *dependencies = _with_dependencies(parts[0], parts[2], prefixes, set())
+    blocks = [f"{_SEPARATOR}MSG: {package}/{name}\n{text}" for package, name, text in dependencies]
+    return Definition(type_name, own[2] + "".join(blocks), _type_hash(type_name, path))
+
+
+def _with_dependencies(
+    package: str, name: str, prefixes: tuple[str, ...], seen: set[tuple[str, str]]
+) -> list[tuple[str, str, str]]:
+    """(package, name, .msg text) of a type and all it uses, depth first, each once.
+
+    What a type uses comes in alphabetical order, so that the text is rosbag2's to the byte.
+    """
+    seen.add((package, name))
+    text = _msg_file(package, name, prefixes).read_text(encoding="utf-8")
+    found = [(package, name, text)]
+    fields = [match for match in map(_FIELD_TYPE.match, text.splitlines()) if match]
+    uses = {(match[1] or package, match[2]) for match in fields if match[2] not in _PRIMITIVES}
+    for used in sorted(uses):
+        if used not in seen:
+            found += _with_dependencies(*used, prefixes, seen)
+    return found
+
+
+def _msg_file(package: str, name: str, prefixes: tuple[str, ...]) -> Path:
+    for prefix in prefixes:
+        path = Path(prefix, "share", package, "msg", f"{name}.msg")
+        if path.is_file():
+            return path
+    raise InputError(
+        f"{package}/msg/{name}: this message type is not installed; "
+        f"install the ROS 2 package {package} or leave the topic out"
+    )
+
+
+def _type_hash(type_name: str, msg_file: Path) -> str:
+    path = msg_file.with_suffix(".json")
+    try:
+        hashes = json.loads(path.read_text(encoding="utf-8"))["type_hashes"]
+        return next(str(h["hash_string"]) for h in hashes if h["type_name"] == type_name)
+    except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
+        raise InputError(
+            f"{path}: holds no type hash of {type_name} ({type(error).__name__}); "
+            f"install the ROS 2 package {type_name.split('/')[0]} again"
+        ) from error

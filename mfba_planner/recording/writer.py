@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Write a bag directory: an MCAP file as rosbag2 writes it, and metadata.yaml at the end."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+
+from mcap.well_known import MessageEncoding, Profile
+from mcap.writer import CompressionType, Writer
+
+from mfba_planner.core.errors import OutputError
+from mfba_planner.recording import metadata, qos, storage
+from mfba_planner.recording.metadata import BagFile, BagMetadata, BagTopic
+from mfba_planner.recording.qos import OfferedQos
+from mfba_planner.recording.schemas import Definition, definition_of
+
+CHUNK_BYTES = 512 * 1024
+MAX_CHUNK_AGE_S = 0.8  # leaves 0.2 s of the promised 1 s to a late timer
+_MESSAGE_OVERHEAD = 31  # bytes around each message in a chunk
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+class BagWriter:
+    """A bag being recorded into a new directory; `close` makes it complete.
+
+    What was written survives kill -9 up to the chunk in progress, which ends at `chunk_bytes`,
+    or before `max_chunk_age_s` where a regular timer calls `flush_if_due`. Raises OutputError
+    for a directory that exists or cannot be written, and for a disk that fills up.
+    """
+
+    def __init__(
+        self,
+        directory: str | Path,
+        *,
+        chunk_bytes: int = CHUNK_BYTES,
+        max_chunk_age_s: float = MAX_CHUNK_AGE_S,
+        compression: CompressionType = CompressionType.ZSTD,
+        ros_distro: str = metadata.ROS_DISTRO,
+    ) -> None:
+        if not hasattr(Writer, "flush"):
+            raise OutputError("mcap: this version cannot end a chunk; install mcap 1.5 or newer")
+        self.directory = Path(os.path.abspath(directory))
+        self.path = self.directory / f"{self.directory.name}_0.mcap"
+        self._chunk_bytes = chunk_bytes
+        self._max_age_ns = round(max_chunk_age_s * 1e9)
+        self._ros_distro = ros_distro
+        self._topics: dict[str, BagTopic] = {}
+        self._channel_ids: dict[str, int] = {}
+        self._schema_ids: dict[str, int] = {}
+        self._counts: dict[str, int] = {}
+        self._start_ns = metadata.NO_TIME_NS
+        self._end_ns = 0
+        self._pending_bytes = 0
+        self._pending_count = 0
+        self._stored_count = 0
+        self._last_call_ns: int | None = None
+        self._empty_since_ns = 0  # of the steady clock: nothing was pending then
+        self._open = True
+        self._made = storage.make_directory(self.directory)
+        try:
+            self._stream = storage.WholeWrites(self.path)
+        except OSError as error:
+            storage.remove_empty(self._made)
+            raise storage.cannot_create(self.directory, error) from error
+        try:
+            # Chunks are ended here, by size and by age; mcap's own limit is out of the way.
+            self._writer = Writer(
+                self._stream,  # type: ignore[arg-type]
+                chunk_size=1 << 62,
+                compression=compression,
+            )
+            self._writer.start(profile=Profile.ROS2, library="mfba_planner")
+            self._write_record()
+        except BaseException as error:
+            self.discard()
+            if isinstance(error, OSError):
+                raise storage.cannot_create(self.directory, error) from error
+            raise
+
+    def __enter__(self) -> BagWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def message_count(self) -> int:
+        """Messages written, those of the chunk in progress too."""
+        return self._stored_count + self._pending_count
+
+    @property
+    def topics(self) -> dict[str, BagTopic]:
+        """The topics by name, with their counts so far."""
+        return {
+            name: replace(topic, message_count=self._counts[name])
+            for name, topic in self._topics.items()
+        }
+
+    def add_topic(
+        self,
+        name: str,
+        type_name: str,
+        offered: OfferedQos | Iterable[OfferedQos] = (),
+        *,
+        definition: Definition | None = None,
+    ) -> None:
+        """Announce a topic, also while recording; again with the same type changes nothing.
+
+        `definition` defaults to the installed one. Raises InputError for a type that is not
+        installed, OutputError for another type on a known topic.
+        """
+        known = self._topics.get(name)
+        if known is not None:
+            if known.type_name != type_name:
+                raise OutputError(
+                    f"{name}: recorded as {known.type_name}, not as {type_name}; "
+                    "give the topic one type"
+                )
+            return
+        definition = definition or definition_of(type_name)
+        profiles = (offered,) if isinstance(offered, OfferedQos) else tuple(offered)
+        with self._guarded():
+            if type_name not in self._schema_ids:
+                self._schema_ids[type_name] = self._writer.register_schema(
+                    type_name, definition.encoding, definition.text.encode()
+                )
+            self._channel_ids[name] = self._writer.register_channel(
+                name,
+                MessageEncoding.CDR,
+                self._schema_ids[type_name],
+                {
+                    "offered_qos_profiles": qos.to_text(profiles),
+                    "topic_type_hash": definition.type_hash,
+                },
+            )
+        self._counts[name] = 0
+        self._topics[name] = BagTopic(
+            name=name, type_name=type_name, qos=profiles, type_hash=definition.type_hash
+        )
+
+    def write(
+        self,
+        topic: str,
+        cdr_bytes: bytes,
+        log_time_ns: int,
+        publish_time_ns: int,
+        *,
+        sequence: int | None = None,
+    ) -> None:
+        """Store one serialized message; `sequence` defaults to the topic's own count.
+
+        Raises OutputError for an unknown topic, a time below 0 or from 2**63 - 1 on, a full disk.
+        """
+        count = self._counts.get(topic)
+        if count is None:
+            raise OutputError(f"{topic}: not a topic of this bag; announce it with add_topic")
+        for time_ns in (log_time_ns, publish_time_ns):
+            if not 0 <= time_ns < metadata.NO_TIME_NS:
+                raise OutputError(
+                    f"{topic}: time {time_ns} ns cannot be stored; give 0 to 2**63 - 2"
+                )
+        self._refuse_after_end()
+        try:
+            # Into memory only: flush writes. (Spelt out, as _guarded costs as much again.)
+            self._writer.add_message(
+                self._channel_ids[topic],
+                log_time_ns,
+                cdr_bytes,
+                publish_time_ns,
+                count & 0xFFFFFFFF if sequence is None else sequence,
+            )
+        except BaseException:
+            self._abandon()
+            raise
+        self._counts[topic] = count + 1
+        self._pending_count += 1
+        self._pending_bytes += len(cdr_bytes) + _MESSAGE_OVERHEAD
+        self._start_ns = min(self._start_ns, log_time_ns)
+        self._end_ns = max(self._end_ns, log_time_ns)
+        if self._pending_bytes >= self._chunk_bytes:
+            self.flush()
+
+    def flush(self) -> None:
+        """End the chunk in progress and hand it to the system."""
+        with self._guarded():
+            self._writer.flush()
+        self._stored_count += self._pending_count
+        self._pending_count = self._pending_bytes = 0
+        self._empty_since_ns = self._last_call_ns or 0
+
+    def flush_if_due(self, steady_now_ns: int) -> None:
+        """Flush before the chunk in progress gets too old: call it from a regular timer.
+
+        The oldest message may have come right after the last moment known to be without any,
+        and the next chance to flush is one period away: both count towards its age.
+        """
+        last_ns, self._last_call_ns = self._last_call_ns, steady_now_ns
+        if self._pending_count:
+            period_ns = steady_now_ns - (last_ns or 0)
+            if steady_now_ns + period_ns - self._empty_since_ns < self._max_age_ns:
+                return
+            self.flush()
+        self._empty_since_ns = steady_now_ns
+
+    def attach(
+        self,
+        name: str,
+        media_type: str,
+        data: bytes,
+        *,
+        log_time_ns: int = 0,
+        create_time_ns: int = 0,
+    ) -> None:
+        """Store a file inside the bag, at once."""
+        with self._guarded():
+            self._writer.add_attachment(create_time_ns, log_time_ns, name, media_type, data)
+
+    def add_metadata(self, name: str, content: Mapping[str, str]) -> None:
+        """Store a metadata record, at once."""
+        with self._guarded():
+            self._writer.add_metadata(name, dict(content))
+
+    def close(self) -> None:
+        """Finish the file and write metadata.yaml; does nothing after the end or a failure."""
+        if not self._open:
+            return
+        self.flush()
+        with self._guarded():
+            self._write_record()
+            self._writer.finish()
+            self._stream.close()
+            text = metadata.dump_file(self._content())
+            storage.write_whole(self.directory / metadata.FILE_NAME, text)
+        self._open = False
+
+    def discard(self) -> None:
+        """Close without finishing and remove what was written."""
+        self._abandon()
+        for path in (self.path, self.directory / metadata.FILE_NAME):
+            with suppress(OSError):
+                path.unlink()
+        storage.remove_empty(self._made)
+
+    def _content(self) -> BagMetadata:
+        file = BagFile(
+            path=self.path.name,
+            start_ns=self._start_ns,
+            duration_ns=max(self._end_ns - self._start_ns, 0),
+            message_count=self.message_count,
+        )
+        return BagMetadata(
+            topics=tuple(self.topics.values()), files=(file,), ros_distro=self._ros_distro
+        )
+
+    def _write_record(self) -> None:
+        text = metadata.dump_record(self._content())
+        self._writer.add_metadata(metadata.RECORD_NAME, {metadata.RECORD_KEY: text})
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Refuse after the end; whatever fails inside, leave a file that can be recovered.
+
+        An interrupt is a failure too: mcap's indexes may not fit the file any more.
+        """
+        self._refuse_after_end()
+        try:
+            yield
+        except BaseException as error:
+            self._abandon()
+            if not isinstance(error, OSError):
+                raise
+            what = "disk full" if error.errno in _FULL else "cannot be written"
+            raise OutputError(
+                f"{self.directory}: {what} after {self._stored_count} messages "
+                f"({error.strerror}); make room and run `mfba recover {self.directory}`"
+            ) from error
+
+    def _refuse_after_end(self) -> None:
+        if not self._open:
+            raise OutputError(
+                f"{self.directory}: the recording has ended; record into a new directory"
+            )
+
+    def _abandon(self) -> None:
+        self._open = False
+        with suppress(OSError):
+            self._stream.close()
