@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The doors: what a user sees of errors, signals and closed pipes, and what imports cost."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mfba_planner.core.errors import BagError
+from mfba_planner.entry import guarded_main
+
+ROOT = Path(__file__).parents[1]
+
+
+def start(code: str, **options: object) -> "subprocess.Popen[str]":
+    """Run a few lines of Python in a process of their own, so that signals and pipes are real."""
+    return subprocess.Popen(  # type: ignore[call-overload, no-any-return]
+        [sys.executable, "-c", f"import sys\nfrom mfba_planner import entry\n{code}"],
+        cwd=ROOT,
+        text=True,
+        stderr=subprocess.PIPE,
+        **{"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, **options},
+    )
+
+
+def outcome(process: "subprocess.Popen[str]") -> tuple[int, str | None, str]:
+    out, err = process.communicate(timeout=30)
+    return process.returncode, out, err
+
+
+def raiser(error: BaseException) -> Callable[[], int]:
+    def run() -> int:
+        raise error
+
+    return run
+
+
+def rclpy_init(*args: str) -> Callable[[], int]:
+    """What a node does first, with a user's arguments."""
+
+    def run() -> int:
+        from rclpy.context import Context
+
+        Context().init(args=["--ros-args", *args])
+        return 0
+
+    return run
+
+
+def test_a_program_that_ends_well_keeps_its_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+    assert guarded_main(lambda: 0, "mfba") == 0
+    assert guarded_main(lambda: 3, "mfba") == 3
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("run", "line"),
+    [
+        (raiser(BagError("run1: empty; give a bag")), "run1: empty; give a bag"),
+        (raiser(BagError("run1: odd\nvalue; give a bag")), "run1: odd value; give a bag"),
+        (
+            raiser(OSError(errno.ENOSPC, "No space left on device", "/x/bag.mcap")),
+            "/x/bag.mcap: No space left on device; free some space or write elsewhere",
+        ),
+        (
+            raiser(PermissionError(errno.EACCES, "Permission denied", "/x")),
+            "/x: Permission denied; give a path this user may use",
+        ),
+        (
+            raiser(ModuleNotFoundError("No module named 'mcap'", name="mcap")),
+            "No module named 'mcap'; pip install what setup.py and requirements-ros.txt name",
+        ),
+        (rclpy_init("--odd"), "['--odd']: unknown ROS arguments; after --ros-args give"),
+        (rclpy_init("-p", "vmax"), "failed to initialize rcl: Couldn't parse parameter override"),
+        (
+            rclpy_init("--params-file", "/no.yaml"),
+            "failed to initialize rcl: Couldn't parse params",
+        ),
+    ],
+)
+def test_what_a_user_can_mend_becomes_one_line(
+    run: Callable[[], int], line: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert guarded_main(run, "mfba") == 1
+    said = [text for text in capfd.readouterr().err.splitlines() if "[rcl]" not in text]
+    assert len(said) == 1
+    assert said[0].startswith(f"mfba: {line}")
+
+
+@pytest.mark.parametrize(
+    "bug",
+    [
+        ValueError("a bug"),
+        RuntimeError("failed to initialize"),
+        OSError(errno.EBADF, "a bug"),
+        ModuleNotFoundError("a bug", name="mfba_planner.ros.plannr"),
+    ],
+)
+def test_a_bug_keeps_its_traceback(bug: Exception) -> None:
+    with pytest.raises(type(bug)) as raised:
+        guarded_main(raiser(bug), "mfba")
+    assert raised.value is bug
+
+
+@pytest.mark.parametrize(("interrupted", "code"), [({}, 130), ({"interrupted": 0}, 0)])
+def test_ctrl_c_is_quiet(
+    interrupted: dict[str, int], code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert guarded_main(raiser(KeyboardInterrupt()), "mfba", **interrupted) == code
+    assert capsys.readouterr() == ("", "")
+
+
+def test_loading_the_doors_loads_nothing_heavy() -> None:
+    heavy = "{'numpy', 'rclpy', 'matplotlib', 'yaml', 'pydantic', 'rich', 'argparse'}"
+    code, out, err = outcome(start(f"print(sorted({heavy} & set(sys.modules)))"))
+    assert (code, out, err) == (0, "[]\n", "")
+
+
+@pytest.mark.parametrize("size", [1, 100_000])
+def test_a_reader_that_left_is_no_error(size: int) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    code = f"sys.exit(entry.guarded_main(lambda: int(bool(print('x' * {size}))), 'mfba'))"
+    try:
+        assert outcome(start(code, stdout=writer)) == (141, None, "")
+    finally:
+        os.close(writer)
+
+
+@pytest.mark.parametrize("size", [1, 100_000])
+def test_a_full_disk_behind_stdout_is_one_line(size: int) -> None:
+    code = f"sys.exit(entry.guarded_main(lambda: int(bool(print('x' * {size}))), 'mfba'))"
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        status, _, err = outcome(start(code, stdout=full))
+    assert (status, err) == (
+        1,
+        "mfba: output: No space left on device; free some space or write elsewhere\n",
+    )
+
+
+SLOW_IMPORT = """
+def slow(name):
+    print("importing", flush=True)
+    sys.stdin.read()
+entry.import_module = slow
+sys.exit(entry.{door}())
+"""
+
+
+@pytest.mark.parametrize(
+    ("door", "signum", "code"),
+    [
+        ("planner", signal.SIGINT, 0),
+        ("planner", signal.SIGTERM, 0),
+        ("mfba", signal.SIGINT, 130),
+        ("mfba", signal.SIGTERM, 143),
+    ],
+)
+def test_a_signal_during_the_imports_is_quiet(door: str, signum: int, code: int) -> None:
+    process = start(SLOW_IMPORT.format(door=door), stdin=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "importing\n"
+    process.send_signal(signum)
+    assert outcome(process) == (code, "", "")
+
+
+RUNNING_COMMAND = """
+from types import SimpleNamespace
+def main(argv):
+    try:
+        print("running", argv, flush=True)
+        sys.stdin.read()
+    finally:
+        print("closed", flush=True)
+entry.import_module = lambda name: SimpleNamespace(main=main)
+sys.argv = ["mfba", "run"]
+sys.exit(entry.mfba())
+"""
+
+
+@pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_unwinds_a_running_command(signum: int, code: int) -> None:
+    process = start(RUNNING_COMMAND, stdin=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "running ['run']\n"
+    process.send_signal(signum)
+    assert outcome(process) == (code, "closed\n", "")
+
+
+@pytest.mark.parametrize(
+    ("before", "line"),
+    [
+        (
+            "import os; os.environ['RMW_IMPLEMENTATION'] = 'rmw_nope'",
+            "planner: RMW_IMPLEMENTATION=rmw_nope: librmw_nope.so: cannot open",
+        ),
+        ("sys.modules['rclpy'] = None", "planner: rclpy: import of rclpy halted"),
+    ],
+)
+def test_a_node_without_ros_says_so_in_one_line(before: str, line: str) -> None:
+    code, out, err = outcome(start(f"{before}; sys.exit(entry.planner())"))
+    assert (code, out) == (1, "")
+    assert err.startswith(line)
+    assert len(err.splitlines()) == 1
+    assert "; " in err  # a remedy follows

@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The house itself: one version, licences, who may import whom, short files, sound packaging."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from mfba_planner import __version__, resources
+from mfba_planner.core.errors import InputError
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "mfba_planner"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+NODES = ("planner", "world_sim", "virtual_sensor", "recorder", "replay")
+COMMANDS = ("launcher", "mfba")
+
+# Who may import whom, inside the package and outside; "*" is everything but cli.
+ROS = (
+    {"rclpy", "tf2_msgs", "builtin_interfaces", "rcl_interfaces", "ament_index_python"}
+    | {f"{kind}_msgs" for kind in ("diagnostic", "geometry", "nav", "rosgraph", "sensor", "std")}
+    | {"std_srvs", "visualization_msgs"}
+)
+MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
+    "__init__": (set(), set()),
+    "core": ({"core"}, {"numpy"}),
+    "resources": ({"core"}, set()),
+    "outputs": ({"core"}, set()),
+    "entry": ({"core"}, set()),
+    "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
+    "messages": ({"core"}, {"numpy"}),
+    "run_config": ({"core", "scenarios"}, {"numpy"}),
+    "paper": ({"core", "paper"}, {"numpy"}),
+    "recording": (
+        {"core", "messages", "outputs", "recording", "run_config", "scenarios"},
+        {"mcap", "mcap_ros2", "numpy", "yaml", "zstandard"},
+    ),
+    "report": ({"core", "paper", "report"}, {"matplotlib", "numpy", "rich"}),
+    "ros": (
+        {"core", "messages", "outputs", "recording", "ros", "run_config", "scenarios"},
+        {"numpy"} | ROS,
+    ),
+    "launcher": ({"*"}, {"rich", "yaml"} | ROS),
+    "cli": ({"*"}, {"rich", "yaml"}),
+}
+# The core is handed the time and its random generators, and lets others do the talking.
+CORE_NEVER = {"asyncio", "datetime", "logging", "multiprocessing", "random", "threading", "time"}
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def imports_of(path: Path) -> Iterator[str]:
+    """Every module that a file names in an import, absolute, lazy ones included."""
+    package = path.relative_to(ROOT).parent.parts
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else ()
+            module = ".".join((*base, *filter(None, [node.module])))
+            yield from (f"{module}.{alias.name}" for alias in node.names)
+
+
+def layer_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+def is_node(path: Path) -> bool:
+    return path.parent.name == "ros" and path.stem in NODES
+
+
+def relative(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=relative)
+def test_imports_stay_within_their_layer(path: Path) -> None:
+    layer = layer_of(path)
+    assert layer in MAY_IMPORT, f"{layer} is new: say in MAY_IMPORT whom it may import"
+    inside, outside = MAY_IMPORT[layer]
+    for name in imports_of(path):
+        top, *rest = name.split(".")
+        if top == "mfba_planner":
+            assert rest[0] != "cli", f"{name}: nothing imports cli"
+            assert {rest[0], "*"} & (inside | {"__version__"}), f"{layer} must not import {name}"
+        elif top in sys.stdlib_module_names:
+            assert layer != "core" or top not in CORE_NEVER, f"core must not import {name}"
+        else:
+            assert top in outside, f"{layer} must not import {name}"
+
+
+def test_no_module_of_ros_but_the_in_process_driver_imports_a_node() -> None:
+    for path in SOURCES:
+        if layer_of(path) == "ros" and path.stem != "in_process":
+            for name in imports_of(path):
+                parts = name.split(".")
+                assert not (parts[:2] == ["mfba_planner", "ros"] and parts[2] in NODES), (
+                    f"{relative(path)} imports the node {name}"
+                )
+
+
+def test_core_tells_no_time_and_draws_no_hidden_random_numbers() -> None:
+    hidden = re.compile(r"np\.random\.(seed|rand|randn|random|uniform|normal)\b|default_rng\(\)")
+    for path in SOURCES:
+        if layer_of(path) == "core":
+            assert not hidden.search(path.read_text(encoding="utf-8")), relative(path)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=relative)
+def test_files_and_callbacks_stay_short(path: Path) -> None:
+    lines = len(path.read_text(encoding="utf-8").splitlines())
+    assert lines <= (150 if is_node(path) else 400)
+    if not is_node(path):
+        return
+    tree = tree_of(path)
+    handed_over = {
+        argument.attr
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call)
+        for argument in [*call.args, *(keyword.value for keyword in call.keywords)]
+        if isinstance(argument, ast.Attribute)
+    }
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef) and function.name in handed_over:
+            length = (function.end_lineno or 0) - function.lineno + 1
+            assert length <= 15, f"{function.name} has {length} lines: move its work to core"
+
+
+def test_every_python_file_names_its_licence_first() -> None:
+    folders = ("bench", "launch", "mfba_planner", "test", "tools")
+    files = [
+        ROOT / "setup.py",
+        *(path for name in folders for path in (ROOT / name).rglob("*.py")),
+    ]
+    for path in files:
+        first = path.read_text(encoding="utf-8").partition("\n")[0]
+        assert first == "# SPDX-License-Identifier: Apache-2.0", relative(path)
+    assert "Apache License" in (ROOT / "LICENSE").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def distribution(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """What setup.py hands to setuptools."""
+    import_module("setuptools")  # brings distutils where Python has none
+    monkeypatch.chdir(ROOT)
+    return import_module("distutils.core").run_setup("setup.py", stop_after="init")
+
+
+def manifest() -> ElementTree.Element:
+    return ElementTree.parse(ROOT / "package.xml").getroot()
+
+
+def test_one_version_everywhere(distribution: Any) -> None:
+    released = re.search(
+        r"^(\d+\.\d+\.\d+) \((\d{4}-\d\d-\d\d)\)$",
+        (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8"),
+        re.MULTILINE,
+    )
+    assert released
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert manifest().findtext("version") == __version__
+    assert distribution.get_version() == __version__
+    assert released.group(1) == citation["version"] == __version__
+    assert released.group(2) == str(citation["date-released"])
+
+
+def test_manifest_is_what_ament_and_setup_expect(distribution: Any) -> None:
+    root = manifest()
+    assert root.get("format") == "3"
+    assert root.findtext("name") == distribution.get_name() == "mfba_planner"
+    assert root.findtext("license") == distribution.get_license() == "Apache-2.0"
+    assert root.findtext("export/build_type") == "ament_python"
+    maintainer = root.find("maintainer")
+    assert maintainer is not None
+    # An invalid address makes colcon drop the ament hooks without a word.
+    assert re.fullmatch(
+        r"[-a-zA-Z0-9_%+.]+@[-a-zA-Z0-9.]+\.[a-zA-Z]{2,}", maintainer.get("email", "")
+    )
+    assert maintainer.get("email") == distribution.get_maintainer_email()
+
+
+def test_every_import_is_declared_and_every_dependency_justified(distribution: Any) -> None:
+    wheels = {
+        re.split(r"[^\w-]", requirement)[0]
+        for requirement in [
+            *distribution.install_requires,
+            *(name for extra in distribution.extras_require.values() for name in extra),
+            *(ROOT / "requirements-ros.txt").read_text(encoding="utf-8").splitlines(),
+            *(ROOT / "requirements-colcon.txt").read_text(encoding="utf-8").splitlines(),
+        ]
+        if not requirement.startswith("#")
+    }
+    ros = {element.text for element in manifest() if element.tag.endswith("_depend")}
+    modules = {"PyYAML": "yaml", "mcap-ros2-support": "mcap_ros2"}
+    declared = {modules.get(name, name) for name in wheels} | ros
+    imported = {name.split(".")[0] for path in SOURCES for name in imports_of(path)}
+    used = imported - sys.stdlib_module_names - {"mfba_planner"}
+    assert used <= declared
+
+    text = (ROOT / "docs/dependencies.md").read_text(encoding="utf-8")
+    justified = set(re.findall(r"`([\w-]+)`", text))
+    assert wheels | ros <= justified
+
+
+def test_installs_every_shipped_file(distribution: Any) -> None:
+    installed = {source for _, sources in distribution.data_files for source in sources}
+    shipped = {
+        relative(path)
+        for pattern in ("config/**/*.yaml", "launch/*.py", "layout/*", "resource/*")
+        for path in ROOT.glob(pattern)
+    }
+    assert installed == shipped | {"package.xml"}
+    assert "config/scenarios/case1.yaml" in installed
+    assert {path.parent.name for path in SOURCES} == {
+        package.rpartition(".")[2] for package in distribution.packages
+    }
+
+
+def test_programs_lead_to_a_main(distribution: Any) -> None:
+    from mfba_planner import entry
+
+    scripts = dict(line.split(" = ") for line in distribution.entry_points["console_scripts"])
+    assert sorted(scripts) == sorted(NODES + COMMANDS)
+    for name, target in scripts.items():
+        assert target == f"mfba_planner.entry:{name}"
+        assert callable(getattr(entry, name))
+    for module in (*(f"ros/{name}" for name in NODES), "launcher", "cli"):
+        path = PACKAGE / f"{module}.py"
+        path = path if path.exists() else PACKAGE / module / "__init__.py"
+        assert path.exists(), f"{module} is missing"
+        mains = [node for node in tree_of(path).body if getattr(node, "name", "") == "main"]
+        assert len(mains) == 1, f"{module}: main(args: list[str]) -> int is missing"
+
+
+def test_shipped_files_are_found_by_name() -> None:
+    names = resources.scenario_names()
+    assert {"case1", "case2"} <= set(names)
+    assert resources.scenario_path("case1").is_file()
+    with pytest.raises(InputError, match=r"scenarios/case0\.yaml: not a shipped file; see "):
+        resources.scenario_path("case0")
+
+
+def run(*command: str, **variables: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        command,
+        cwd=ROOT,
+        env={**os.environ, **variables},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_make_refuses_a_bad_interpreter_in_one_line(tmp_path: Path) -> None:
+    shim = tmp_path / "python3.12"
+    shim.write_text(
+        "#!/bin/sh\necho 'pyenv: python3.12: command not found\n\nhelp' >&2; exit 127\n"
+    )
+    shim.chmod(0o755)
+    venv = tmp_path / "venv"
+    done = run("make", "venv", f"VENV={venv}", f"PYTHON={shim} /bin/false {tmp_path}/nowhere")
+    assert done.returncode != 0
+    said = [line for line in done.stderr.splitlines() if not line.startswith("make")]
+    assert said == [
+        f"no usable Python: {shim} does not run; /bin/false does not run; "
+        f"{tmp_path}/nowhere not found; "
+        "install Python 3.10 to 3.13 or name it: make PYTHON=/path/to/python3"
+    ]
+    assert not venv.exists()
+
+
+def test_python_finder_takes_the_first_that_works() -> None:
+    done = run("tools/find_python.sh", "/bin/false", sys.executable, "/nowhere")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{sys.executable}\n", "")
+
+
+def test_python_finder_names_the_version_it_refuses(tmp_path: Path) -> None:
+    old = tmp_path / "python3"
+    old.write_text("#!/bin/sh\necho 'is Python 3.9' >&2; exit 1\n")
+    old.chmod(0o755)
+    done = run("tools/find_python.sh", str(old))
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"no usable Python: {old} is Python 3.9; install")
