@@ -125,16 +125,18 @@ def points(text: str) -> tuple[Point, ...]:
         raise InputError(f"{text!r}: not a list of points 'x,y x,y'") from None
 
 
-def decision(diagnostics: Any, pose: Pose2D, ranges_m: Ranges) -> Decision:
-    """planner/decision (with its inputs) to a Decision; InputError if a field is missing."""
-    fields = {item.key: item.value for item in diagnostics.status[0].values}
+def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:
+    """planner/decision and the sectors it answers to a Decision; InputError if garbled."""
     try:
+        status = diagnostics.status[0]
+        fields = {item.key: item.value for item in status.values}
         goal = points(fields["goal"])
+        x, y, yaw = map(float, fields["pose"].split(","))
         return Decision(
             stamp_ns=stamp_ns(diagnostics.header.stamp),
             mode=Mode(fields["mode"]),
-            reason=diagnostics.status[0].message,
-            pose=pose,
+            reason=status.message,
+            pose=Pose2D(x, y, yaw),
             goal=goal[0] if goal else None,
             ranges_m=ranges_m,
             vs=tuple(map(int, fields["vs"])),

@@ -21,7 +21,9 @@ _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-1e6, le=1
 _Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=1e6)]
 _NotNegative = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=0.0, le=1e6)]
 _Point = tuple[_Number, _Number]
-_DEFAULTS = {name: field.default for name, field in Scenario.__dataclass_fields__.items()}
+_DEFAULTS: dict[str, Any] = {
+    name: field.default for name, field in Scenario.__dataclass_fields__.items()
+}
 
 
 class _Strict(BaseModel):

@@ -54,7 +54,7 @@ def evaluate(episode: Episode) -> Result:
         outcome=episode.outcome,
         success=episode.outcome is Outcome.GOAL_REACHED and collisions == 0,
         length_m=length,
-        time_s=(len(episode.ticks) - 1) * episode.planner.tick_ns * NANO if modes else 0.0,
+        time_s=(episode.ticks[-1].stamp_ns - episode.ticks[0].stamp_ns) * NANO,
         ticks=len(episode.ticks),
         fitness=1.0 / length if length > 0.0 else math.inf,
         min_clearance_m=min((min(row) for row in clearances if row), default=math.inf),

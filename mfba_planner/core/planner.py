@@ -145,7 +145,8 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
     position = obs.pose.position
     event, reason, gap = _assess(obs, vs, vg, params)
     mode = transition(mode, event)
-    waypoint, candidates = position, ()
+    waypoint = position
+    candidates: tuple[Point, ...] = ()
     if mode is Mode.PATH_GENERATION:
         assert obs.goal is not None
         waypoint, candidates = generate(position, obs.goal)

@@ -134,6 +134,7 @@ def decision_msg(decision: Decision, algorithm: str, refused: int, name: str) ->
         "vs": bits_text(decision.vs),
         "vg": bits_text(decision.vg),
         "gap": str(decision.gap),
+        "pose": ",".join(map(repr, decision.pose)),
         "goal": points_text([decision.goal] if decision.goal else []),
         "waypoint": points_text([decision.waypoint]),
         "velocity": points_text([decision.velocity]),

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 from ..core.episode import World
 from ..core.errors import GraphError
 from ..run_config import NODES, RunConfig, node_parameters, run_facts
-from . import topics
+from . import params, topics
 from .planner import PlannerNode
 from .recorder import Recorder
 from .runtime import GraphNode, make_executor
@@ -47,7 +47,7 @@ def run_in_process(
         stack.callback(context.try_shutdown)
         peers = (*NODES, topics.RECORDER) if bag else NODES
         told = node_parameters(config, peers)
-        kinds: dict[str, type[GraphNode]] = {
+        kinds: dict[str, Callable[..., GraphNode]] = {
             topics.WORLD_SIM: WorldSim,
             topics.VIRTUAL_SENSOR: VirtualSensor,
             topics.PLANNER: PlannerNode,
@@ -71,7 +71,7 @@ def run_in_process(
         world: WorldSim = nodes[topics.WORLD_SIM]
         if bag:
             recorder: Recorder = nodes[topics.RECORDER]
-            recorder.explain({name: _values(nodes[name]) for name in NODES})
+            recorder.explain({name: params.values(nodes[name]) for name in NODES})
         _spin(executor, lambda: not _missing(nodes), READY_TIMEOUT_S, lambda: _missing(nodes))
         world.resume()
         _spin(
@@ -101,10 +101,3 @@ def _missing(nodes: dict[str, GraphNode]) -> str:
 
 def _overrides(values: dict[str, Any]) -> list[Parameter]:
     return [Parameter(name, value=value) for name, value in values.items()]
-
-
-def _values(node: GraphNode) -> dict[str, Any]:
-    return {
-        name: list(p.value) if p.type_ is Parameter.Type.DOUBLE_ARRAY else p.value
-        for name, p in node.get_parameters_by_prefix("").items()
-    }

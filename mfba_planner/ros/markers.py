@@ -72,7 +72,7 @@ def decision_markers(decision: Decision, frame_id: str) -> MarkerArray:
 
 
 def tf_msg(odom: Odometry) -> Any:
-    """odom -> base_link; only called where tf2_msgs is installed."""
+    """Odom -> base_link; only called where tf2_msgs is installed."""
     from tf2_msgs.msg import TFMessage
 
     p = odom.pose.pose.position

@@ -30,24 +30,28 @@ def declare(node: Node, defaults: T, *, read_only: bool = False) -> T:
 
     Raises ConfigError in one line for a value of the wrong type or out of range.
     """
-    values: dict[str, Any] = {}
+    found: dict[str, Any] = {}
     for name, default, item in walk(defaults):
         spec: Spec = item.metadata["spec"]
-        plain = default.value if isinstance(default, Enum) else default
+        start = default.value if isinstance(default, Enum) else default
+        descriptor = _descriptor(spec, default, read_only)
         try:
-            values[name] = node.declare_parameter(
-                name, plain, _descriptor(spec, default, read_only)
-            ).value
-        except InvalidParameterTypeException as error:
-            kind = type(plain).__name__
+            found[name] = node.declare_parameter(name, start, descriptor).value
+        except InvalidParameterTypeException:
+            kind = type(start).__name__
             hint = " (write 1.0, not 1)" if kind == "float" else ""
             raise ConfigError(
-                f"parameter {name}={error._parameter.value!r}: wrong type; give a {kind}{hint}"
+                f"parameter {name}={_given(node, name)!r}: wrong type; give a {kind}{hint}"
             ) from None
         except InvalidParameterValueException as error:
-            override(defaults, {name: error._value})  # says it better, if it is out of range
-            raise ConfigError(f"parameter {name}={error._value!r}: refused; {spec.doc}") from None
-    return override(defaults, values)
+            override(defaults, {name: _given(node, name)})  # says it better
+            raise ConfigError(f"parameter {name}: {error}; {spec.doc}") from None
+    return override(defaults, found)
+
+
+def _given(node: Node, name: str) -> Any:
+    """What the user gave for a parameter; rclpy's exceptions only quote it in a sentence."""
+    return plain(node._parameter_overrides[name].value)
 
 
 def _descriptor(spec: Spec, default: Any, read_only: bool) -> ParameterDescriptor:
@@ -97,10 +101,21 @@ def declare_radii(node: Node, default: list[float]) -> list[float]:
     )
     try:
         radii = list(node.declare_parameter(name, default, descriptor).value)
-    except InvalidParameterTypeException as error:
+    except InvalidParameterTypeException:
         raise ConfigError(
-            f"parameter {name}={error._parameter.value!r}: wrong type; give [0.3, 0.3]"
+            f"parameter {name}={_given(node, name)!r}: wrong type; give [0.3, 0.3]"
         ) from None
     if not all(math.isfinite(r) and r > 0.0 for r in radii):
         raise ConfigError(f"parameter {name}={radii}: give finite radii above 0")
     return radii
+
+
+def values(node: Node) -> dict[str, Any]:
+    """All parameters of a node as plain data."""
+    found: dict[str, Any] = node.get_parameters_by_prefix("")
+    return {name: plain(parameter.value) for name, parameter in found.items()}
+
+
+def plain(value: Any) -> Any:
+    """A parameter's value as JSON knows it: arrays become lists."""
+    return list(value) if hasattr(value, "tolist") or isinstance(value, tuple) else value

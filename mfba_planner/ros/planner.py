@@ -35,6 +35,7 @@ class PlannerNode(GraphNode):
         self._refusals = Refusals(self)
         self._reset_inputs()
         self._goal: Point | None = None
+        self._pose = Pose2D(0.0, 0.0)  # the last that could be used
         self._next_view_ns = 0
         self._goal_step = self.advertise(topics.GOAL_STEP)
         self._plan = self.advertise(topics.PLAN)
@@ -113,7 +114,8 @@ class PlannerNode(GraphNode):
             self._refusals.add(error)
             return
         if pair is not None:
-            self._answer(stamp, *pair, age_s=0.0)
+            pose, ranges = pair
+            self._answer(stamp, pose, ranges, 0.0)
 
     def _is_newer(self, stamp: int) -> bool:
         if stamp > self._last_stamp_ns:
@@ -134,10 +136,12 @@ class PlannerNode(GraphNode):
         self, stamp: int, pose: Pose2D | Refused, ranges: Ranges | Refused, age_s: float
     ) -> None:
         refused = next((x for x in (pose, ranges) if isinstance(x, str)), "")
+        if not isinstance(pose, str):
+            self._pose = pose
         decision = self.brain.decide(
             Observation(
                 stamp_ns=stamp,
-                pose=Pose2D(0.0, 0.0) if isinstance(pose, str) else pose,
+                pose=self._pose,
                 ranges_m=() if isinstance(ranges, str) else ranges,
                 goal=self._goal,
                 now_ns=stamp + round(age_s / NANO),

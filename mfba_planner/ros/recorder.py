@@ -14,8 +14,8 @@ from geometry_msgs.msg import TwistStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
-from rosgraph_msgs.msg import Clock as ClockMsg
 from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock as ClockMsg
 
 from ..core.errors import ConfigError
 from ..messages import stamp_ns
@@ -42,7 +42,7 @@ class Recorder(GraphNode):
         except ValueError:
             raise ConfigError(f"parameter run={s.run!r}: not JSON; give an object") from None
         self._found: dict[str, dict[str, Any]] = {}
-        self._clients: dict[str, AsyncParameterClient] = {}
+        self._askers: dict[str, AsyncParameterClient] = {}
         self._asked: set[str] = set()
         self._log_time_ns = 0
         self._held: list[tuple[str, bytes]] = []
@@ -97,7 +97,7 @@ class Recorder(GraphNode):
     def _collect(self) -> None:
         """Ask every node once for all its parameters."""
         for node in self._wanted - self._asked:
-            client = self._clients.setdefault(node, AsyncParameterClient(self, node))
+            client = self._askers.setdefault(node, AsyncParameterClient(self, node))
             if client.services_are_ready():
                 self._asked.add(node)
                 client.list_parameters(callback=partial(self._on_listed, node))
@@ -107,13 +107,13 @@ class Recorder(GraphNode):
 
     def _on_listed(self, node: str, future: Any) -> None:
         listed = list(future.result().result.names)
-        self._clients[node].get_parameters(
+        self._askers[node].get_parameters(
             listed, callback=partial(self._on_parameters, node, listed)
         )
 
     def _on_parameters(self, node: str, listed: list[str], future: Any) -> None:
         values = map(parameter_value_to_python, future.result().values)
-        self._found[node] = {k: _plain(v) for k, v in zip(listed, values)}
+        self._found[node] = {k: params.plain(v) for k, v in zip(listed, values)}
 
     def explain(self, found: dict[str, dict[str, Any]]) -> None:
         """Put the nodes' parameters and the facts of the run into the bag, once."""
@@ -139,10 +139,6 @@ class Recorder(GraphNode):
 
 def _type_name(kind: Any) -> str:
     return f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if hasattr(value, "tolist") or isinstance(value, tuple) else value
 
 
 def main(args: list[str]) -> int:

@@ -14,7 +14,6 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from ..core.errors import ConfigError
 from .topics import Topic, expected_readers
 
 SPIN_S = 0.1  # longest time until a signal is noticed
@@ -41,10 +40,7 @@ def make_executor(context: rclpy.Context | None = None) -> Executor:
 def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
     """Run one node until it is told to stop; return 0. MfbaErrors of the node pass through."""
     stop = StopFlag()
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    except rclpy.exceptions.RCLError as error:
-        raise ConfigError(f"ROS arguments: {first_line(error)}; check --ros-args") from None
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node: GraphNode | None = None
     try:
         node = make_node()
@@ -58,11 +54,6 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
             node.close()
             node.destroy_node()
         rclpy.try_shutdown()
-
-
-def first_line(error: Exception) -> str:
-    """An rcl error without its file names and its second half."""
-    return str(error).split(", at ")[0].splitlines()[0]
 
 
 class GraphNode(Node):

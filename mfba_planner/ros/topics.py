@@ -111,7 +111,7 @@ INITIALPOSE = Topic(
 )
 MARKERS = Topic(name="markers", type=MarkerArray, writers=(WORLD_SIM, PLANNER), qos=VIEW_QOS)
 
-GRAPH = (
+GRAPH: tuple[Topic, ...] = (
     CLOCK,
     ODOM,
     OBSTACLES,
@@ -131,7 +131,7 @@ GRAPH = (
 try:  # not among the PyPI wheels; published and recorded where it is installed
     from tf2_msgs.msg import TFMessage
 except ImportError:
-    TF = None
+    TF: Topic | None = None
 else:
     TF = Topic(name="/tf", type=TFMessage, writers=(WORLD_SIM,), qos=TICK_QOS, every_tick=True)
     GRAPH += (TF,)

@@ -45,7 +45,7 @@ class WorldSim(GraphNode):
         self._trail: deque[Point] = deque(maxlen=TRAIL_POINTS)
         self._next_view_ns = 0
         self._refusals = Refusals(self)
-        self._clock = self.advertise(topics.CLOCK)
+        self._clock_pub = self.advertise(topics.CLOCK)
         self._odom = self.advertise(topics.ODOM)
         self._obstacles = self.advertise(topics.OBSTACLES)
         self._goal = self.advertise(topics.GOAL_POSE)
@@ -104,7 +104,7 @@ class WorldSim(GraphNode):
         self._retries = 0
         centers = self.scenario.centers(self.world.time_s)
         pose = self.world.pose
-        self._clock.publish(clock_msg(stamp))
+        self._clock_pub.publish(clock_msg(stamp))
         self._obstacles.publish(obstacles_msg(centers, stamp, s.odom_frame))
         odom = odometry_msg(pose, self._velocity, stamp, s.odom_frame, s.base_frame)
         if self._tf:
