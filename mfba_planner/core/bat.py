@@ -150,8 +150,8 @@ class Disc:
 
     def clamp(self, x: Vector) -> Vector:
         """A point outside is drawn back along its radius."""
-        cx, cy = self.center
-        dx, dy = x[0] - cx, x[1] - cy
+        (cx, cy), (px, py) = self.center, x
+        dx, dy = px - cx, py - cy
         norm = math.sqrt(dx * dx + dy * dy)
         if norm <= self.radius:
             return x
@@ -169,9 +169,9 @@ class BatSwarm:
 
     __slots__ = (
         "_a",
+        "_asked",
         "_r",
         "_rng",
-        "_told",
         "_uniforms",
         "_v",
         "_values",
@@ -179,47 +179,52 @@ class BatSwarm:
         "best_value",
         "best_x",
         "candidates",
+        "horizon",
         "params",
         "region",
         "t",
     )
 
-    def __init__(self, params: BatParams, region: Region, rng: Generator) -> None:
-        """Draw the initial population (eq. 3) from rng, the only source of randomness."""
+    def __init__(
+        self, params: BatParams, region: Region, rng: Generator, horizon: int | None = None
+    ) -> None:
+        """Draw the initial population (eq. 3) from rng, the only source of randomness.
+
+        horizon is T of eq. 10 where it is not params.iterations.
+        """
         self.params = params
+        self.horizon = horizon or params.iterations
+        self.region = region
         self.t = 0
         self.best_x: Vector = []
         self.best_value = math.inf
-        self.region = region
         self._rng = rng
+        self._asked = False
         n = params.population
-        x_min, x_max = region.span()
-        d = len(x_min)
+        low, high = region.span()
+        d = len(low)
         sign = 1.0 if params.initial is Initial.INSIDE else -1.0
-        draws = rng.random(n * d).tolist()
-        self._x = [
-            self._bounded(
-                [
-                    low + sign * draws[i * d + j] * (high - low)
-                    for j, (low, high) in enumerate(zip(x_min, x_max))
-                ]
-            )
-            for i in range(n)
-        ]
+        u = rng.random(n * d).tolist()
+        self._x = self._bounded(
+            [
+                [lo + sign * uj * (hi - lo) for lo, hi, uj in zip(low, high, u[k : k + d])]
+                for k in range(0, n * d, d)
+            ]
+        )
         self._v = [[0.0] * d for _ in range(n)]
         self._a = [params.a0] * n
         self._r = [params.r0] * n
         self._values = [math.inf] * n
         self._uniforms: Vector = []
-        self.candidates = self._x
-        self._told = False
+        self.candidates = list(self._x)
 
     def ask(self) -> list[Vector]:
         """Return n candidates of d floats; asking twice without tell returns the same ones."""
-        if self._told:
-            self._told = False
-            self.t += 1
-            self.candidates = self._fly()
+        if not self._asked:
+            self._asked = True
+            if self.best_x:
+                self.t += 1
+                self.candidates = self._fly()
         return self.candidates
 
     def tell(self, values: Sequence[float]) -> None:
@@ -230,24 +235,29 @@ class BatSwarm:
         n = self.params.population
         if len(values) != n:
             raise InputError(f"{len(values)} values told for {n} bats: tell one per candidate")
-        if self._told:
+        if not self._asked:
             raise InputError("tell without ask: call ask() for the next candidates first")
-        self._told = True
-        if self.t == 0:
-            self._values = [v if v == v else math.inf for v in values]
+        self._asked = False
+        if not self.best_x:
+            self.best_x = self.candidates[0]
+            self._values = [math.inf if v != v else v for v in values]
         else:
             self._accept(values)
         for x, value in zip(self.candidates, values):
-            if value < self.best_value or not self.best_x:
-                self.best_x, self.best_value = x, value if value == value else math.inf
+            if value < self.best_value:
+                self.best_x, self.best_value = x, value
 
     def beta(self, u: float) -> float:
         """Beta of eq. 4 from a uniform draw u: u itself (BA), or eq. 10 (MFBA)."""
+        return self._betas([u])[0]
+
+    def _betas(self, u: Vector) -> Vector:
+        """Beta of every bat; the normalized t stays in [0, 1] beyond iteration T as well."""
         p = self.params
         if p.algorithm is Algorithm.BA:
             return u
-        t = self.t / p.iterations if p.schedule is Schedule.NORMALIZED else float(self.t)
-        return t * math.exp(-p.rho * u)
+        t = min(1.0, self.t / self.horizon) if p.schedule is Schedule.NORMALIZED else self.t
+        return [t * math.exp(-p.rho * ui) for ui in u]
 
     def _fly(self) -> list[Vector]:
         """Candidates of one iteration, eq. 4-7.
@@ -259,31 +269,27 @@ class BatSwarm:
         n, d = p.population, len(best)
         stride = 3 + d
         u = self._uniforms = self._rng.random(n * stride).tolist()
-        towards = p.velocity is Velocity.TOWARDS_BEST
-        walk_scale = p.sigma * math.fsum(self._a) / n
+        # Eq. 5 with the sign that flies towards the best; the printed one is -f.
+        sign = 1.0 if p.velocity is Velocity.TOWARDS_BEST else -1.0
+        f_span = p.f_max - p.f_min
+        f = [sign * (p.f_min + f_span * beta) for beta in self._betas(u[::stride])]  # eq. 4
+        scale = p.sigma * math.fsum(self._a) / n
+        from_best = p.walk is Walk.BEST
+        per_coordinate = 0 if p.epsilon is Epsilon.SCALAR else 1
+        dimensions = range(d)
         candidates = []
-        for i in range(n):
-            k = i * stride
-            x, v = self._x[i], self._v[i]
-            f = p.f_min + (p.f_max - p.f_min) * self.beta(u[k])  # eq. 4
-            if towards:
-                v = [vj + (bj - xj) * f for vj, xj, bj in zip(v, x, best)]  # eq. 5, mended
-            else:
-                v = [vj + (xj - bj) * f for vj, xj, bj in zip(v, x, best)]  # eq. 5, printed
-            self._v[i] = v
-            candidate = [xj + vj for xj, vj in zip(x, v)]  # eq. 6
-            if u[k + 1] > self._r[i]:
-                candidate = self._walk(candidate, u[k + 3 : k + stride], walk_scale)
-            candidates.append(self._bounded(candidate))
-        return candidates
-
-    def _walk(self, candidate: Vector, u: Vector, scale: float) -> Vector:
-        """Local walk of eq. 7; scale = sigma times the mean loudness."""
-        start = self.best_x if self.params.walk is Walk.BEST else candidate
-        if self.params.epsilon is Epsilon.SCALAR:
-            step = scale * (2.0 * u[0] - 1.0)
-            return [s + step for s in start]
-        return [s + scale * (2.0 * uj - 1.0) for s, uj in zip(start, u)]
+        for k, x, v, fi, r in zip(range(0, n * stride, stride), self._x, self._v, f, self._r):
+            walk = u[k + 1] > r
+            point = []
+            for j in dimensions:
+                v[j] += (best[j] - x[j]) * fi  # eq. 5
+                xj = x[j] + v[j]  # eq. 6
+                if walk:
+                    epsilon = 2.0 * u[k + 3 + j * per_coordinate] - 1.0
+                    xj = (best[j] if from_best else xj) + scale * epsilon  # eq. 7
+                point.append(xj)
+            candidates.append(point)
+        return self._bounded(candidates)
 
     def _accept(self, values: Sequence[float]) -> None:
         """Take candidates that are not worse, with probability A_i; then eq. 8 and 9."""
@@ -297,8 +303,11 @@ class BatSwarm:
                 self._a[i] *= p.alpha  # eq. 8
                 self._r[i] = rate
 
-    def _bounded(self, x: Vector) -> Vector:
-        return x if self.params.bounds is Bounds.NONE else self.region.clamp(x)
+    def _bounded(self, points: list[Vector]) -> list[Vector]:
+        if self.params.bounds is Bounds.NONE:
+            return points
+        clamp = self.region.clamp
+        return [clamp(x) for x in points]
 
 
 def minimize(

@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
 from .geometry import Point, Pose2D, distance
-from .planner import NANO, Decision, Mode, Observation, Planner, PlannerParams
+from .planner import NANO, Decision, Observation, Planner, PlannerParams
 from .sensing import Ranges, SensorParams, sense_circles
 from .world import Scenario
 
@@ -100,31 +99,30 @@ def run(
     planner = planner or PlannerParams()
     sensor = sensor or SensorParams()
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m)
-    ticks = tuple(_ticks(world, Planner(planner, seed), sensor))
+    brain = Planner(planner, seed)
+    ticks = [_turn(world, brain, sensor)]
+    while (outcome := world.outcome()) is None:
+        world.step(ticks[-1].velocity)
+        ticks.append(_turn(world, brain, sensor))
     return Episode(
         scenario=scenario,
         sensor=sensor,
         planner=planner,
         seed=seed,
         driver="core",
-        ticks=ticks,
-        outcome=world.outcome() or Outcome.INTERRUPTED,
+        ticks=tuple(ticks),
+        outcome=outcome,
     )
 
 
-def _ticks(world: World, brain: Planner, sensor: SensorParams) -> Iterator[Decision]:
-    """Yield a decision per tick; the last is the one taken where the run has ended."""
-    while True:
-        decision = brain.decide(
-            Observation(
-                stamp_ns=world.stamp_ns,
-                pose=world.pose,
-                ranges_m=sense(world, sensor),
-                goal=world.scenario.goal_m,
-                now_ns=world.stamp_ns,
-            )
+def _turn(world: World, brain: Planner, sensor: SensorParams) -> Decision:
+    """The decision at the present tick, also at the one where the run has ended."""
+    return brain.decide(
+        Observation(
+            stamp_ns=world.stamp_ns,
+            pose=world.pose,
+            ranges_m=sense(world, sensor),
+            goal=world.scenario.goal_m,
+            now_ns=world.stamp_ns,
         )
-        yield decision
-        if world.outcome() is not None or decision.mode is Mode.ARRIVED:
-            return
-        world.step(decision.velocity)
+    )

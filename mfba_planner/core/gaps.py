@@ -8,10 +8,12 @@ import math
 from .geometry import wrap_angle
 from .sensing import Bits
 
+TIE_RAD = 1e-9  # turns closer than this are equal: rounding must not choose the gap
+
 
 def gap_vector(vs: Bits) -> Bits:
     """Vg of Table 1: b(i) = a(i) or a(i+1); the ring wraps (Fig. 5 closes gap 12 by sector 1)."""
-    return tuple(a | b for a, b in zip(vs, vs[1:] + vs[:1]))
+    return tuple([a | b for a, b in zip(vs, vs[1:] + vs[:1])])
 
 
 def gap_heading(gap: int, count: int) -> float:
@@ -29,6 +31,6 @@ def nearest_free_gap(vg: Bits, goal_heading_rad: float) -> int | None:
     for gap, closed in enumerate(vg, start=1):
         if not closed:
             turn = abs(wrap_angle(gap_heading(gap, n) - goal_heading_rad))
-            if turn < smallest:
+            if turn < smallest - TIE_RAD:
                 best, smallest = gap, turn
     return best

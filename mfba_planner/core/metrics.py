@@ -42,19 +42,22 @@ def evaluate(episode: Episode) -> Result:
     gap between robot and obstacle edges, continuous in time, negative in contact (inf without
     obstacles); collisions counts contacts, one per obstacle and unbroken run of ticks.
     encounters lists, in order of time, the obstacles (from 1) that came within SR of the
-    enlarged edge at some tick. success is: goal reached, no collision.
+    enlarged edge at some tick. mode_switches counts every change of mode, the one to ARRIVED
+    included. success is: goal reached, no collision.
     """
     clearances = tick_clearances(episode)
-    length = sum(
+    # fsum: sum() itself rounds differently before and after Python 3.12
+    length = math.fsum(
         distance(a.pose.position, b.pose.position) for a, b in pairwise(episode.ticks)
     )
     modes = [tick.mode for tick in episode.ticks]
+    stamps = [tick.stamp_ns for tick in episode.ticks] or [0]
     collisions = _contacts(clearances)
     return Result(
         outcome=episode.outcome,
         success=episode.outcome is Outcome.GOAL_REACHED and collisions == 0,
         length_m=length,
-        time_s=(episode.ticks[-1].stamp_ns - episode.ticks[0].stamp_ns) * NANO,
+        time_s=(stamps[-1] - stamps[0]) * NANO,
         ticks=len(episode.ticks),
         fitness=1.0 / length if length > 0.0 else math.inf,
         min_clearance_m=min((min(row) for row in clearances if row), default=math.inf),

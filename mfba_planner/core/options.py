@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options with a unit, a range and a sentence: declared once, checked once, documented from here."""
+"""Options with a unit, a range and a sentence: declared, checked and documented from here."""
 
 from __future__ import annotations
 

@@ -10,7 +10,8 @@ from enum import Enum
 
 import numpy as np
 
-from .bat import BatParams, BatSwarm, Disc, Vector
+from .bat import BatParams, BatSwarm, Bounds, Disc, Vector, minimize
+from .errors import ConfigError
 from .gaps import gap_heading, gap_vector, nearest_free_gap
 from .geometry import Point, Pose2D, bearing, distance, towards
 from .options import check, option
@@ -138,14 +139,17 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
 
     generate(position, goal) returns the bats' next point and all their candidates; it is
     called in path generation only. Standing still is the answer to everything that is not
-    path generation or obstacle avoidance.
+    path generation or obstacle avoidance, input that is not finite included.
     """
     vs = sensory_vector(obs.ranges_m)
     vg = gap_vector(vs)
     position = obs.pose.position
     event, reason, gap = _assess(obs, vs, vg, params)
     mode = transition(mode, event)
+    if mode is Mode.ARRIVED and event is not Event.AT_GOAL:
+        reason, gap = f"goal was reached before; {reason}", 0
     waypoint = position
+    velocity = (0.0, 0.0)  # not a difference: inf - inf is NaN
     candidates: tuple[Point, ...] = ()
     if mode is Mode.PATH_GENERATION:
         assert obs.goal is not None
@@ -154,7 +158,9 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
         assert obs.goal is not None
         length = min(params.step_length_m, distance(position, obs.goal))
         waypoint = towards(position, gap_heading(gap, len(vg)), length)
-    dt = params.tick_ns * NANO
+    if waypoint is not position:
+        dt = params.tick_ns * NANO
+        velocity = ((waypoint[0] - position[0]) / dt, (waypoint[1] - position[1]) / dt)
     return Decision(
         stamp_ns=obs.stamp_ns,
         mode=mode,
@@ -166,17 +172,16 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
         vg=vg,
         gap=gap,
         waypoint=waypoint,
-        velocity=((waypoint[0] - position[0]) / dt, (waypoint[1] - position[1]) / dt),
+        velocity=velocity,
         candidates=candidates,
     )
 
 
-def _assess(
-    obs: Observation, vs: Bits, vg: Bits, params: PlannerParams
-) -> tuple[Event, str, int]:
+def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tuple[Event, str, int]:
     """Reduce an observation to one event, its reason and the chosen gap (0 when none)."""
-    if obs.refused:
-        return Event.INVALID, f"refused input: {obs.refused}", 0
+    refused = obs.refused or _fault(obs)
+    if refused:
+        return Event.INVALID, f"refused input: {refused}", 0
     age_s = (obs.now_ns - obs.stamp_ns) * NANO
     if age_s > params.input_timeout_s:
         return Event.STALE, f"input is {age_s:.3f} s old", 0
@@ -195,6 +200,20 @@ def _assess(
     return Event.OBSTACLE, f"sectors {sensed} set: gap {gap} is nearest to the goal", gap
 
 
+def _fault(obs: Observation) -> str:
+    """What must never move a robot, "" for nothing; the last of the doors."""
+    for name, numbers in (("pose", obs.pose), ("goal", obs.goal or ())):
+        if not all(map(math.isfinite, numbers)):
+            return f"{name} {tuple(numbers)} is not finite"
+    if len(obs.ranges_m) < 3:
+        return f"{len(obs.ranges_m)} sectors are fewer than 3"
+    if any(map(math.isnan, obs.ranges_m)):
+        return "a sector's range is NaN"
+    if obs.stamp_ns < 0:
+        return f"stamp {obs.stamp_ns} ns is negative"
+    return ""
+
+
 class Planner:
     """Algorithm 1 with its memory: the mode, and the swarm where a reading keeps one.
 
@@ -203,7 +222,9 @@ class Planner:
     """
 
     def __init__(self, params: PlannerParams, seed: int) -> None:
-        """Start idle; seed is any non-negative integer."""
+        """Start idle; ConfigError for a negative seed."""
+        if seed < 0:
+            raise ConfigError(f"seed={seed}: negative; give a whole number from 0 up")
         self.params = params
         self.seed = seed
         self.mode = Mode.IDLE
@@ -231,22 +252,26 @@ class Planner:
         return fresh_step(position, goal, self.params, stream(self.seed, self._stamp_ns))
 
     def _fly_on(self, position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
-        """Fig. 1 read literally: one bat iteration per robot step, within the robot's reach.
+        """Fig. 1 read literally: bat.iterations per robot step, within the robot's reach.
 
         The bats stay where they are in the world and are drawn into the disc of one step
         around the robot, as is the best point they ever saw; the robot goes to that point.
+        T of eq. 10 spans the trip: all iterations of the straight way from here to the goal.
         """
         reach = self.params.step_length_m
         if distance(position, goal) <= reach:
             return goal, ()
-        disc = Disc(reach, position)
+        disc, bat = Disc(reach, position), self.params.bat
         if self._swarm is None:
-            self._swarm = BatSwarm(self.params.bat, disc, stream(self.seed, self._stamp_ns))
-        self._swarm.region = disc
-        points = self._swarm.ask()
-        self._swarm.tell([distance((x, y), goal) for x, y in points])
-        x, y = disc.clamp(self._swarm.best_x)
-        return (x, y), tuple((px, py) for px, py in points)
+            horizon = bat.iterations * math.ceil(distance(position, goal) / reach)
+            rng = stream(self.seed, self._stamp_ns)
+            self._swarm = BatSwarm(bat, disc, rng, horizon)
+        swarm = self._swarm
+        swarm.region = disc
+        for _ in range(bat.iterations):
+            swarm.tell([distance((x, y), goal) for x, y in swarm.ask()])
+        x, y = disc.clamp(swarm.best_x)
+        return (x, y), tuple((px, py) for px, py in swarm.candidates)
 
 
 def stream(seed: int, stamp_ns: int) -> np.random.Generator:
@@ -271,8 +296,10 @@ def fresh_step(
         dx, dy = x[0] - gx, x[1] - gy
         return math.sqrt(dx * dx + dy * dy)
 
-    swarm = BatSwarm(params.bat, Disc(params.step_length_m), rng)
-    for _ in range(params.bat.iterations + 1):
-        swarm.tell([cost(x) for x in swarm.ask()])
-    bx, by = swarm.best_x
+    reach = Disc(params.step_length_m)
+    swarm = minimize(cost, reach, params.bat, rng)
+    best = swarm.best_x
+    if params.bat.bounds is Bounds.NONE:
+        best = reach.clamp(best)  # bats may leave the disc, the robot cannot
+    bx, by = best
     return (px + bx, py + by), tuple((px + x, py + y) for x, y in swarm.candidates)

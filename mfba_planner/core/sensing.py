@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sensory vector Vs: tangent spans of enlarged circles on equal sectors (eq. 11, Fig. 4, 5)."""
+"""The sensory vector Vs: tangent spans of enlarged circles on sectors (eq. 11, Fig. 4, 5)."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class SensorParams:
 
 
 def sensory_vector(ranges_m: Iterable[float]) -> Bits:
-    """Vs of eq. 11: a(i) = 1 where sector i holds an obstacle, that is a finite range."""
-    return tuple(1 if math.isfinite(r) else 0 for r in ranges_m)
+    """Vs of eq. 11: a(i) = 0 where sector i is free (+inf), 1 for any other range."""
+    return tuple([0 if r == math.inf else 1 for r in ranges_m])
 
 
 def longest_range_m(params: SensorParams, enlarged_radius_m: float) -> float:
@@ -57,6 +57,7 @@ def sense_circles(
     set when the tangent span of a circle in range touches it. circles holds (centre,
     enlarged radius) in metres. The ranges are rounded to what a LaserScan message can carry,
     so that a planner decides the same with and without messages between. Fig. 4, 5.
+    Raises InputError for a position or circle that is not finite: NaN is not free.
     """
     n = params.sectors
     ranges = [math.inf] * n
@@ -64,6 +65,11 @@ def sense_circles(
     for (cx, cy), radius in circles:
         dx, dy = cx - px, cy - py
         d = math.sqrt(dx * dx + dy * dy)
+        if not math.isfinite(d - radius):
+            raise InputError(
+                f"position {position} and circle {(cx, cy)} of radius {radius}: "
+                "not finite; send finite numbers"
+            )
         if d - radius <= params.sensing_range_m:
             _mark(ranges, d, radius, math.atan2(dy, dx))
     return single_precision(ranges)
@@ -81,7 +87,7 @@ def _mark(ranges: list[float], d: float, radius: float, direction: float) -> Non
     half = tangent_half_angle(d, radius)
     first = math.floor((direction - half) / width)
     last = math.floor((direction + half) / width)
-    for sector in range(first, min(last, first + n - 1) + 1):
+    for sector in range(first, last + 1):
         nearest = min(max(direction, sector * width), (sector + 1) * width)
         r = ray_circle_distance(d, radius, nearest - direction)
         if not math.isfinite(r):  # a tangent that only touches: rounding put it just outside
@@ -102,15 +108,14 @@ class Scan:
     range_max_m: float
 
 
-def sense_scan(
-    scan: Scan, yaw_rad: float, robot_radius_m: float, params: SensorParams
-) -> Ranges:
+def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: SensorParams) -> Ranges:
     """Range per sector from any laser scan; every return is a point enlarged by the robot.
 
     yaw_rad turns the scan's frame into the sectors' frame. As in REP-117, +inf is free space,
     -inf an obstacle nearer than range_min (taken at range_min), NaN and values outside
     [range_min, range_max] are no measurement and are passed over. Raises InputError for a
-    scan without a single usable beam or with unusable geometry: blind is not free.
+    scan without a single usable beam or with unusable geometry: blind is not free. A sector
+    that no beam looks into is free all the same: the scan knows nothing of it.
     """
     geometry = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m, yaw_rad)
     if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:

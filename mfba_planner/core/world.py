@@ -108,13 +108,15 @@ def center_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Poi
 
 def _fold(value: float, low: float, high: float) -> float:
     """Reflect an unbounded coordinate into [low, high] (a triangle wave)."""
+    if low <= value <= high:
+        return value
     length = high - low
     if length <= 0.0:
         return low
     offset = math.fmod(value - low, 2.0 * length)
     if offset < 0.0:
         offset += 2.0 * length
-    return low + (offset if offset <= length else 2.0 * length - offset)
+    return min(high, low + (offset if offset <= length else 2.0 * length - offset))
 
 
 def bounce_times(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:

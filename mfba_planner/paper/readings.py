@@ -38,9 +38,7 @@ SWARMS: dict[str, BatParams] = {
 PLANNERS: dict[str, PlannerParams] = {
     "section6": PlannerParams(),
     # Fig. 1 literally: one swarm for the trip, one bat iteration per robot step.
-    "fig1": PlannerParams(
-        step_length_m=0.1, swarm=Swarm.PERSISTENT, bat=BatParams(iterations=1)
-    ),
+    "fig1": PlannerParams(step_length_m=0.1, swarm=Swarm.PERSISTENT, bat=BatParams(iterations=1)),
 }
 
 
