@@ -23,6 +23,8 @@ from .runtime import GraphNode, make_executor
 from .virtual_sensor import VirtualSensor
 from .world_sim import WorldSim
 
+# Nobody is there to call them, and the executor waits for each service at every turn.
+_UNATTENDED = {"start_type_description_service": False}
 READY_TIMEOUT_S = 10.0
 DRAIN_TURNS = 500  # delivery within a process is synchronous: enough for what is queued
 
@@ -34,10 +36,10 @@ def run_in_process(
     domain_id: int,
     timeout_s: float = 600.0,
     on_turn: Callable[[World], bool] = lambda _: True,
-) -> None:
-    """Run the graph until goal or time limit, recording into the directory `bag`.
+) -> float:
+    """Run the graph until goal or time limit; return the seconds the loop took.
 
-    on_turn sees the world after every turn of the executor and ends the run by returning
+    bag names the directory to record into, None for no recording. on_turn sees the world after every turn of the executor and ends the run by returning
     False. Raises GraphError when the graph does not get ready or not finished in time.
     """
     context = Context()
@@ -63,7 +65,11 @@ def run_in_process(
         stack.callback(executor.shutdown)
         nodes: dict[str, Any] = {}
         for name, kind in kinds.items():
-            node = kind(context=context, parameter_overrides=_overrides(told[name]))
+            node = kind(
+                context=context,
+                parameter_overrides=_overrides(told[name] | _UNATTENDED),
+                start_parameter_services=False,
+            )
             stack.callback(node.destroy_node)
             stack.callback(node.close)
             executor.add_node(node)
@@ -73,6 +79,7 @@ def run_in_process(
             recorder: Recorder = nodes[topics.RECORDER]
             recorder.explain({name: params.values(nodes[name]) for name in NODES})
         _spin(executor, lambda: not _missing(nodes), READY_TIMEOUT_S, lambda: _missing(nodes))
+        started = time.perf_counter()
         world.resume()
         _spin(
             executor,
@@ -80,8 +87,10 @@ def run_in_process(
             timeout_s,
             lambda: f"tick {world.world.tick} after {timeout_s:g} s",
         )
+        took_s = time.perf_counter() - started
         for _ in range(DRAIN_TURNS):
             executor.spin_once(timeout_sec=0.0)
+        return took_s
 
 
 def _spin(

@@ -12,6 +12,7 @@ from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.serialization import deserialize_message
@@ -69,7 +70,14 @@ class Recorder(GraphNode):
         callback: Callable[[bytes], None] = partial(self._on_message, name)
         if topic is topics.CLOCK and self.settings.sim_time:
             callback = self._on_clock
-        self.create_subscription(kind, topic.name, callback, topics.recording_qos(topic), raw=True)
+        self.create_subscription(
+            kind,
+            topic.name,
+            callback,
+            topics.recording_qos(topic),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            raw=True,
+        )
 
     def _on_clock(self, data: bytes) -> None:
         self._log_time_ns = stamp_ns(deserialize_message(data, ClockMsg).clock)
@@ -87,9 +95,12 @@ class Recorder(GraphNode):
         self._write(name, data)
 
     def _write(self, name: str, data: bytes) -> None:
-        if name in self._types:  # a topic is announced with its first message
-            self.writer.add_topic(name, *self._types.pop(name))
+        if name in self._types:  # its writer came late
+            self._announce(name)
         self.writer.write(name, data, self._log_time_ns, self._log_time_ns)
+
+    def _announce(self, name: str) -> None:
+        self.writer.add_topic(name, *self._types.pop(name))
 
     def _flush(self) -> None:
         self.writer.flush_if_due(time.monotonic_ns())
@@ -119,6 +130,8 @@ class Recorder(GraphNode):
         """Put the nodes' parameters and the facts of the run into the bag, once."""
         if not self._explained:
             self._explained = True
+            for name in [name for name in self._types if self.count_publishers(name)]:
+                self._announce(name)
             attach_configuration(self.writer, {"nodes": found, "run": self._facts})
             self.writer.flush()
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -67,8 +68,17 @@ class GraphNode(Node):
         self._peers: set[str] = set()
 
     def advertise(self, topic: Topic, message_type: Any = None) -> Publisher:
-        """Create the publisher of a topic of topics.py."""
-        publisher = self.create_publisher(message_type or topic.type, topic.name, topic.qos)
+        """Create the publisher of a topic of topics.py.
+
+        Without rclpy's QoS events: each is one more thing to wait for at every turn of the
+        executor, and a reader with the wrong QoS is warned on its own side.
+        """
+        publisher = self.create_publisher(
+            message_type or topic.type,
+            topic.name,
+            topic.qos,
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )
         self._writers.append((topic, publisher))
         return publisher
 
