@@ -15,6 +15,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
 
+from ..core.episode import Outcome
 from ..core.geometry import Point, Pose2D
 from ..core.planner import Decision, Mode
 from ..core.sensing import Bits, Ranges, SensorParams, longest_range_m
@@ -149,3 +150,12 @@ def decision_msg(decision: Decision, algorithm: str, refused: int, name: str) ->
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
     return DiagnosticArray(header=header(decision.stamp_ns, ""), status=[status])
+
+
+def outcome_msg(outcome: Outcome | None, ticks: int) -> DiagnosticStatus:
+    """How a run stands: None is running; ticks counts those published."""
+    return DiagnosticStatus(
+        name="run",
+        message=outcome.value if outcome else "running",
+        values=[KeyValue(key="ticks", value=str(ticks))],
+    )

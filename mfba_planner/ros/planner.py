@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -35,7 +36,8 @@ class PlannerNode(GraphNode):
         self._refusals = Refusals(self)
         self._reset_inputs()
         self._goal: Point | None = None
-        self._pose = Pose2D(0.0, 0.0)  # the last that could be used
+        self._goal_message: Any = None
+        self._pose, self._ranges = Pose2D(0.0, 0.0), (math.inf,) * 12  # the last usable ones
         self._next_view_ns = 0
         self._goal_step = self.advertise(topics.GOAL_STEP)
         self._plan = self.advertise(topics.PLAN)
@@ -76,6 +78,9 @@ class PlannerNode(GraphNode):
         self._reset_inputs()
 
     def _on_goal(self, message: Any) -> None:
+        if message == self._goal_message and stamp_ns(message.header.stamp):
+            return  # a latched one, delivered twice
+        self._goal_message = message
         self.brain.reset()
         try:
             self._goal = goal_point(message)
@@ -130,7 +135,7 @@ class PlannerNode(GraphNode):
         age_s = now - min(self._sectors_at, self._odom[1] if self._odom else now)
         if age_s > self.brain.params.input_timeout_s and self._last_stamp_ns >= 0:
             pose, _ = self._odom or ("no odom yet", now)
-            self._answer(self._last_stamp_ns, pose, (), age_s)
+            self._answer(self._last_stamp_ns, pose, self._ranges, age_s)
 
     def _answer(
         self, stamp: int, pose: Pose2D | Refused, ranges: Ranges | Refused, age_s: float
@@ -138,6 +143,8 @@ class PlannerNode(GraphNode):
         refused = next((x for x in (pose, ranges) if isinstance(x, str)), "")
         if not isinstance(pose, str):
             self._pose = pose
+        if not isinstance(ranges, str):
+            self._ranges = ranges
         decision = self.brain.decide(
             Observation(
                 stamp_ns=stamp,

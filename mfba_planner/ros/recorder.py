@@ -46,6 +46,7 @@ class Recorder(GraphNode):
         self._askers: dict[str, AsyncParameterClient] = {}
         self._asked: set[str] = set()
         self._log_time_ns = 0
+        self._latched: dict[str, bytes] = {}
         self._held: list[tuple[str, bytes]] = []
         self._explained = False
         self._types: dict[str, tuple[str, OfferedQos]] = {}
@@ -70,14 +71,23 @@ class Recorder(GraphNode):
         callback: Callable[[bytes], None] = partial(self._on_message, name)
         if topic is topics.CLOCK and self.settings.sim_time:
             callback = self._on_clock
-        self.create_subscription(
-            kind,
-            topic.name,
-            callback,
-            topics.recording_qos(topic),
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-            raw=True,
-        )
+        profiles = topics.recording_qos(topic)
+        if len(profiles) > 1:
+            callback = partial(self._on_latched, name)
+        for qos in profiles:
+            self.create_subscription(
+                kind,
+                topic.name,
+                callback,
+                qos,
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+                raw=True,
+            )
+
+    def _on_latched(self, name: str, data: bytes) -> None:
+        if self._latched.get(name) != data:  # it comes twice
+            self._latched[name] = data
+            self._on_message(name, data)
 
     def _on_clock(self, data: bytes) -> None:
         self._log_time_ns = stamp_ns(deserialize_message(data, ClockMsg).clock)

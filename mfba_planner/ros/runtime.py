@@ -15,6 +15,7 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
+from . import topics
 from .topics import Topic, expected_readers
 
 SPIN_S = 0.1  # longest time until a signal is noticed
@@ -83,8 +84,9 @@ class GraphNode(Node):
         return publisher
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], kind: Any = None) -> None:
-        """Create the subscription of a topic of topics.py."""
-        self.create_subscription(kind or topic.type, topic.name, callback, topic.qos)
+        """Create the subscription of a topic of topics.py; two of them for a latched one."""
+        for qos in topics.reading_qos(topic):
+            self.create_subscription(kind or topic.type, topic.name, callback, qos)
 
     def offer_ready(self, peers: set[str]) -> None:
         """Offer ~/ready: true once every peer's subscription to our topics is matched."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray, PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry, Path
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -106,6 +106,13 @@ DECISION = Topic(
     qos=TICK_QOS,
     every_tick=True,
 )
+OUTCOME = Topic(
+    # "running", then how it ended (core.episode.Outcome) and after how many ticks
+    name="outcome",
+    type=DiagnosticStatus,
+    writers=(WORLD_SIM,),
+    qos=LATCHED_QOS,
+)
 INITIALPOSE = Topic(
     name="initialpose", type=PoseWithCovarianceStamped, readers=(WORLD_SIM,), qos=VIEW_QOS
 )
@@ -124,6 +131,7 @@ GRAPH: tuple[Topic, ...] = (
     TRAIL,
     CMD_VEL,
     DECISION,
+    OUTCOME,
     INITIALPOSE,
     MARKERS,
 )
@@ -142,6 +150,15 @@ def expected_readers(topic: Topic, nodes: set[str]) -> int:
     return len(nodes.intersection(topic.readers)) + (RECORDER in nodes)
 
 
-def recording_qos(topic: Topic) -> QoSProfile:
+def reading_qos(topic: Topic) -> list[QoSProfile]:
+    """What readers ask for: a latched topic also takes writers that are not (RViz is not).
+
+    A latched message then comes twice.
+    """
+    latched = topic.qos.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    return [topic.qos, VIEW_QOS] if latched else [topic.qos]
+
+
+def recording_qos(topic: Topic) -> list[QoSProfile]:
     """What a reader asks for that must not lose a message."""
-    return _reliable(5000, topic.qos.durability)
+    return [_reliable(5000, qos.durability) for qos in reading_qos(topic)]

@@ -18,7 +18,14 @@ from ..core.planner import NANO
 from ..messages import pose2d, rotated, velocity
 from ..scenarios import load_scenario, scenario_to_json
 from . import markers, params, topics
-from .convert import clock_msg, obstacles_msg, odometry_msg, path_msg, pose_stamped_msg
+from .convert import (
+    clock_msg,
+    obstacles_msg,
+    odometry_msg,
+    outcome_msg,
+    path_msg,
+    pose_stamped_msg,
+)
 from .runtime import GraphNode, Refusals, spin_node
 from .settings import WorldSimSettings, names
 
@@ -49,6 +56,7 @@ class WorldSim(GraphNode):
         self._odom = self.advertise(topics.ODOM)
         self._obstacles = self.advertise(topics.OBSTACLES)
         self._goal = self.advertise(topics.GOAL_POSE)
+        self._outcome = self.advertise(topics.OUTCOME)
         self._trail_pub = self.advertise(topics.TRAIL)
         self._markers = self.advertise(topics.MARKERS)
         self._tf = self.advertise(topics.TF) if topics.TF else None
@@ -67,7 +75,7 @@ class WorldSim(GraphNode):
         else:
             period = s.tick_ns * NANO / s.speed_factor
             self.create_timer(period, self._on_timer, clock=steady)
-        self._publish_goal()
+        self._announce()
 
     @property
     def stamp_ns(self) -> int:
@@ -92,6 +100,7 @@ class WorldSim(GraphNode):
         outcome = None if self.settings.run_on else self.world.outcome()
         if outcome is not None:
             self.over = True
+            self._outcome.publish(outcome_msg(outcome, self.world.tick + 1))
             self.get_logger().info(f"run over: {outcome.value} at tick {self.world.tick}")
             return
         self.world.step(self._velocity)
@@ -116,9 +125,10 @@ class WorldSim(GraphNode):
             self._markers.publish(markers.world_markers(self.world, stamp, s.odom_frame))
         self._odom.publish(odom)
 
-    def _publish_goal(self) -> None:
+    def _announce(self) -> None:
         goal = self.scenario.goal_m
         self._goal.publish(pose_stamped_msg(goal, self.stamp_ns, self.settings.odom_frame))
+        self._outcome.publish(outcome_msg(None, 0))
 
     def _on_cmd_vel(self, message: Any) -> None:
         try:
@@ -187,7 +197,7 @@ class WorldSim(GraphNode):
         self.world = World(self.scenario, s.tick_ns, s.goal_tolerance_m)
         self._velocity, self.over = (0.0, 0.0), False
         self._trail.clear()
-        self._publish_goal()
+        self._announce()
         self._published = False
         if s.lockstep and not self._paused:
             self._publish_tick()
