@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -94,14 +95,18 @@ def run(
     planner: PlannerParams | None = None,
     sensor: SensorParams | None = None,
     seed: int = 0,
+    go_on: Callable[[World], bool] = lambda _: True,
 ) -> Episode:
-    """The core driver: Algorithm 1 from start to goal or time limit, without ROS."""
+    """The core driver: Algorithm 1 from start to goal or time limit, without ROS.
+
+    go_on sees the world after every decision and ends the run by returning False.
+    """
     planner = planner or PlannerParams()
     sensor = sensor or SensorParams()
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m)
     brain = Planner(planner, seed)
     ticks = [_turn(world, brain, sensor)]
-    while (outcome := world.outcome()) is None:
+    while (outcome := world.outcome()) is None and go_on(world):
         world.step(ticks[-1].velocity)
         ticks.append(_turn(world, brain, sensor))
     return Episode(
@@ -111,7 +116,7 @@ def run(
         seed=seed,
         driver="core",
         ticks=tuple(ticks),
-        outcome=outcome,
+        outcome=outcome or Outcome.INTERRUPTED,
     )
 
 
