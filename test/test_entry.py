@@ -199,6 +199,10 @@ def test_a_signal_unwinds_a_running_command(signum: int, code: int) -> None:
             "import os; os.environ['RMW_IMPLEMENTATION'] = 'rmw_nope'",
             "planner: RMW_IMPLEMENTATION=rmw_nope: librmw_nope.so: cannot open",
         ),
+        (
+            "import os; os.environ['ROS_DOMAIN_ID'] = '500'",
+            "planner: ROS_DOMAIN_ID=500: no such domain; give 0 to 232",
+        ),
         ("sys.modules['rclpy'] = None", "planner: rclpy: import of rclpy halted"),
     ],
 )

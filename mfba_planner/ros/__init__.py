@@ -8,7 +8,10 @@ from mfba_planner.core.errors import ConfigError
 
 
 def _require_ros() -> None:
-    """Raise ConfigError, with the remedy, where rclpy or its middleware cannot be loaded."""
+    """Raise ConfigError, with the remedy, where rclpy or its middleware cannot work."""
+    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+    if not (domain.isdecimal() and int(domain) <= 232):
+        raise ConfigError(f"ROS_DOMAIN_ID={domain}: no such domain; give 0 to 232 or unset it")
     name = os.environ.get("RMW_IMPLEMENTATION")
     try:
         if name:
