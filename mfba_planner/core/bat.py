@@ -243,9 +243,21 @@ class BatSwarm:
             self._values = [math.inf if v != v else v for v in values]
         else:
             self._accept(values)
-        for x, value in zip(self.candidates, values):
-            if value < self.best_value:
-                self.best_x, self.best_value = x, value
+        self._keep_best(self.candidates, values)
+
+    def resettle(self, region: Region, objective: Callable[[Vector], float]) -> None:
+        """Draw bats and best into another region and value them again, between tell and ask.
+
+        Raises InputError at any other moment.
+        """
+        if self._asked or not self.best_x:
+            raise InputError("resettle before tell: tell the values of the candidates first")
+        self.region = region
+        self._x = self._bounded(self._x)
+        self._values = [objective(x) for x in self._x]
+        self.best_x = self._bounded([self.best_x])[0]
+        self.best_value = objective(self.best_x)
+        self._keep_best(self._x, self._values)
 
     def beta(self, u: float) -> float:
         """Beta of eq. 4 from a uniform draw u: u itself (BA), or eq. 10 (MFBA)."""
@@ -302,6 +314,11 @@ class BatSwarm:
                 self._values[i] = value
                 self._a[i] *= p.alpha  # eq. 8
                 self._r[i] = rate
+
+    def _keep_best(self, points: list[Vector], values: Sequence[float]) -> None:
+        for x, value in zip(points, values):
+            if value < self.best_value:
+                self.best_x, self.best_value = x, value
 
     def _bounded(self, points: list[Vector]) -> list[Vector]:
         if self.params.bounds is Bounds.NONE:

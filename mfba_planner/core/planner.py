@@ -254,7 +254,7 @@ class Planner:
     def _fly_on(self, position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
         """Fig. 1 read literally: bat.iterations per robot step, within the robot's reach.
 
-        The bats stay where they are in the world and are drawn into the disc of one step
+        The bats stay where they are in the world, but are drawn into the disc of one step
         around the robot, as is the best point they ever saw; the robot goes to that point.
         T of eq. 10 spans the trip: all iterations of the straight way from here to the goal.
         """
@@ -262,16 +262,20 @@ class Planner:
         if distance(position, goal) <= reach:
             return goal, ()
         disc, bat = Disc(reach, position), self.params.bat
+
+        def cost(x: Vector) -> float:
+            return distance((x[0], x[1]), goal)
+
         if self._swarm is None:
             horizon = bat.iterations * math.ceil(distance(position, goal) / reach)
             rng = stream(self.seed, self._stamp_ns)
             self._swarm = BatSwarm(bat, disc, rng, horizon)
-        swarm = self._swarm
-        swarm.region = disc
+        else:
+            self._swarm.resettle(disc, cost)
         for _ in range(bat.iterations):
-            swarm.tell([distance((x, y), goal) for x, y in swarm.ask()])
-        x, y = disc.clamp(swarm.best_x)
-        return (x, y), tuple((px, py) for px, py in swarm.candidates)
+            self._swarm.tell([cost(x) for x in self._swarm.ask()])
+        x, y = disc.clamp(self._swarm.best_x)
+        return (x, y), tuple((px, py) for px, py in self._swarm.candidates)
 
 
 def stream(seed: int, stamp_ns: int) -> np.random.Generator:
