@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import re
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,13 +20,18 @@ from .core.options import did_you_mean
 from .core.world import Obstacle, Scenario, Walls
 from .resources import scenario_names, scenario_path
 
+_EXAMPLE = "compare config/scenarios/case1.yaml"
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-1e6, le=1e6)]
 _Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=1e6)]
 _NotNegative = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=0.0, le=1e6)]
 _Point = tuple[_Number, _Number]
-_DEFAULTS: dict[str, Any] = {
-    name: field.default for name, field in Scenario.__dataclass_fields__.items()
-}
+# Names end up in messages and in file names.
+_Name = Annotated[str, Field(max_length=100, pattern=r"^\w[\w .+-]*$")]
+
+
+def _default(kind: type, name: str) -> Any:
+    """The core's default; it is written down there and only there."""
+    return kind.__dataclass_fields__[name].default  # type: ignore[attr-defined]
 
 
 class _Strict(BaseModel):
@@ -33,13 +41,16 @@ class _Strict(BaseModel):
 class _Obstacle(_Strict):
     center_m: _Point
     radius_m: _Positive
-    speed_mps: _NotNegative = 0.0
+    speed_mps: _NotNegative = _default(Obstacle, "speed_mps")
     heading_deg: _Number | None = None
     heading_rad: _Number | None = None  # what programs write: degrees would lose the last bit
 
     def build(self) -> Obstacle:
         if self.heading_deg is not None and self.heading_rad is not None:
-            raise ConfigError("obstacles: heading_deg and heading_rad given; keep one of them")
+            raise ConfigError(
+                f"heading_deg={self.heading_deg:g}: heading_rad={self.heading_rad:g} is given "
+                "as well; keep one of them"
+            )
         return Obstacle(
             center_m=self.center_m,
             radius_m=self.radius_m,
@@ -54,14 +65,14 @@ class _Walls(_Strict):
 
 
 class _Scenario(_Strict):
-    name: Annotated[str, Field(min_length=1, max_length=100)]
-    description: str = ""
+    name: _Name
+    description: str = _default(Scenario, "description")
     start_m: _Point
     goal_m: _Point
-    robot_radius_m: _Positive = _DEFAULTS["robot_radius_m"]
+    robot_radius_m: _Positive = _default(Scenario, "robot_radius_m")
     obstacles: list[_Obstacle] = []
     walls: _Walls | None = None
-    time_limit_s: _Positive = _DEFAULTS["time_limit_s"]
+    time_limit_s: _Positive = _default(Scenario, "time_limit_s")
 
     def build(self) -> Scenario:
         walls = self.walls
@@ -89,41 +100,58 @@ def load_scenario(source: str) -> Scenario:
     """
     if source.lstrip().startswith("{"):
         return parse_scenario(source, "inline scenario")
-    path = Path(source)
-    if path.suffix in (".yaml", ".yml") or path.exists():
-        return parse_scenario(_read(path), str(path))
+    if source.endswith((".yaml", ".yml", ".json")):
+        return parse_scenario(_read(Path(source)), source)
     known = scenario_names()
-    if source not in known:
-        raise ConfigError(
-            f"{source!r}: no such scenario; {did_you_mean(source, known)} (or give a .yaml file)"
-        )
-    return parse_scenario(_read(scenario_path(source)), source)
+    if source in known:
+        return parse_scenario(_read(scenario_path(source)), source)
+    if os.path.isfile(source):
+        return parse_scenario(_read(Path(source)), source)
+    raise ConfigError(
+        f"{source!r}: no such scenario; {did_you_mean(source, known)} (or give a .yaml file)"
+    )
 
 
 def _read(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a path with a NUL
         reason = getattr(error, "strerror", None) or "not a text file"
         raise ConfigError(f"{path}: {reason}; give a readable scenario .yaml") from None
 
 
+class _Loader(yaml.SafeLoader):
+    """YAML as people expect it: 1e-3 is a number, and a key given twice is a mistake."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
+        """Refuse what SafeLoader would settle in silence: the last of two equal keys."""
+        keys = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in keys:
+                    problem = f"{key.value!r} given twice"
+                    raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+                keys.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
+
+
 def parse_scenario(text: str, origin: str) -> Scenario:
-    """Turn YAML text into a Scenario; ConfigError names origin, value, reason and remedy."""
-    try:
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f" line {mark.line + 1}" if mark else ""
-        raise ConfigError(
-            f"{origin}{where}: not YAML; compare config/scenarios/case1.yaml"
-        ) from None
+    """Turn YAML or JSON text into a Scenario.
+
+    Raises ConfigError naming origin, value, reason and remedy.
+    """
+    data = _plain(text, origin)
     if data is None:
-        raise ConfigError(f"{origin}: empty; compare config/scenarios/case1.yaml")
+        raise ConfigError(f"{origin}: empty; {_EXAMPLE}")
     if not isinstance(data, dict):
-        raise ConfigError(
-            f"{origin}: a {type(data).__name__}, not a mapping; compare config/scenarios/case1.yaml"
-        )
+        raise ConfigError(f"{origin}: a {type(data).__name__}, not a mapping; {_EXAMPLE}")
     try:
         return _Scenario.model_validate(data).build()
     except ValidationError as error:
@@ -132,17 +160,55 @@ def parse_scenario(text: str, origin: str) -> Scenario:
         raise ConfigError(f"{origin}: {error}") from None
 
 
+def _plain(text: str, origin: str) -> Any:
+    """What the text holds; JSON first, since YAML reads some of JSON's escapes differently."""
+    with suppress(ValueError, RecursionError):
+        return json.loads(text)
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f" line {mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or "unreadable characters"
+        raise ConfigError(f"{origin}{where}: not YAML ({problem}); {_EXAMPLE}") from None
+    except (ValueError, LookupError, AttributeError, RecursionError):
+        # what PyYAML raises for an impossible date, a misused tag, a bottomless nesting
+        raise ConfigError(f"{origin}: not YAML (unreadable value); {_EXAMPLE}") from None
+
+
+_REMEDIES = {
+    "finite_number": "give a finite number",
+    "float_type": "give a number",
+    "list_type": "give a list ([] for none)",
+    "missing": f"add it ({_EXAMPLE})",
+    "model_type": f"give a mapping ({_EXAMPLE})",
+    "string_pattern_mismatch": "give a name of letters, digits, spaces and _ . + -",
+    "string_too_long": "give at most 100 characters",
+    "string_type": "give a text",
+    "too_long": "give two numbers, [x, y]",
+    "tuple_type": "give two numbers, [x, y]",
+}
+
+
 def _explain(error: ValidationError) -> str:
-    """The first fault in one line: place, value, reason, remedy."""
-    fault = error.errors(include_url=False)[0]
-    place = ".".join(str(part + 1 if isinstance(part, int) else part) for part in fault["loc"])
-    if fault["type"] == "extra_forbidden":
-        known = _keys_at(fault["loc"])
-        return f"{place}: unknown key; {did_you_mean(str(fault['loc'][-1]), known)}"
-    if fault["type"] == "missing":
-        return f"{place}: missing; add it (compare config/scenarios/case1.yaml)"
-    message = fault["msg"].replace("Input should be", "give")
-    return f"{place}={fault['input']!r}: refused; {message}"
+    """One fault in one line: place, value, reason, remedy.
+
+    An unknown key goes first: misspelt, it is why another one is missing.
+    """
+    faults = error.errors(include_url=False)
+    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
+    kind, location = fault["type"], fault["loc"]
+    if kind == "invalid_key":
+        return f"key {location[-1]}: not a word; remove it ({_EXAMPLE})"
+    place = ".".join(str(part + 1 if isinstance(part, int) else part) for part in location)
+    if kind == "extra_forbidden":
+        return f"{place}: unknown key; {did_you_mean(str(location[-1]), _keys_at(location))}"
+    if kind == "missing":
+        return f"{place}: missing; {_REMEDIES[kind]}"
+    remedy = _REMEDIES.get(kind) or fault["msg"].replace("Input should be", "give a number")
+    value = repr(fault["input"])
+    shown = value if len(value) <= 60 else f"{value[:57]}..."
+    return f"{place}={shown}: refused; {remedy}"
 
 
 def _keys_at(location: tuple[Any, ...]) -> list[str]:
