@@ -15,7 +15,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ..core.episode import World
 from ..core.geometry import Point, towards
-from ..core.planner import Decision, Mode
+from ..core.planner import NANO, Decision, Mode
 from .convert import header, pose_msg
 
 Rgba = tuple[float, float, float, float]
@@ -36,6 +36,23 @@ MODE_COLORS = {
     Mode.ARRIVED: GREEN,
 }
 ARROW_S = 2.0  # a velocity arrow shows where the obstacle will be after so long
+
+
+class Seldom:
+    """Viewers need no message per tick: says when a period of simulated time has passed."""
+
+    def __init__(self, period_s: float) -> None:
+        """The first stamp is due."""
+        self._period_ns = round(period_s / NANO)
+        self._last_ns: int | None = None
+
+    def due(self, stamp_ns: int) -> bool:
+        """Whether to show something at this stamp; also when time was set back."""
+        last = self._last_ns
+        if last is not None and last <= stamp_ns < last + self._period_ns:
+            return False
+        self._last_ns = stamp_ns
+        return True
 
 
 def world_markers(world: World, stamp_ns: int, frame_id: str) -> MarkerArray:

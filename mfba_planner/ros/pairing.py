@@ -15,16 +15,20 @@ WAITING_LIMIT = 10_000  # messages of one stream that may wait for their partner
 
 
 class StampPairs(Generic[A, B]):
-    """Join stream a with stream b; a pair is given out as soon as both parts are there."""
+    """Join stream a with stream b; a pair is given out as soon as both parts are there.
 
-    def __init__(self) -> None:
+    With `again`, the last pair is given out once more when both its parts come once more.
+    """
+
+    def __init__(self, *, again: bool = False) -> None:
         """Start with nothing waiting."""
+        self._again = again
         self._a: OrderedDict[int, A] = OrderedDict()
         self._b: OrderedDict[int, B] = OrderedDict()
         self._answered_ns = -1
 
     def add_a(self, stamp_ns: int, value: A) -> tuple[A, B] | None:
-        """Take a message of stream a; InputError for a stamp not newer than the last answer."""
+        """Take a message of stream a; InputError for a stamp that was answered before."""
         self._refuse_old(stamp_ns)
         if stamp_ns in self._b:
             pair = (value, self._b[stamp_ns])
@@ -34,7 +38,7 @@ class StampPairs(Generic[A, B]):
         return None
 
     def add_b(self, stamp_ns: int, value: B) -> tuple[A, B] | None:
-        """Take a message of stream b; InputError for a stamp not newer than the last answer."""
+        """Take a message of stream b; InputError for a stamp that was answered before."""
         self._refuse_old(stamp_ns)
         if stamp_ns in self._a:
             pair = (self._a[stamp_ns], value)
@@ -44,7 +48,7 @@ class StampPairs(Generic[A, B]):
         return None
 
     def _refuse_old(self, stamp_ns: int) -> None:
-        if stamp_ns <= self._answered_ns:
+        if stamp_ns <= self._answered_ns and not (self._again and stamp_ns == self._answered_ns):
             raise InputError(
                 f"stamp {stamp_ns} ns: not newer than {self._answered_ns} ns, answered before; "
                 "stamps must rise"

@@ -78,18 +78,26 @@ def _descriptor(spec: Spec, default: Any, read_only: bool) -> ParameterDescripto
 def follow(node: Node, current: Callable[[], Any], apply: Callable[[Any], None]) -> None:
     """Let parameters of a dataclass be set later: checked as a whole, refused with the reason."""
 
-    def on_set(parameters: list[Parameter]) -> SetParametersResult:
+    def changed(parameters: list[Parameter]) -> Any:
         known = {name for name, _, _ in walk(current())}
-        changes = {p.name: p.value for p in parameters if p.name in known}
+        return override(current(), {p.name: p.value for p in parameters if p.name in known})
+
+    def judge(parameters: list[Parameter]) -> SetParametersResult:
         try:
-            changed = override(current(), changes)
+            changed(parameters)
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
-        if changes:
-            apply(changed)
         return SetParametersResult(successful=True)
 
-    node.add_on_set_parameters_callback(on_set)
+    node.add_on_set_parameters_callback(judge)
+    # Only what everybody has accepted is applied.
+    node.add_post_set_parameters_callback(lambda parameters: apply(changed(parameters)))
+
+
+def state(node: Node, name: str, value: str, doc: str) -> None:
+    """Declare what a node has made of its parameters: to be read, whatever was given for it."""
+    descriptor = ParameterDescriptor(description=doc, read_only=True)
+    node.declare_parameter(name, value, descriptor, ignore_override=True)
 
 
 def declare_radii(node: Node, default: list[float]) -> list[float]:

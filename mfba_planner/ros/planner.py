@@ -3,25 +3,22 @@
 
 from __future__ import annotations
 
-import math
 import time
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
-from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
-from rclpy.duration import Duration
+from rclpy.clock import Clock, ClockType
 
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner import NANO, Decision, Mode, Observation, Planner, PlannerParams
-from ..core.sensing import Ranges
 from ..messages import goal_point, robot_pose, sector_ranges, stamp_ns
 from . import convert, markers, params, topics
-from .pairing import StampPairs
+from .inputs import Lockstep, Newest, Ready
 from .runtime import GraphNode, Refusals, spin_node
 from .settings import PlannerSettings, names
 
-Refused = str  # an input that was refused travels as its reason
+WATCH_S = 0.05  # how often, in real time, the age of the inputs is looked at
 
 
 class PlannerNode(GraphNode):
@@ -34,31 +31,23 @@ class PlannerNode(GraphNode):
         self.brain = Planner(params.declare(self, PlannerParams()), s.seed)
         params.follow(self, lambda: self.brain.params, self._set_params)
         self._refusals = Refusals(self)
-        self._reset_inputs()
         self._goal: Point | None = None
-        self._goal_message: Any = None
-        self._pose, self._ranges = Pose2D(0.0, 0.0), (math.inf,) * 12  # the last usable ones
-        self._next_view_ns = 0
+        self._pose = Pose2D(0.0, 0.0)  # the last that could be used
         self._goal_step = self.advertise(topics.GOAL_STEP)
         self._plan = self.advertise(topics.PLAN)
         self._decision = self.advertise(topics.DECISION)
         self._markers = self.advertise(topics.MARKERS)
-        kind = TwistStamped if s.enable_stamped_cmd_vel else None
-        self._cmd_vel = self.advertise(topics.CMD_VEL, kind)
-        self.listen(topics.ODOM, self._on_odom)
+        self._view = markers.Seldom(s.view_period_s)
+        stamped = TwistStamped if s.enable_stamped_cmd_vel else None
+        self._cmd_vel = self.advertise(topics.CMD_VEL, stamped)
+        self._inputs: Lockstep | Newest = Lockstep() if s.lockstep else Newest()
+        self.listen(topics.ODOM, self._on_odom, from_anyone=not s.lockstep)
         self.listen(topics.SECTORS, self._on_sectors)
         self.listen(topics.GOAL_POSE, self._on_goal)
         self.offer_ready(names(s.wait_for))
-        self.get_clock().create_jump_callback(
-            JumpThreshold(
-                min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
-            ),
-            post_callback=self._on_time_jump,
-        )
+        self.on_time_set_back(self._start_afresh)
         if not s.lockstep:
-            period = 0.25 * self.brain.params.input_timeout_s
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self.create_timer(period, self._watch, clock=steady)
+            self.create_timer(WATCH_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def missing(self) -> str:
         """Besides the subscribers: the goal, when peers are waited for."""
@@ -67,84 +56,51 @@ class PlannerNode(GraphNode):
     def _set_params(self, changed: PlannerParams) -> None:
         self.brain.params = changed
 
-    def _reset_inputs(self) -> None:
-        self._pairs: StampPairs[Pose2D | Refused, Ranges | Refused] = StampPairs()
-        self._odom: tuple[Pose2D | Refused, float] | None = None
-        self._sectors_at, self._last_stamp_ns = time.monotonic(), -1
-
-    def _on_time_jump(self, _: TimeJump) -> None:
+    def _start_afresh(self) -> None:
         self.get_logger().warning("time was set back: starting afresh")
         self.brain.reset()
-        self._reset_inputs()
+        self._inputs = type(self._inputs)()
 
     def _on_goal(self, message: Any) -> None:
-        if message == self._goal_message and stamp_ns(message.header.stamp):
-            return  # a latched one, delivered twice
-        self._goal_message = message
         self.brain.reset()
+        self._goal = None
         try:
             self._goal = goal_point(message)
         except InputError as error:
-            self._goal = None
             self._refusals.add(error)
 
     def _on_odom(self, message: Any) -> None:
-        pose = self._read(robot_pose, message)
-        self._odom = (pose, time.monotonic())
-        if self.settings.lockstep:
-            self._join(self._pairs.add_a, message, pose)
+        self._take(message, robot_pose, self._inputs.odom)
 
     def _on_sectors(self, message: Any) -> None:
-        ranges = self._read(sector_ranges, message)
-        self._sectors_at = time.monotonic()
-        if self.settings.lockstep:
-            self._join(self._pairs.add_b, message, ranges)
-        elif self._is_newer(stamp_ns(message.header.stamp)):
-            pose, arrived = self._odom or ("no odom yet", self._sectors_at)
-            self._answer(self._last_stamp_ns, pose, ranges, self._sectors_at - arrived)
+        self._take(message, sector_ranges, self._inputs.sectors)
 
-    def _read(self, reader: Any, message: Any) -> Any:
-        """The message's value, or the reason why it was refused (and counted)."""
+    def _take(self, message: Any, read: Any, add: Any) -> None:
+        """Read one input and answer, if that completes what a decision needs."""
         try:
-            return reader(message)
+            value = read(message)
         except InputError as error:
             self._refusals.add(error)
-            return str(error)
-
-    def _join(self, add: Any, message: Any, value: Any) -> None:
-        stamp = stamp_ns(message.header.stamp)
+            value = str(error)
         try:
-            pair = add(stamp, value)
+            ready = add(stamp_ns(message.header.stamp), value, time.monotonic())
         except InputError as error:
             self._refusals.add(error)
-            return
-        if pair is not None:
-            pose, ranges = pair
-            self._answer(stamp, pose, ranges, 0.0)
-
-    def _is_newer(self, stamp: int) -> bool:
-        if stamp > self._last_stamp_ns:
-            self._last_stamp_ns = stamp
-            return True
-        self._refusals.add(InputError(f"sectors stamp {stamp} ns goes back; stamps must rise"))
-        return False
+        else:
+            self._answer(ready)
 
     def _watch(self) -> None:
         """Real time: say stop, again and again, while sectors or odom are stale."""
-        now = time.monotonic()
-        age_s = now - min(self._sectors_at, self._odom[1] if self._odom else now)
-        if age_s > self.brain.params.input_timeout_s and self._last_stamp_ns >= 0:
-            pose, _ = self._odom or ("no odom yet", now)
-            self._answer(self._last_stamp_ns, pose, self._ranges, age_s)
+        if isinstance(self._inputs, Newest):
+            self._answer(self._inputs.stale(time.monotonic(), self.brain.params.input_timeout_s))
 
-    def _answer(
-        self, stamp: int, pose: Pose2D | Refused, ranges: Ranges | Refused, age_s: float
-    ) -> None:
+    def _answer(self, ready: Ready | None) -> None:
+        if ready is None:
+            return
+        stamp, pose, ranges, age_s = ready
         refused = next((x for x in (pose, ranges) if isinstance(x, str)), "")
         if not isinstance(pose, str):
             self._pose = pose
-        if not isinstance(ranges, str):
-            self._ranges = ranges
         decision = self.brain.decide(
             Observation(
                 stamp_ns=stamp,
@@ -170,8 +126,7 @@ class PlannerNode(GraphNode):
                 decision, algorithm, self._refusals.count, self.get_fully_qualified_name()
             )
         )
-        if stamp >= self._next_view_ns:
-            self._next_view_ns = stamp + round(s.view_period_s / NANO)
+        if self._view.due(stamp):
             self._markers.publish(markers.decision_markers(decision, s.odom_frame))
         if s.enable_stamped_cmd_vel:
             self._cmd_vel.publish(convert.twist_stamped_msg(decision, s.base_frame))

@@ -12,9 +12,7 @@ from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.parameter import parameter_value_to_python
-from rclpy.parameter_client import AsyncParameterClient
+from rclpy.executors import Executor
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMsg
 
@@ -29,6 +27,10 @@ from . import params, topics
 from .qos import offered
 from .runtime import GraphNode, spin_node
 from .settings import RecorderSettings, names
+from .survey import Found, ParameterSurvey
+
+QUIET_S = 0.2  # on one machine a message takes a hundredth of that, unless it is overloaded
+DRAIN_S = 10.0
 
 
 class Recorder(GraphNode):
@@ -42,11 +44,7 @@ class Recorder(GraphNode):
             self._facts = json.loads(s.run)
         except ValueError:
             raise ConfigError(f"parameter run={s.run!r}: not JSON; give an object") from None
-        self._found: dict[str, dict[str, Any]] = {}
-        self._askers: dict[str, AsyncParameterClient] = {}
-        self._asked: set[str] = set()
         self._log_time_ns = 0
-        self._latched: dict[str, bytes] = {}
         self._held: list[tuple[str, bytes]] = []
         self._explained = False
         self._types: dict[str, tuple[str, OfferedQos]] = {}
@@ -56,9 +54,7 @@ class Recorder(GraphNode):
             self._record(topic)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(0.25, self._flush, clock=steady)
-        self._wanted = names(s.nodes)
-        if self._wanted:
-            self._collector = self.create_timer(0.05, self._collect, clock=steady)
+        self._survey = ParameterSurvey(self, names(s.nodes), self.explain)
         self.offer_ready(names(s.wait_for))
         self.get_logger().info(f"recording to {self.directory}")
 
@@ -71,23 +67,10 @@ class Recorder(GraphNode):
         callback: Callable[[bytes], None] = partial(self._on_message, name)
         if topic is topics.CLOCK and self.settings.sim_time:
             callback = self._on_clock
-        profiles = topics.recording_qos(topic)
-        if len(profiles) > 1:
-            callback = partial(self._on_latched, name)
-        for qos in profiles:
-            self.create_subscription(
-                kind,
-                topic.name,
-                callback,
-                qos,
-                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-                raw=True,
-            )
-
-    def _on_latched(self, name: str, data: bytes) -> None:
-        if self._latched.get(name) != data:  # it comes twice
-            self._latched[name] = data
-            self._on_message(name, data)
+        # In simulated time world_sim writes what every tick brings, and nobody else.
+        from_anyone = not (topic.every_tick and self.settings.sim_time)
+        profiles = topics.recording_qos(topic, from_anyone=from_anyone)
+        self.subscribe(kind, topic.name, callback, profiles, raw=True)
 
     def _on_clock(self, data: bytes) -> None:
         self._log_time_ns = stamp_ns(deserialize_message(data, ClockMsg).clock)
@@ -115,28 +98,7 @@ class Recorder(GraphNode):
     def _flush(self) -> None:
         self.writer.flush_if_due(time.monotonic_ns())
 
-    def _collect(self) -> None:
-        """Ask every node once for all its parameters."""
-        for node in self._wanted - self._asked:
-            client = self._askers.setdefault(node, AsyncParameterClient(self, node))
-            if client.services_are_ready():
-                self._asked.add(node)
-                client.list_parameters(callback=partial(self._on_listed, node))
-        if self._wanted <= self._found.keys():
-            self._collector.cancel()
-            self.explain(self._found)
-
-    def _on_listed(self, node: str, future: Any) -> None:
-        listed = list(future.result().result.names)
-        self._askers[node].get_parameters(
-            listed, callback=partial(self._on_parameters, node, listed)
-        )
-
-    def _on_parameters(self, node: str, listed: list[str], future: Any) -> None:
-        values = map(parameter_value_to_python, future.result().values)
-        self._found[node] = {k: params.plain(v) for k, v in zip(listed, values)}
-
-    def explain(self, found: dict[str, dict[str, Any]]) -> None:
+    def explain(self, found: Found) -> None:
         """Put the nodes' parameters and the facts of the run into the bag, once."""
         if not self._explained:
             self._explained = True
@@ -147,17 +109,25 @@ class Recorder(GraphNode):
 
     def missing(self) -> str:
         """Until the parameters of all nodes are in the bag, whose are missing."""
-        absent = sorted(self._wanted - self._found.keys())
-        return f"parameters of {', '.join(absent)} not read yet" if absent else ""
+        absent = ", ".join(self._survey.absent)
+        return f"parameters of {absent} not read yet" if absent else ""
+
+    def drain(self, executor: Executor) -> None:
+        """Record on until nothing has come for a while: senders may be far ahead."""
+        count, heard = self.writer.message_count, time.monotonic()
+        deadline = heard + DRAIN_S
+        while time.monotonic() < min(heard + QUIET_S, deadline):
+            executor.spin_once(timeout_sec=QUIET_S)
+            if self.writer.message_count != count:
+                count, heard = self.writer.message_count, time.monotonic()
 
     def close(self) -> None:
         """Write what is held and finish the bag."""
-        if hasattr(self, "writer"):
-            for name, held in self._held:
-                self._log_time_ns = self._log_time_ns or time.time_ns()
-                self._write(name, held)
-            self.explain(self._found)
-            self.writer.close()
+        for name, held in self._held:
+            self._log_time_ns = self._log_time_ns or time.time_ns()
+            self._write(name, held)
+        self.explain(self._survey.found)
+        self.writer.close()
 
 
 def _type_name(kind: Any) -> str:

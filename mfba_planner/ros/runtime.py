@@ -4,21 +4,25 @@
 from __future__ import annotations
 
 import signal
+from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.clock import JumpHandle, JumpThreshold
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from . import topics
-from .topics import Topic, expected_readers
+from .topics import Topic, expected_readers, reading_qos
 
 SPIN_S = 0.1  # longest time until a signal is noticed
+ONCE_LIMIT = 2000  # messages by which two subscriptions to one topic may be apart
 
 
 class StopFlag:
@@ -50,12 +54,16 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
         executor.add_node(node)
         while not stop.is_set and not node.finished:
             executor.spin_once(timeout_sec=SPIN_S)
+        node.drain(executor)
         return 0
     finally:
-        if node is not None:
-            node.close()
-            node.destroy_node()
-        rclpy.try_shutdown()
+        try:
+            if node is not None:
+                node.close()
+        finally:
+            if node is not None:
+                node.destroy_node()
+            rclpy.try_shutdown()
 
 
 class GraphNode(Node):
@@ -67,6 +75,7 @@ class GraphNode(Node):
         self.finished = False
         self._writers: list[tuple[Topic, Publisher]] = []
         self._peers: set[str] = set()
+        self._jumps: list[JumpHandle] = []
 
     def advertise(self, topic: Topic, message_type: Any = None) -> Publisher:
         """Create the publisher of a topic of topics.py.
@@ -83,10 +92,44 @@ class GraphNode(Node):
         self._writers.append((topic, publisher))
         return publisher
 
-    def listen(self, topic: Topic, callback: Callable[[Any], None], kind: Any = None) -> None:
-        """Create the subscription of a topic of topics.py; two of them for a latched one."""
-        for qos in topics.reading_qos(topic):
-            self.create_subscription(kind or topic.type, topic.name, callback, qos)
+    def listen(
+        self,
+        topic: Topic,
+        callback: Callable[[Any], None],
+        kind: Any = None,
+        *,
+        from_anyone: bool = True,
+    ) -> None:
+        """Create the subscription of a topic of topics.py; two of them where others write too."""
+        profiles = reading_qos(topic, from_anyone=from_anyone)
+        self.subscribe(kind or topic.type, topic.name, callback, profiles)
+
+    def subscribe(
+        self,
+        kind: Any,
+        name: str,
+        callback: Callable[[Any], None],
+        profiles: list[QoSProfile],
+        *,
+        raw: bool = False,
+    ) -> None:
+        """Subscribe with each QoS profile; a message that fits more than one comes once."""
+        several = len(profiles) > 1
+        # With several, a writer that does not fit the one fits the other: no warning then.
+        events = SubscriptionEventCallbacks(use_default_callbacks=not (raw or several))
+        call: Any = Once(callback) if several else callback
+        for qos in profiles:
+            self.create_subscription(kind, name, call, qos, event_callbacks=events, raw=raw)
+
+    def on_time_set_back(self, callback: Callable[[], None]) -> None:
+        """Call back whenever the node's clock (with use_sim_time: /clock) is set back."""
+        threshold = JumpThreshold(
+            min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
+        )
+        # rclpy itself does not keep the handle alive.
+        self._jumps.append(
+            self.get_clock().create_jump_callback(threshold, post_callback=lambda _: callback())
+        )
 
     def offer_ready(self, peers: set[str]) -> None:
         """Offer ~/ready: true once every peer's subscription to our topics is matched."""
@@ -97,9 +140,13 @@ class GraphNode(Node):
         """What is still missing before a first message would reach everybody; empty: nothing."""
         for topic, publisher in self._writers:
             expected = expected_readers(topic, self._peers - {self.get_name()})
-            found = publisher.get_subscription_count()
-            if found < expected:
-                return f"{topic.name} has {found} of {expected} subscribers"
+            if not expected:
+                continue
+            known = self.get_subscriptions_info_by_topic(publisher.topic_name)
+            found = [info.node_name for info in known if info.node_name in expected]
+            absent = expected.difference(found)
+            if absent or publisher.get_subscription_count() < len(found):
+                return f"{topic.name} waits for {', '.join(sorted(absent or expected))}"
         return ""
 
     def _on_ready(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -107,8 +154,35 @@ class GraphNode(Node):
         response.success = not response.message
         return response
 
+    def drain(self, executor: Executor) -> None:
+        """Take in what has been sent already; called once after a signal, before close."""
+
     def close(self) -> None:
         """Release what must not be lost; called once, before the node is destroyed."""
+
+    def destroy_node(self) -> None:
+        """Let go of the clock, then of the node."""
+        while self._jumps:
+            self._jumps.pop().unregister()
+        super().destroy_node()
+
+
+class Once:
+    """Hands each message on once, though two subscriptions bring it."""
+
+    def __init__(self, callback: Callable[[Any], None]) -> None:
+        """Start with nothing seen."""
+        self._callback = callback
+        self._seen: OrderedDict[tuple[int, int], None] = OrderedDict()
+
+    def __call__(self, message: Any, info: Any) -> None:
+        """Take a message with rclpy's MessageInfo."""
+        key = (info["source_timestamp"], info["publication_sequence_number"])
+        if key not in self._seen:
+            self._seen[key] = None
+            if len(self._seen) > ONCE_LIMIT:
+                self._seen.popitem(last=False)
+            self._callback(message)
 
 
 class Refusals:

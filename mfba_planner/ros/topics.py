@@ -34,17 +34,24 @@ def _reliable(depth: int, durability: DurabilityPolicy) -> QoSProfile:
 TICK_QOS = _reliable(1000, DurabilityPolicy.VOLATILE)
 LATCHED_QOS = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
 VIEW_QOS = _reliable(10, DurabilityPolicy.VOLATILE)
+SENSOR_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Topic:
-    """One row of the graph's table; every_tick topics carry one message per tick."""
+    """One row of the graph's table; every_tick topics carry one message per tick.
+
+    least_qos is what other people's writers may offer, where that is less than qos.
+    """
 
     name: str
     type: Any
     writers: tuple[str, ...] = ()
     readers: tuple[str, ...] = ()
     qos: QoSProfile
+    least_qos: QoSProfile | None = None
     every_tick: bool = False
 
 
@@ -57,6 +64,7 @@ ODOM = Topic(
     writers=(WORLD_SIM,),
     readers=(VIRTUAL_SENSOR, PLANNER),
     qos=TICK_QOS,
+    least_qos=SENSOR_QOS,
     every_tick=True,
 )
 OBSTACLES = Topic(
@@ -67,7 +75,13 @@ OBSTACLES = Topic(
     qos=TICK_QOS,
     every_tick=True,
 )
-SCAN = Topic(name="scan", type=LaserScan, readers=(VIRTUAL_SENSOR,), qos=TICK_QOS)
+SCAN = Topic(
+    name="scan",
+    type=LaserScan,
+    readers=(VIRTUAL_SENSOR,),
+    qos=TICK_QOS,
+    least_qos=SENSOR_QOS,  # most lidars
+)
 SECTORS = Topic(
     name="sectors",
     type=LaserScan,
@@ -84,7 +98,12 @@ SENSORY_VECTOR = Topic(
     every_tick=True,
 )
 GOAL_POSE = Topic(
-    name="goal_pose", type=PoseStamped, writers=(WORLD_SIM,), readers=(PLANNER,), qos=LATCHED_QOS
+    name="goal_pose",
+    type=PoseStamped,
+    writers=(WORLD_SIM,),
+    readers=(PLANNER,),
+    qos=LATCHED_QOS,
+    least_qos=VIEW_QOS,  # RViz
 )
 GOAL_STEP = Topic(
     name="goal_step", type=PoseStamped, writers=(PLANNER,), qos=TICK_QOS, every_tick=True
@@ -145,20 +164,30 @@ else:
     GRAPH += (TF,)
 
 
-def expected_readers(topic: Topic, nodes: set[str]) -> int:
-    """How many of the named nodes read a topic; the recorder reads every one."""
-    return len(nodes.intersection(topic.readers)) + (RECORDER in nodes)
+def expected_readers(topic: Topic, nodes: set[str]) -> set[str]:
+    """Which of the named nodes read a topic; the recorder reads every one."""
+    return nodes.intersection((*topic.readers, RECORDER))
 
 
-def reading_qos(topic: Topic) -> list[QoSProfile]:
-    """What readers ask for: a latched topic also takes writers that are not (RViz is not).
+def reading_qos(topic: Topic, *, from_anyone: bool = True) -> list[QoSProfile]:
+    """What readers ask for; where others write too, what they may offer as well.
 
-    A latched message then comes twice.
+    A message may then come twice: see runtime.Once.
     """
-    latched = topic.qos.durability is DurabilityPolicy.TRANSIENT_LOCAL
-    return [topic.qos, VIEW_QOS] if latched else [topic.qos]
+    if topic.least_qos is None or not from_anyone:
+        return [topic.qos]
+    return [topic.qos, topic.least_qos]
 
 
-def recording_qos(topic: Topic) -> list[QoSProfile]:
+def recording_qos(topic: Topic, *, from_anyone: bool = True) -> list[QoSProfile]:
     """What a reader asks for that must not lose a message."""
-    return [_reliable(5000, qos.durability) for qos in reading_qos(topic)]
+    profiles = reading_qos(topic, from_anyone=from_anyone)
+    return [
+        QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=5000,
+            reliability=qos.reliability,
+            durability=qos.durability,
+        )
+        for qos in profiles
+    ]

@@ -38,19 +38,23 @@ class VirtualSensor(GraphNode):
         self.radii = params.declare_radii(self, _DEFAULT_RADII)
         params.follow(self, lambda: self.sensor, self._set_sensor)
         self._refusals = Refusals(self)
-        self._pairs: StampPairs[Pose2D | None, Any] = StampPairs()
-        self._pose: Pose2D | None = None
+        self._by_stamp = s.lockstep or s.source is Source.OBSTACLES
+        self._start_afresh()
         self._sectors = self.advertise(topics.SECTORS)
         self._vector = self.advertise(topics.SENSORY_VECTOR)
-        self.listen(topics.ODOM, self._on_odom)
-        if s.source is Source.OBSTACLES:
-            self.listen(topics.OBSTACLES, self._on_measurement)
-        else:
-            self.listen(topics.SCAN, self._on_measurement)
+        self.listen(topics.ODOM, self._on_odom, from_anyone=not s.lockstep)
+        source = topics.OBSTACLES if s.source is Source.OBSTACLES else topics.SCAN
+        self.listen(source, self._on_measurement)
         self.offer_ready(names(s.wait_for))
+        self.on_time_set_back(self._start_afresh)
 
     def _set_sensor(self, sensor: SensorParams) -> None:
         self.sensor = sensor
+
+    def _start_afresh(self) -> None:
+        # A pair that comes again is answered again: a planner may have been restarted.
+        self._pairs: StampPairs[Pose2D | None, Any] = StampPairs(again=True)
+        self._pose: Pose2D | None = None
 
     def _on_odom(self, message: Any) -> None:
         self._pose = None
@@ -58,16 +62,17 @@ class VirtualSensor(GraphNode):
             self._pose = robot_pose(message)
         except InputError as error:
             self._refusals.add(error)
-        self._join(self._pairs.add_a, stamp_ns(message.header.stamp), self._pose)
+        if self._by_stamp:
+            self._join(self._pairs.add_a, message, self._pose)
 
     def _on_measurement(self, message: Any) -> None:
-        stamp = stamp_ns(message.header.stamp)
-        if self.settings.lockstep or self.settings.source is Source.OBSTACLES:
-            self._join(self._pairs.add_b, stamp, message)
+        if self._by_stamp:
+            self._join(self._pairs.add_b, message, message)
         else:
-            self._answer(stamp, self._pose, message)
+            self._answer(stamp_ns(message.header.stamp), self._pose, message)
 
-    def _join(self, add: Any, stamp: int, value: Any) -> None:
+    def _join(self, add: Any, message: Any, value: Any) -> None:
+        stamp = stamp_ns(message.header.stamp)
         try:
             pair = add(stamp, value)
         except InputError as error:
@@ -78,14 +83,17 @@ class VirtualSensor(GraphNode):
 
     def _answer(self, stamp: int, pose: Pose2D | None, message: Any) -> None:
         """Publish sectors for one stamp; NaN where the inputs were refused."""
-        ranges: Ranges = (math.nan,) * self.sensor.sectors
-        try:
-            if pose is None:
-                raise InputError("no usable odom yet; the sectors are blind")
-            ranges = self._measure(pose, message)
-        except InputError as error:
-            self._refusals.add(error)
         s = self.settings
+        ranges: Ranges = (math.nan,) * self.sensor.sectors
+        if pose is not None:
+            try:
+                ranges = self._measure(pose, message)
+            except InputError as error:
+                self._refusals.add(error)
+        else:
+            self.get_logger().warning(
+                "no usable odom: the sectors are blind", throttle_duration_sec=1.0
+            )
         self._sectors.publish(
             sectors_msg(ranges, self.sensor, s.robot_radius_m, stamp, s.odom_frame)
         )
@@ -106,7 +114,7 @@ class VirtualSensor(GraphNode):
         radii = self.radii * len(centers) if len(self.radii) == 1 else self.radii
         if len(radii) != len(centers):
             raise InputError(
-                f"{len(centers)} obstacles but {len(radii)} obstacle_radii_m; give one per obstacle"
+                f"{len(centers)} obstacles but {len(radii)} obstacle_radii_m; give one each"
             )
         return [r + self.settings.robot_radius_m for r in radii]
 

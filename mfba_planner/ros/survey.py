@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All parameters of other nodes, asked for over their parameter services."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+
+from . import params
+
+PERIOD_S = 0.05
+
+Found = dict[str, dict[str, Any]]
+
+
+class ParameterSurvey:
+    """Asks every wanted node once, as soon as it is there; done(found) when all have answered."""
+
+    def __init__(self, node: Node, wanted: set[str], done: Callable[[Found], None]) -> None:
+        """Begin to ask, while the node spins."""
+        self._node = node
+        self._done = done
+        self._askers: dict[str, AsyncParameterClient] = {}
+        self._asked: set[str] = set()
+        self.wanted = wanted
+        self.found: Found = {}
+        if wanted:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self._timer = node.create_timer(PERIOD_S, self._ask, clock=steady)
+
+    @property
+    def absent(self) -> list[str]:
+        """Nodes that have not answered yet."""
+        return sorted(self.wanted - self.found.keys())
+
+    def _ask(self) -> None:
+        for name in self.wanted - self._asked:
+            asker = self._askers.setdefault(name, AsyncParameterClient(self._node, name))
+            if asker.services_are_ready():
+                self._asked.add(name)
+                asker.list_parameters(callback=partial(self._on_listed, name))
+        if not self.absent:
+            self._node.destroy_timer(self._timer)
+            self._done(self.found)
+
+    def _on_listed(self, name: str, future: Any) -> None:
+        listed = list(future.result().result.names)
+        self._askers[name].get_parameters(listed, callback=partial(self._on_values, name, listed))
+
+    def _on_values(self, name: str, listed: list[str], future: Any) -> None:
+        values = map(parameter_value_to_python, future.result().values)
+        self.found[name] = {key: params.plain(value) for key, value in zip(listed, values)}

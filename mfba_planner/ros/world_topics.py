@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What world_sim says: the tick, the goal, how the run stands, and views for people."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from ..core.episode import Outcome, World
+from ..core.geometry import Point
+from . import convert, markers, topics
+from .runtime import GraphNode
+from .settings import WorldSimSettings
+
+TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is shown
+
+
+class WorldTopics:
+    """The publishers of world_sim."""
+
+    def __init__(self, node: GraphNode, settings: WorldSimSettings) -> None:
+        """Advertise them all."""
+        self._frame, self._base_frame = settings.odom_frame, settings.base_frame
+        self._clock = node.advertise(topics.CLOCK)
+        self._odom = node.advertise(topics.ODOM)
+        self._obstacles = node.advertise(topics.OBSTACLES)
+        self._goal = node.advertise(topics.GOAL_POSE)
+        self._outcome = node.advertise(topics.OUTCOME)
+        self._trail = node.advertise(topics.TRAIL)
+        self._markers = node.advertise(topics.MARKERS)
+        self._tf = node.advertise(topics.TF) if topics.TF else None
+        self._path: deque[Point] = deque(maxlen=TRAIL_POINTS)
+        self._view = markers.Seldom(settings.view_period_s)
+
+    def begin(self, goal: Point, stamp_ns: int) -> None:
+        """A run begins: where it leads to, and that it is under way."""
+        self._path.clear()
+        self._goal.publish(convert.pose_stamped_msg(goal, stamp_ns, self._frame))
+        self._outcome.publish(convert.outcome_msg(None, 0))
+
+    def end(self, outcome: Outcome, ticks: int) -> None:
+        """A run has ended."""
+        self._outcome.publish(convert.outcome_msg(outcome, ticks))
+
+    def tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
+        """One tick under one stamp; odom last, as it is what completes the sensor's pair."""
+        frame = self._frame
+        centers = world.scenario.centers(world.time_s)
+        odom = convert.odometry_msg(world.pose, velocity, stamp_ns, frame, self._base_frame)
+        self._clock.publish(convert.clock_msg(stamp_ns))
+        self._obstacles.publish(convert.obstacles_msg(centers, stamp_ns, frame))
+        if self._tf:
+            self._tf.publish(markers.tf_msg(odom))
+        if self._view.due(stamp_ns):
+            self._path.append(world.pose.position)
+            self._trail.publish(convert.path_msg(list(self._path), stamp_ns, frame))
+            self._markers.publish(markers.world_markers(world, stamp_ns, frame))
+        self._odom.publish(odom)
