@@ -7,9 +7,9 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from mfba_planner.core.errors import BagError, OutputError
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.writer import BagWriter
+from ..core.errors import BagError, OutputError
+from .reader import BagReader
+from .writer import BagWriter
 
 ATTACHMENT_NAME = "mfba_planner/configuration.json"
 MEDIA_TYPE = "application/json"

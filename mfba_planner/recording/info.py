@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 
-from mfba_planner.core.errors import BagError
-from mfba_planner.recording.metadata import BagTopic
-from mfba_planner.recording.reader import BagReader
+from ..core.errors import BagError
+from .metadata import BagTopic
+from .reader import BagReader
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

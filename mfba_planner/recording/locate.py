@@ -7,9 +7,9 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mfba_planner.core.errors import BagError
-from mfba_planner.recording import metadata
-from mfba_planner.recording.metadata import BagMetadata
+from ..core.errors import BagError
+from . import metadata
+from .metadata import BagMetadata
 
 
 @dataclass

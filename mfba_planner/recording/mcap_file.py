@@ -11,8 +11,8 @@ from typing import BinaryIO, NamedTuple
 from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Channel, Metadata, MetadataIndex, Schema
 
-from mfba_planner.recording import records
-from mfba_planner.recording.records import FRAME, Message, reading
+from . import records
+from .records import FRAME, Message, reading
 
 
 class Piece(NamedTuple):

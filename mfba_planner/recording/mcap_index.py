@@ -10,10 +10,10 @@ from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, ChunkIndex, Footer, Header, MetadataIndex, Statistics
 from mcap.writer import MCAP0_MAGIC
 
-from mfba_planner.core.errors import BagError
-from mfba_planner.recording.mcap_file import McapFile, Piece
-from mfba_planner.recording.mcap_walk import walk
-from mfba_planner.recording.records import FRAME, frames, parsed, reading
+from ..core.errors import BagError
+from .mcap_file import McapFile, Piece
+from .mcap_walk import walk
+from .records import FRAME, frames, parsed, reading
 
 _FOOTER_BYTES = FRAME.size + 20
 _TAIL_BYTES = _FOOTER_BYTES + len(MCAP0_MAGIC)

@@ -10,10 +10,10 @@ from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, Metadata, MetadataIndex
 from mcap.writer import MCAP0_MAGIC
 
-from mfba_planner.core.errors import BagError
-from mfba_planner.recording import records
-from mfba_planner.recording.mcap_file import McapFile, Piece
-from mfba_planner.recording.records import FRAME, Message, reading
+from ..core.errors import BagError
+from . import records
+from .mcap_file import McapFile, Piece
+from .records import FRAME, Message, reading
 
 _LOOSE_RUN_BYTES = 1 << 20  # messages outside chunks are handled in runs of about this size
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import yaml
 
-from mfba_planner.core.errors import BagError
-from mfba_planner.recording import qos as qos_words
-from mfba_planner.recording.qos import OfferedQos
+from ..core.errors import BagError
+from . import qos as qos_words
+from . import yaml_text
+from .qos import OfferedQos
 
 FILE_NAME = "metadata.yaml"
 RECORD_NAME = "rosbag2"
@@ -59,12 +60,12 @@ class BagMetadata:
 
 def dump_record(bag: BagMetadata) -> str:
     """YAML text of the `rosbag2` metadata record: metadata.yaml without its root key."""
-    return str(yaml.safe_dump(_content(bag), sort_keys=False)).strip()
+    return yaml_text.dump(_content(bag))
 
 
 def dump_file(bag: BagMetadata) -> str:
     """YAML text of metadata.yaml."""
-    return str(yaml.safe_dump({_ROOT: _content(bag)}, sort_keys=False))
+    return yaml_text.dump({_ROOT: _content(bag)}) + "\n"
 
 
 def _content(bag: BagMetadata) -> dict[str, Any]:
@@ -110,7 +111,7 @@ def _content(bag: BagMetadata) -> dict[str, Any]:
 def load_file(text: str, where: str) -> BagMetadata:
     """Parse metadata.yaml of versions 1 to 9; `where` names it in errors. Raises BagError."""
     try:
-        content = yaml.safe_load(text)[_ROOT]
+        content = yaml_text.load(text)[_ROOT]
         version = int(content["version"])
     except (yaml.YAMLError, TypeError, KeyError, ValueError) as error:
         raise _broken(where, error) from error
@@ -146,6 +147,8 @@ def _parse(content: Mapping[str, Any], where: str) -> BagMetadata:
             f"{where}: compressed by {mode}, only MCAP's own chunk compression can be read; "
             "convert the bag with `ros2 bag convert`"
         )
+    if not content["relative_file_paths"]:
+        raise BagError(f"{where}: names no storage file; give the .mcap file itself")
     # Before version 5 there are no per-file facts, so the whole bag's count stands for them.
     per_file = content.get("files") or [
         {"path": path, "message_count": content["message_count"] if i == 0 else 0}

@@ -9,7 +9,8 @@ from typing import Any
 
 import yaml
 
-from mfba_planner.core.errors import BagError
+from ..core.errors import BagError
+from . import yaml_text
 
 INFINITE_NS = 2**63 - 1
 _NS_PER_S = 1_000_000_000
@@ -63,13 +64,13 @@ def to_list(profiles: Iterable[OfferedQos]) -> list[dict[str, Any]]:
 
 def to_text(profiles: Iterable[OfferedQos]) -> str:
     """The same list as YAML text, as an MCAP channel's metadata carries it."""
-    return str(yaml.safe_dump(to_list(profiles), sort_keys=False)).strip()
+    return yaml_text.dump(to_list(profiles))
 
 
 def from_list(value: object) -> tuple[OfferedQos, ...]:
     """Profiles of a YAML list, or of its text; words or rmw's numbers. Raises BagError."""
     try:
-        items: Any = yaml.safe_load(value) if isinstance(value, str) else value
+        items: Any = yaml_text.load(value) if isinstance(value, str) else value
         return tuple(_from_item(item) for item in items or ())
     except (yaml.YAMLError, TypeError, KeyError, ValueError, IndexError) as error:
         shown = " ".join(str(value).split())[:60]

@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 from mcap.records import Attachment, AttachmentIndex, Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from mfba_planner.core.errors import BagError
-from mfba_planner.recording import metadata, qos
-from mfba_planner.recording.locate import locate
-from mfba_planner.recording.mcap_file import McapFile, Piece
-from mfba_planner.recording.mcap_index import open_file
-from mfba_planner.recording.merge import RawMessage, Source, in_time_order
-from mfba_planner.recording.metadata import BagTopic
-from mfba_planner.recording.schemas import Definition
+from ..core.errors import BagError
+from . import metadata, qos
+from .locate import locate
+from .mcap_file import McapFile, Piece
+from .mcap_index import open_file
+from .merge import RawMessage, Source, in_time_order
+from .metadata import BagTopic
+from .schemas import Definition
 
 
 class DecodedMessage(NamedTuple):

@@ -18,7 +18,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Chunk
 from mcap.stream_reader import get_chunk_data_stream
 
-from mfba_planner.core.errors import BagError
+from ..core.errors import BagError
 
 FRAME = struct.Struct("<BQ")  # opcode, length of the body
 _MESSAGE = struct.Struct("<HIQQ")  # channel id, sequence, log time, publish time

@@ -6,10 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from mfba_planner.core.errors import BagError
-from mfba_planner.recording import metadata
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.writer import BagWriter
+from ..core.errors import BagError
+from . import metadata
+from .reader import BagReader
+from .writer import BagWriter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

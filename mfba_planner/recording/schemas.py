@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from mfba_planner.core.errors import InputError
+from ..core.errors import InputError
 
 _SEPARATOR = "\n" + "=" * 80 + "\n"
-_FIELD_TYPE = re.compile(r"\s*(?:([A-Za-z]\w*)/(?:msg/)?)?([A-Za-z]\w*)")
+_FIELD_TYPE = re.compile(r"\s*(?:([A-Za-z]\w*)/)?([A-Za-z]\w*)")
 _PRIMITIVES = frozenset(
     ("bool", "byte", "char", "float32", "float64", "int8", "uint8", "int16", "uint16")
     + ("int32", "uint32", "int64", "uint64", "string", "wstring")

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from mfba_planner.core.errors import OutputError
+from ..core.errors import OutputError
 
 
 class WholeWrites:

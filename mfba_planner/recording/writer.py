@@ -13,11 +13,11 @@ from pathlib import Path
 from mcap.well_known import MessageEncoding, Profile
 from mcap.writer import CompressionType, Writer
 
-from mfba_planner.core.errors import OutputError
-from mfba_planner.recording import metadata, qos, storage
-from mfba_planner.recording.metadata import BagFile, BagMetadata, BagTopic
-from mfba_planner.recording.qos import OfferedQos
-from mfba_planner.recording.schemas import Definition, definition_of
+from ..core.errors import OutputError
+from . import metadata, qos, storage
+from .metadata import BagFile, BagMetadata, BagTopic
+from .qos import OfferedQos
+from .schemas import Definition, definition_of
 
 CHUNK_BYTES = 512 * 1024
 MAX_CHUNK_AGE_S = 0.8  # leaves 0.2 s of the promised 1 s to a late timer
@@ -60,7 +60,7 @@ class BagWriter:
         self._stored_count = 0
         self._last_call_ns: int | None = None
         self._empty_since_ns = 0  # of the steady clock: nothing was pending then
-        self._open = True
+        self._ended = ""  # once it has: why nothing more can be written
         self._made = storage.make_directory(self.directory)
         try:
             self._stream = storage.WholeWrites(self.path)
@@ -175,7 +175,7 @@ class BagWriter:
                 count & 0xFFFFFFFF if sequence is None else sequence,
             )
         except BaseException:
-            self._abandon()
+            self._end()
             raise
         self._counts[topic] = count + 1
         self._pending_count += 1
@@ -227,7 +227,7 @@ class BagWriter:
 
     def close(self) -> None:
         """Finish the file and write metadata.yaml; does nothing after the end or a failure."""
-        if not self._open:
+        if self._ended:
             return
         self.flush()
         with self._guarded():
@@ -236,11 +236,11 @@ class BagWriter:
             self._stream.close()
             text = metadata.dump_file(self._content())
             storage.write_whole(self.directory / metadata.FILE_NAME, text)
-        self._open = False
+        self._end()
 
     def discard(self) -> None:
         """Close without finishing and remove what was written."""
-        self._abandon()
+        self._end()
         for path in (self.path, self.directory / metadata.FILE_NAME):
             with suppress(OSError):
                 path.unlink()
@@ -270,23 +270,27 @@ class BagWriter:
         self._refuse_after_end()
         try:
             yield
-        except BaseException as error:
-            self._abandon()
-            if not isinstance(error, OSError):
-                raise
+        except OSError as error:
             what = "disk full" if error.errno in _FULL else "cannot be written"
-            raise OutputError(
+            self._end(
                 f"{self.directory}: {what} after {self._stored_count} messages "
                 f"({error.strerror}); make room and run `mfba recover {self.directory}`"
-            ) from error
+            )
+            raise OutputError(self._ended) from error
+        except BaseException:
+            self._end()
+            raise
 
     def _refuse_after_end(self) -> None:
-        if not self._open:
-            raise OutputError(
-                f"{self.directory}: the recording has ended; record into a new directory"
-            )
+        if self._ended:
+            raise OutputError(self._ended)
 
-    def _abandon(self) -> None:
-        self._open = False
+    def _end(self, reason: str = "") -> None:
+        """Close the file; whoever writes on gets the first reason again."""
+        self._ended = (
+            self._ended
+            or reason
+            or (f"{self.directory}: the recording has ended; record into a new directory")
+        )
         with suppress(OSError):
             self._stream.close()

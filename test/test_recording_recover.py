@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: Apache-2.0
+import random
+import shutil
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from mcap.writer import IndexType
+from recording_bags import (
+    FOREIGN,
+    SENSOR,
+    START_NS,
+    count_with_all,
+    count_with_rosbags,
+    fill,
+    foreign_mcap,
+    write_bag,
+)
+
+from mfba_planner.core.errors import BagError, OutputError
+from mfba_planner.recording.mcap_index import open_file
+from mfba_planner.recording.merge import RawMessage
+from mfba_planner.recording.metadata import BagFile, BagMetadata, dump_file
+from mfba_planner.recording.qos import OfferedQos
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.recover import recover
+from mfba_planner.recording.schemas import definition_of
+from mfba_planner.recording.writer import BagWriter
+
+
+def content(path: Path) -> list[RawMessage]:
+    with BagReader(path) as reader:
+        return list(reader.messages(in_file_order=True))
+
+
+def test_truncation_anywhere(tmp_path: Path) -> None:
+    """Every message of every whole chunk, in a bag four readers open; an error without one."""
+    source = write_bag(tmp_path / "run1", 60, chunk_bytes=9000, beams=40)
+    data, written = source.read_bytes(), content(source)
+    file = open_file(source)
+    ends = [piece.offset + piece.length for piece in file.pieces]
+    sizes = [len(file.messages(piece)) for piece in file.pieces]
+    file.stream.close()
+    assert len(ends) > 5
+
+    generator = random.Random(20240501)
+    cuts = sorted(generator.sample(range(8, len(data)), 190))
+    # ... and the places where it matters: around each chunk's end, and at the very end.
+    cuts += [end + step for end in ends[:4] for step in (-1, 0, 1)]
+    cuts += [len(data) - 1, len(data) - 8, len(data) - 40]
+    cut, out = tmp_path / "cut.mcap", tmp_path / "out"
+    failures = 0
+    opened: set[bytes] = set()
+    for size in cuts:
+        cut.write_bytes(data[:size])
+        whole = sum(count for count, end in zip(sizes, ends) if end <= size)
+        if not whole:
+            failures += 1
+            with pytest.raises(BagError) as caught:
+                recover(cut, out)
+            assert "\n" not in str(caught.value)
+            assert not out.exists()
+        else:
+            report = recover(cut, out)
+            assert report.messages == whole
+            assert report.problems
+            recovered = (out / "out_0.mcap").read_bytes()
+            if recovered not in opened:  # the readers need not see the same bytes twice
+                opened.add(recovered)
+                assert content(out) == written[:whole]
+                expected = Counter(message.topic for message in written[:whole])
+                assert count_with_all(out) == expected
+            shutil.rmtree(out)
+        assert cut.read_bytes() == data[:size]
+    assert 0 < failures < len(cuts) / 2
+    assert len(opened) == len(ends)
+
+
+def test_a_directory_without_metadata(tmp_path: Path) -> None:
+    source = write_bag(tmp_path / "run1", 30)
+    (source.parent / "metadata.yaml").unlink()
+    source.write_bytes(source.read_bytes()[:-2000])
+    report = recover(tmp_path / "run1", tmp_path / "out")
+    assert report.messages == 61
+    assert report.problems[0] == "metadata.yaml is missing: the recording was not closed"
+    assert report.output == tmp_path / "out"
+    assert count_with_all(tmp_path / "out").total() == 61
+    assert sorted(p.name for p in source.parent.iterdir()) == ["run1_0.mcap"]
+
+
+def test_everything_else_comes_over_too(tmp_path: Path) -> None:
+    source = write_bag(tmp_path / "run1", 30)
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(source.read_bytes()[:-500])
+    report = recover(cut, tmp_path / "out")
+    assert report.attachments == 1
+    with BagReader(source) as before, BagReader(tmp_path / "out") as after:
+        assert after.complete
+        assert after.topics == before.topics
+        assert after.definitions == before.definitions
+        assert list(after.iter_attachments()) == list(before.iter_attachments())
+        records = [record for record in after.metadata_records() if record[0] != "rosbag2"]
+        assert records == [("lab", {"robot": "turtle"})]
+        assert list(after.messages()) == list(before.messages())
+        assert after.ros_distro == before.ros_distro
+
+
+def test_a_good_bag_comes_over_as_it_is(tmp_path: Path) -> None:
+    report = recover(FOREIGN, tmp_path / "out")
+    assert (report.messages, report.bytes_lost, report.problems) == (281, 0, ())
+    assert content(tmp_path / "out") == content(FOREIGN)
+    assert count_with_all(tmp_path / "out").total() == 281
+    with BagReader(FOREIGN) as before, BagReader(tmp_path / "out") as after:
+        assert after.topics == before.topics
+    # An empty one too: nothing is missing from it.
+    with BagWriter(tmp_path / "quiet") as writer:
+        writer.add_topic("/scan", "sensor_msgs/msg/LaserScan", SENSOR)
+    assert recover(tmp_path / "quiet", tmp_path / "quiet_too").messages == 0
+    with BagReader(tmp_path / "quiet_too") as reader:
+        assert reader.topics["/scan"].qos == (SENSOR,)
+
+
+def test_messages_outside_chunks(tmp_path: Path) -> None:
+    times = tuple(range(100))
+    data = foreign_mcap(
+        tmp_path / "a.mcap", times_ns=times, use_chunking=False, index_types=IndexType.NONE
+    ).read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: data.index(b"at 77")])
+    report = recover(tmp_path / "cut.mcap", tmp_path / "out")
+    assert report.messages == 77
+    assert report.bytes_lost == 9 + 22 + 8  # the frame, header and CDR start of number 77
+    assert count_with_all(tmp_path / "out") == {"/chatter": 77}
+
+
+def damage_chunk(path: Path, number: int) -> None:
+    """Make one chunk unreadable."""
+    file = open_file(path)
+    piece = file.pieces[number]
+    file.stream.close()
+    data = bytearray(path.read_bytes())
+    data[piece.offset + piece.length // 2] ^= 0xFF
+    path.write_bytes(data)
+
+
+def test_a_damaged_chunk_in_the_middle_is_left_out(tmp_path: Path) -> None:
+    source = write_bag(tmp_path / "run1", 60)
+    before = content(source)
+    damage_chunk(source, 2)
+    report = recover(tmp_path / "run1", tmp_path / "out")
+    (lost, counts) = report.problems
+    assert lost.startswith("run1_0.mcap: lost ")
+    assert counts.startswith("metadata.yaml counts 121 messages")
+    assert 0 < report.bytes_lost < source.stat().st_size / 2
+    after = content(tmp_path / "out")
+    assert 0 < len(after) < len(before)
+    assert [m for m in before if m in after] == after
+    assert count_with_all(tmp_path / "out").total() == report.messages
+
+
+def test_messages_whose_description_is_lost_are_counted(tmp_path: Path) -> None:
+    """The first chunk describes the channels; cut the end off and they stand nowhere else."""
+    source = write_bag(tmp_path / "run1", 60)
+    damage_chunk(source, 0)
+    source.write_bytes(source.read_bytes()[:-8])
+    with pytest.raises(BagError, match="not one whole chunk"):
+        # The summary, without its last bytes, still describes them - but not without its start.
+        recover(truncate_before_summary(source), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    report = recover(source, tmp_path / "out")
+    assert report.messages > 50
+
+
+def truncate_before_summary(path: Path) -> Path:
+    cut = path.with_name("cut.mcap")
+    data = path.read_bytes()
+    # DataEnd: opcode 15, length 4, no CRC.
+    cut.write_bytes(data[: data.rindex(b"\x0f\x04" + bytes(11))])
+    return cut
+
+
+def test_zeros_after_a_power_cut(tmp_path: Path) -> None:
+    source = write_bag(tmp_path / "run1", 30, chunk_bytes=9000)
+    file = open_file(source)
+    first = file.pieces[0]
+    file.stream.close()
+    end = first.offset + first.length
+    source.write_bytes(source.read_bytes()[:end] + bytes(5000))
+    report = recover(source, tmp_path / "out")
+    assert (report.chunks, report.bytes_lost) == (1, 5000)
+    assert count_with_all(tmp_path / "out").total() == report.messages > 0
+
+
+def test_several_files_become_one(tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    for number in (0, 1, 2, 10):
+        foreign_mcap(bag / f"bag_{number}.mcap", times_ns=(number * 10, number * 10 + 1))
+    last = bag / "bag_10.mcap"
+    last.write_bytes(last.read_bytes()[:-20])
+    # metadata.yaml that cannot be used does not stand in the way.
+    listed = BagMetadata(topics=(), files=(BagFile(path="gone.mcap"),), ros_distro="kilted")
+    (bag / "metadata.yaml").write_text(dump_file(listed))
+    report = recover(bag, tmp_path / "out")
+    assert report.messages == 8
+    assert report.problems[0].endswith("names gone.mcap, which is not there")
+    assert report.problems[1] == "bag_10.mcap: the end of the file is missing"
+    times = [message.log_time_ns for message in content(tmp_path / "out")]
+    assert times == [0, 1, 10, 11, 20, 21, 100, 101]  # 10 after 2
+
+
+def test_a_bag_that_uses_types_not_installed_here(tmp_path: Path) -> None:
+    # Of a type with one string, data; rosbags computes it from the schema and compares.
+    type_hash = "RIHS01_134dbc5b563ba6a8f3539b907dd992d0eeee76157fb90e4dfc28b104a458bf62"
+    path = foreign_mcap(
+        tmp_path / "a.mcap",
+        schema=("their_msgs/msg/Word", "ros2msg", b"string data"),
+        channel_metadata={"topic_type_hash": type_hash},
+    )
+    recover(path, tmp_path / "out")
+    assert count_with_all(tmp_path / "out") == {"/chatter": 3}
+    with BagReader(tmp_path / "out") as reader:
+        assert reader.topics["/chatter"].type_hash == type_hash
+        assert reader.topics["/chatter"].type_name == "their_msgs/msg/Word"
+        assert reader.ros_distro == "unknown"
+
+
+def test_existing_output_is_refused_and_the_source_stays(tmp_path: Path) -> None:
+    source = write_bag(tmp_path / "run1", 5)
+    before = source.read_bytes()
+    for out in (tmp_path / "run1", tmp_path):
+        with pytest.raises(OutputError, match="exists already and is never overwritten"):
+            recover(source, out)
+    assert source.read_bytes() == before
+    assert sorted(p.name for p in source.parent.iterdir()) == ["metadata.yaml", "run1_0.mcap"]
+
+
+def test_nothing_to_recover(tmp_path: Path) -> None:
+    writer = BagWriter(tmp_path / "run1")
+    writer.add_topic("/odom", "nav_msgs/msg/Odometry", OfferedQos())
+    text = definition_of("nav_msgs/msg/Odometry").text  # only in memory so far
+    assert text.encode() not in writer.path.read_bytes()
+    with pytest.raises(BagError, match=r"run1: not one whole chunk in \d+ bytes, .*record again"):
+        recover(tmp_path / "run1", tmp_path / "out")
+    fill(writer, 3)
+    writer.close()
+    with pytest.raises(BagError, match="does not exist"):
+        recover(tmp_path / "none", tmp_path / "out")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(BagError, match="not a bag"):
+        recover(tmp_path / "folder", tmp_path / "out")
+    (tmp_path / "text.mcap").write_text("a shopping list")
+    with pytest.raises(BagError, match="not an MCAP file"):
+        recover(tmp_path / "text.mcap", tmp_path / "out")
+    broken = tmp_path / "folder" / "metadata.yaml"
+    broken.write_text("{")
+    with pytest.raises(BagError, match="not a readable metadata"):
+        recover(tmp_path / "folder", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_recovering_twice_changes_nothing_more(tmp_path: Path) -> None:
+    source = write_bag(tmp_path / "run1", 30)
+    source.write_bytes(source.read_bytes()[:-700])
+    recover(source, tmp_path / "once")
+    recover(tmp_path / "once", tmp_path / "twice")
+    once, twice = tmp_path / "once" / "once_0.mcap", tmp_path / "twice" / "twice_0.mcap"
+    assert content(once) == content(twice)
+    assert once.stat().st_size == twice.stat().st_size - 4 * len("e")  # names in the records
+    assert content(once)[0].log_time_ns == START_NS
+    assert count_with_rosbags(tmp_path / "twice").total() == 61
