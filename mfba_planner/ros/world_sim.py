@@ -44,8 +44,7 @@ class WorldSim(GraphNode):
         self.create_service(Trigger, "~/step", self._on_step)
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.offer_ready(names(s.wait_for))
-        period_s = s.tick_ns * NANO / s.speed_factor
-        on_timer = self._on_timer
+        period_s, on_timer = s.tick_ns * NANO / s.speed_factor, self._on_timer
         if s.lockstep:
             period_s, on_timer = min(s.answer_timeout_s / 4, 0.25), self._watch
         self.create_timer(period_s, on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -125,8 +124,7 @@ class WorldSim(GraphNode):
             self._pace.paused = True
         else:
             self.resume()
-        response.success = True
-        response.message = "paused" if self._pace.paused else "running"
+        response.success, response.message = True, "paused" if request.data else "running"
         return response
 
     def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
