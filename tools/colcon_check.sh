@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 tree=$PWD
-venv=$tree/$1
+venv=$(cd "$1" && pwd)
 programs="launcher mfba planner recorder replay virtual_sensor world_sim"
 
 fail() {
@@ -31,13 +31,15 @@ check() { # MODE
         set +u
         source "$prefix/../setup.bash"
         set -u
-        PREFIX=$prefix "$venv/bin/python" - <<'PYTHON'
+        PREFIX=$prefix BASE=$tree/build/colcon/$1 "$venv/bin/python" - <<'PYTHON'
 import os
 
 from ament_index_python import get_package_prefix, get_package_share_directory
 
+import mfba_planner
 from mfba_planner.resources import scenario_names
 
+assert mfba_planner.__file__.startswith(os.environ["BASE"]), mfba_planner.__file__
 assert get_package_prefix("mfba_planner") == os.environ["PREFIX"]
 share = get_package_share_directory("mfba_planner")
 assert os.path.isfile(f"{share}/package.xml"), share
@@ -55,9 +57,10 @@ build symlink --symlink-install
 check symlink
 
 # All tests are `make test`'s business; here it is colcon's finding and counting them.
-"$venv/bin/colcon" --log-base build/colcon/copy/log test --paths . --return-code-on-test-failure \
+"$venv/bin/colcon" --log-base build/colcon/copy/log test --paths . \
     --build-base build/colcon/copy/build --install-base build/colcon/copy/install \
     --pytest-args test/test_package.py
-summary=$("$venv/bin/colcon" test-result --test-result-base build/colcon/copy/build | tail -n 1)
-echo "colcon_check: $summary"
-[[ $summary =~ ^Summary:\ [1-9] ]] || fail "colcon test ran no test"
+results=$("$venv/bin/colcon" test-result --verbose --test-result-base build/colcon/copy/build) ||
+    fail "$results"
+echo "colcon_check: colcon test: $results"
+[[ $results =~ Summary:\ [1-9] ]] || fail "colcon test ran no test"
