@@ -36,6 +36,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "core": ({"core"}, {"numpy"}),
     "resources": ({"core"}, set()),
     "outputs": ({"core"}, set()),
+    "arguments": ({"core"}, set()),
     "entry": ({"core"}, set()),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
     "messages": ({"core"}, {"numpy"}),
@@ -278,7 +279,7 @@ def test_make_refuses_a_bad_interpreter_in_one_line(tmp_path: Path) -> None:
     said = [line for line in done.stderr.splitlines() if not line.startswith("make")]
     assert said == [
         f"no usable Python: {shim} does not run; /bin/false does not run; "
-        f"{tmp_path}/nowhere not found; "
+        f"{tmp_path}/nowhere is not there; "
         "install Python 3.10 to 3.13 or name it: make PYTHON=/path/to/python3"
     ]
     assert not venv.exists()

@@ -15,13 +15,15 @@ except ImportError:
 print(sys.executable)
 '
 for candidate in "$@"; do
-    if answer=$("$candidate" -c "$check" 2>&1); then
-        echo "${answer:-$(command -v "$candidate")}" # without PATH Python does not know itself
+    if ! command -v "$candidate" >/dev/null; then
+        reason="is not there"
+    elif reason=$("$candidate" -c "$check" 2>&1); then
+        echo "${reason:-$(command -v "$candidate")}" # without PATH Python does not know itself
         exit 0
-    elif [ "$(printf '%s' "$answer" | wc -l)" -gt 0 ] || [ -z "$answer" ]; then
-        answer="does not run" # nothing, or a shim's or traceback's many lines
+    elif [ -z "$reason" ] || [ "$(printf %s "$reason" | wc -l)" -gt 0 ]; then
+        reason="does not run" # a shim's advice, or a traceback
     fi
-    said="$said$candidate ${answer##*: }; "
+    said="$said$candidate $reason; "
 done
 echo "no usable Python: ${said}install Python 3.10 to 3.13 or name it: make PYTHON=/path/to/python3" >&2
 exit 1
