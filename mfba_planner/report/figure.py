@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run as a picture in the manner of Fig. 7, with legend and result."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from mfba_planner.core.episode import Episode
+from mfba_planner.core.metrics import Result, evaluate
+
+from . import legend, style, words
+from .files import write_new
+from .moments import Pass, closest_passes
+from .page import Page
+from .scene import draw_scene, label_numbers
+from .view import choose_view
+
+
+def draw_run(episode: Episode, path: Path) -> None:
+    """Write the picture of a run as PNG; the same episode gives the same bytes.
+
+    Raises OutputError when path exists already or cannot be written.
+    """
+    write_new(path, png_bytes(episode))
+
+
+def png_bytes(episode: Episode) -> bytes:
+    """The picture of a run as PNG, without date or version inside."""
+    buffer = io.BytesIO()
+    with style.context():
+        run_figure(episode).savefig(buffer, format="png", metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def run_figure(episode: Episode) -> Figure:
+    """Compose head, world, panel and strip; to be called and saved within style.context()."""
+    result, passes = evaluate(episode), closest_passes(episode)
+    view, scale = choose_view(episode, passes)
+    page = Page(view, scale)
+    draw_scene(page.ax, episode, view, passes, result.encounters)
+    label_numbers(page.ax, episode, view, passes)
+    page.head(episode.scenario.name, episode.scenario.description or f"{episode.driver} driver")
+    page.legend(legend.entries(page.ax))
+    page.rows("Closest pass, edge to edge", _pass_rows(passes, result))
+    hidden = [str(p.number) for p in passes if not view.holds(p.center_m)]
+    page.note(f"outside the picture: {', '.join(hidden)}" if hidden else "")
+    page.strip(_cells(episode, result))
+    return page.figure
+
+
+def _pass_rows(passes: Sequence[Pass], result: Result) -> list[tuple[str, str, str]]:
+    met = sorted((p for p in passes if p.number in result.encounters), key=lambda p: p.gap_m)
+    return [
+        (
+            f"obstacle {p.number}",
+            words.number(p.gap_m, 2, "m"),
+            f"at {words.number(p.time_s, 1, 's')}",
+        )
+        for p in met
+    ]
+
+
+def _cells(episode: Episode, result: Result) -> list[tuple[str, str, str]]:
+    """(label, value, colour) of the result strip."""
+    touched = style.BAD if result.collisions else style.INK
+    return [
+        ("outcome", words.outcome(result), style.GOOD if result.success else style.BAD),
+        ("length", words.length(result), style.INK),
+        ("time", words.time(result), style.INK),
+        ("min clearance", words.clearance(result), touched),
+        ("collisions", str(result.collisions), touched),
+        ("mode switches", str(result.mode_switches), style.INK),
+        ("algorithm", episode.planner.bat.algorithm.value, style.INK),
+        ("seed", words.one_line(str(episode.seed), 12), style.INK),
+    ]

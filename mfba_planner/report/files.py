@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Output files: whole or not at all, and never over an existing one."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from pathlib import Path
+
+from mfba_planner.core.errors import OutputError
+
+
+def write_new(path: Path, data: bytes) -> None:
+    """Write a file that must not exist yet, through a temporary one beside it.
+
+    Raises OutputError when path exists or cannot be written; nothing is left behind then.
+    """
+    if os.path.lexists(path):
+        raise _exists(path)
+    temporary = path.with_name(f".mfba-{secrets.token_hex(4)}.tmp")
+    try:
+        try:
+            with open(temporary, "xb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            _publish(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except FileExistsError:
+        raise _exists(path) from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise OutputError(
+            f"{path}: cannot be written ({reason}); give a path in a writable directory"
+        ) from None
+
+
+def _publish(temporary: Path, path: Path) -> None:
+    """Give a finished file its name; a link, unlike a rename, refuses an existing one."""
+    try:
+        os.link(temporary, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without hard links
+        if os.path.lexists(path):
+            raise FileExistsError from None
+        os.rename(temporary, path)
+
+
+def _exists(path: Path) -> OutputError:
+    return OutputError(f"{path}: already exists and is not overwritten; give another path")

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the marks in a scene mean; only what is drawn is explained."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from mfba_planner.core.planner import Mode
+
+from . import style, words
+from .scene import kinds
+
+Entry = tuple[Line2D | Patch, str]
+
+
+def entries(ax: Axes) -> list[Entry]:
+    """(handle, label) for each kind of mark that the axes hold."""
+    drawn = kinds(ax.get_children())
+    return [entry for kind, entry in _all().items() if kind in drawn]
+
+
+def _all() -> dict[str, Entry]:
+    return {
+        "start": (Line2D([], [], **style.START), "start"),
+        "goal": (Line2D([], [], **style.GOAL), "goal"),
+        "end": (Line2D([], [], **style.END), "end of the run"),
+        **{f"path:{mode.value}": (_path(mode), words.MODES[mode]) for mode in _MODES},
+        "obstacle": (_disc(style.OBSTACLE), "obstacle, at closest pass"),
+        "enlarged": (Line2D([], [], **_edge(style.ENLARGED)), "enlarged by the robot's radius"),
+        "pass": (Line2D([], [], **style.PASS), "clearance at closest pass"),
+        "track": (_track(), "obstacle's track"),
+        "part": (_track(), "obstacle's track near closest pass"),
+        "ring": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR at the switch"),
+        "sector": (Patch(**style.SECTOR), "sectors set at the switch"),
+        "sensed": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle at the switch"),
+        "wall": (Line2D([], [], **_edge(style.WALL)), "wall"),
+    }
+
+
+_MODES = (
+    Mode.PATH_GENERATION,
+    Mode.OBSTACLE_AVOIDANCE,
+    Mode.BLOCKED,
+    Mode.STOPPED,
+    Mode.IDLE,
+)
+
+
+def _path(mode: Mode) -> Line2D:
+    looks: style.Looks = {"color": style.MODE_COLOURS[mode]}
+    if mode in style.STANDING:
+        looks |= {**style.STANDING[mode], "linestyle": "none", "markersize": 9.0}
+    return Line2D([], [], linewidth=style.MODE_WIDTHS.get(mode, style.MODE_WIDTH), **looks)
+
+
+def _track() -> Line2D:
+    return Line2D([], [], marker=">", markersize=5.0, markeredgewidth=0.0, **style.TRACK)
+
+
+def _disc(looks: style.Looks) -> Line2D:
+    return Line2D(
+        [],
+        [],
+        linestyle="none",
+        marker="o",
+        markersize=10.0,
+        markerfacecolor=looks["facecolor"],
+        markeredgecolor=looks["edgecolor"],
+        markeredgewidth=looks["linewidth"],
+    )
+
+
+def _edge(looks: style.Looks) -> style.Looks:
+    return {("color" if key == "edgecolor" else key): value for key, value in looks.items()}

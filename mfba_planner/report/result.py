@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run's result as JSON: what was run, with what, and what came of it."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict
+from enum import Enum
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from mfba_planner import __version__
+from mfba_planner.core.episode import Episode, Outcome
+from mfba_planner.core.errors import InputError
+from mfba_planner.core.metrics import Result, evaluate
+from mfba_planner.core.options import flatten
+
+from .files import write_new
+
+SCHEMA_VERSION = 1
+_KINDS = {
+    "schema_version": int,
+    "scenario": str,
+    "seed": int,
+    "driver": str,
+    "algorithm": str,
+    "parameters": dict,
+    "versions": dict,
+    "result": dict,
+    "extra": dict,
+}
+
+
+def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str, Any]:
+    """Everything a result file holds, in plain JSON values.
+
+    parameters has the flattened options of planner and sensor; extra holds what the caller
+    knows beyond the episode (wall time, file names). JSON has no infinity: null stands for a
+    number that is not finite, which means for fitness that the robot never moved, for
+    min_clearance_m that there are no obstacles.
+    """
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "scenario": episode.scenario.name,
+        "seed": episode.seed,
+        "driver": episode.driver,
+        "algorithm": episode.planner.bat.algorithm.value,
+        "parameters": {
+            "planner": _plain(flatten(episode.planner)),
+            "sensor": _plain(flatten(episode.sensor)),
+        },
+        "versions": {
+            "mfba_planner": __version__,
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+        },
+        "result": _plain(asdict(evaluate(episode))),
+        "extra": _plain(extra),
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Turn a value into what JSON can hold, numbers that are not finite into None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, Enum):
+        return _plain(value.value)
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def write_result(path: Path, data: Mapping[str, Any]) -> None:
+    """Write a result file; OutputError when it exists already or cannot be written."""
+    text = json.dumps(data, indent=2, allow_nan=False)
+    write_new(path, f"{text}\n".encode())
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """Read a result file back; InputError for anything that is not one."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise _refused(path, "not a text file") from None
+    except OSError as error:
+        raise _refused(path, (error.strerror or str(error)).lower()) from None
+    try:
+        data = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        raise _refused(path, "not JSON, or cut short") from None
+    fault = _fault(data)
+    if fault:
+        raise _refused(path, fault)
+    return data
+
+
+def _no_constant(token: str) -> None:
+    raise ValueError(token)
+
+
+def _refused(path: Path, reason: str) -> InputError:
+    return InputError(f"{path}: {reason}; give a result .json that a run has written")
+
+
+def _fault(data: Any) -> str:
+    """What keeps data from being a result, "" for nothing."""
+    if not isinstance(data, dict):
+        return f"of type {type(data).__name__}, not a mapping"
+    version = data.get("schema_version")
+    if version != SCHEMA_VERSION:
+        return f"schema_version={version!r} is unknown (this is version {SCHEMA_VERSION})"
+    for key, kind in _KINDS.items():
+        if key not in data:
+            return f"{key} is missing"
+        if type(data[key]) is not kind:
+            return f"{key} is of type {type(data[key]).__name__}, not {kind.__name__}"
+    return _result_fault(data["result"])
+
+
+def _result_fault(result: Mapping[str, Any]) -> str:
+    for key, kind in get_type_hints(Result).items():
+        if key not in result:
+            return f"result.{key} is missing"
+        if not _fits(result[key], kind):
+            return f"result.{key}={result[key]!r} makes no sense"
+    return ""
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    """Tell whether a JSON value can stand for a field of Result; a float may be null."""
+    if kind is Outcome:
+        return value in [outcome.value for outcome in Outcome]
+    if kind is float:
+        return value is None or type(value) in (int, float)
+    if kind in (bool, int):
+        return type(value) is kind
+    return isinstance(value, list) and all(type(item) is int for item in value)

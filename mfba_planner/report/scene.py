@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The world of a run drawn to scale: path, obstacles and tracks, sensing rings, walls.
+
+Every artist carries a gid that says what it is: `path:blocked`, `track:3`, `ring:0`, `goal`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from itertools import groupby
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, FancyArrowPatch, Rectangle, Wedge
+from matplotlib.patheffects import withStroke
+
+from mfba_planner.core.episode import Episode, Outcome
+from mfba_planner.core.geometry import Point, bearing, distance, towards
+from mfba_planner.core.planner import Decision, Mode
+from mfba_planner.core.sensing import Bits
+from mfba_planner.core.world import Obstacle, center_at
+
+from . import style
+from .moments import Pass, encounter_ticks, is_finite, span_s, stretches, track
+from .view import View
+
+Z_SECTOR, Z_TRACK, Z_OBSTACLE, Z_RING, Z_PATH, Z_MARK = (2.0 + 0.1 * i for i in range(6))
+_LONG = 0.75  # widths + heights of the view; longer tracks would cover it with lines
+_ARROW_M = 1e-3  # of track before an arrow's tip: enough to have a direction
+_ARROW_TRIES = 400  # from the end of the track back to where an arrow can be seen
+
+
+def draw_scene(
+    ax: Axes, episode: Episode, view: View, passes: Sequence[Pass], met: Collection[int]
+) -> None:
+    """Draw a run into axes; met holds the numbers of the obstacles that came within SR."""
+    _walls(ax, episode)
+    for moment in passes:
+        obstacle = episode.scenario.obstacles[moment.number - 1]
+        _track(ax, episode, view, obstacle, moment)
+        _obstacle(ax, episode, obstacle, moment)
+        if moment.number in met:
+            _connect(ax, moment)
+    for index, tick in enumerate(encounter_ticks(episode)):
+        if is_finite(tick.pose.position):
+            _ring(ax, episode, index, tick)
+    _path(ax, episode)
+    _ends(ax, episode)
+
+
+def _patch(ax: Axes, patch: Circle | Wedge | Rectangle | FancyArrowPatch, gid: str) -> None:
+    patch.set_gid(gid)
+    ax.add_patch(patch)
+
+
+def _line(ax: Axes, points: Sequence[Point], gid: str, **looks: object) -> None:
+    xs, ys = zip(*points)
+    line = Line2D(xs, ys, **looks)  # type: ignore[arg-type]
+    line.set_gid(gid)
+    ax.add_line(line)
+
+
+def _walls(ax: Axes, episode: Episode) -> None:
+    walls = episode.scenario.walls
+    if walls:
+        (left, bottom), (right, top) = walls.lower_m, walls.upper_m
+        room = Rectangle((left, bottom), right - left, top - bottom, fill=False, **style.WALL)
+        _patch(ax, room, "wall")
+
+
+def _track(ax: Axes, episode: Episode, view: View, obstacle: Obstacle, moment: Pass) -> None:
+    """The obstacle's way over the run; between walls of a long run, its part around a pass."""
+    walls = episode.scenario.walls
+    t0, t1 = span_s(episode)
+    kind, longest = "track", _LONG * (view.width + view.height)
+    if walls and obstacle.speed_mps * (t1 - t0) > longest:
+        reach = 0.5 * longest / obstacle.speed_mps
+        t0, t1 = max(t0, moment.time_s - reach), min(t1, moment.time_s + reach)
+        kind = "part"
+    if obstacle.speed_mps * (t1 - t0) <= 0.0:
+        return
+    points = track(obstacle, walls, t0, t1)
+    _line(ax, points, f"{kind}:{moment.number}", zorder=Z_TRACK, **style.TRACK)
+    for t in np.linspace(t1, t0, _ARROW_TRIES, endpoint=False).tolist():
+        tip = center_at(obstacle, t, walls)
+        if view.holds(tip) and distance(tip, moment.center_m) > obstacle.radius_m:
+            tail = center_at(obstacle, t - _ARROW_M / obstacle.speed_mps, walls)
+            arrow = FancyArrowPatch(tail, tip, zorder=Z_TRACK, **style.ARROW)
+            _patch(ax, arrow, f"arrow:{moment.number}")
+            break
+
+
+def _obstacle(ax: Axes, episode: Episode, obstacle: Obstacle, moment: Pass) -> None:
+    enlarged = episode.scenario.enlarged_radius(obstacle)
+    body = Circle(moment.center_m, obstacle.radius_m, zorder=Z_OBSTACLE, **style.OBSTACLE)
+    edge = Circle(moment.center_m, enlarged, fill=False, zorder=Z_OBSTACLE, **style.ENLARGED)
+    _patch(ax, body, f"obstacle:{moment.number}")
+    _patch(ax, edge, f"enlarged:{moment.number}")
+
+
+def _connect(ax: Axes, moment: Pass) -> None:
+    """The gap: from the robot's centre to the enlarged edge, a mere point in contact."""
+    heading = bearing(moment.robot_m, moment.center_m)
+    ends = [moment.robot_m, towards(moment.robot_m, heading, max(0.0, moment.gap_m))]
+    _line(ax, ends, f"pass:{moment.number}", zorder=Z_MARK, markevery=[0], **style.PASS)
+
+
+def _ring(ax: Axes, episode: Episode, index: int, tick: Decision) -> None:
+    """SR around the robot, the sectors that are set, and what set them (enlarged)."""
+    position, reach = tick.pose.position, episode.sensor.sensing_range_m
+    for first, count in _runs(tick.vs):
+        start, end = (360.0 * i / len(tick.vs) for i in (first, first + count))
+        wedge = Wedge(position, reach, start, end, zorder=Z_SECTOR, **style.SECTOR)
+        _patch(ax, wedge, f"sector:{index}")
+    circles = episode.scenario.enlarged(episode.time_s(tick.stamp_ns))
+    for center, radius in circles:
+        if distance(position, center) - radius <= reach:
+            sensed = Circle(center, radius, fill=False, zorder=Z_RING, **style.SENSED)
+            _patch(ax, sensed, f"sensed:{index}")
+    ring = Circle(position, reach, fill=False, zorder=Z_RING, **style.RING)
+    _patch(ax, ring, f"ring:{index}")
+
+
+def _runs(bits: Bits) -> Iterator[tuple[int, int]]:
+    """Yield (first, count) of neighbouring sectors that are set."""
+    first = 0
+    for bit, group in groupby(bits):
+        count = len(list(group))
+        if bit:
+            yield first, count
+        first += count
+
+
+def _path(ax: Axes, episode: Episode) -> None:
+    """One line per stretch of a mode, and a mark where the robot stands in it."""
+    parts = stretches(episode)
+    for mode in Mode:
+        # a single point makes a line of no length, which is drawn as nothing
+        lines = [[*s.points_m, s.points_m[-1]] for s in parts if s.mode is mode]
+        if not lines:
+            continue
+        collection = LineCollection(
+            lines,
+            colors=style.MODE_COLOURS[mode],
+            linewidths=style.MODE_WIDTHS.get(mode, style.MODE_WIDTH),
+            capstyle="round",
+            joinstyle="round",
+            zorder=Z_PATH,
+        )
+        collection.set_gid(f"path:{mode.value}")
+        ax.add_collection(collection, autolim=False)
+        if mode in style.STANDING:
+            looks = {"color": style.MODE_COLOURS[mode], "linestyle": "none", "zorder": Z_MARK}
+            places = [line[0] for line in lines]
+            _line(ax, places, f"standing:{mode.value}", **looks, **style.STANDING[mode])
+
+
+def _ends(ax: Axes, episode: Episode) -> None:
+    _line(ax, [episode.scenario.start_m], "start", zorder=Z_MARK, **style.START)
+    _line(ax, [episode.scenario.goal_m], "goal", zorder=Z_MARK, **style.GOAL)
+    if episode.outcome is not Outcome.GOAL_REACHED:
+        last = episode.ticks[-1].pose.position
+        _line(ax, [last], "end", zorder=Z_MARK, **style.END)
+
+
+def label_numbers(ax: Axes, episode: Episode, view: View, passes: Sequence[Pass]) -> None:
+    """Write each visible obstacle's number into its circle, or beside it, where it is free."""
+    points_per_m = ax.bbox.width / ax.figure.dpi * 72.0 / view.width
+    size = 1.35 * style.SMALL / points_per_m  # of a number, in metres
+    bodies = [(p.center_m, episode.scenario.obstacles[p.number - 1].radius_m) for p in passes]
+    taken: list[Point] = []
+
+    def is_free(spot: Point, own: Point) -> bool:
+        apart = all(distance(spot, other) > size for other in taken)
+        return apart and all(distance(spot, c) > r + 0.3 * size for c, r in bodies if c != own)
+
+    for moment, (center, radius) in zip(passes, bodies):
+        if not view.holds(center):
+            continue
+        reach = max(radius, 0.3 * size) + 0.6 * size
+        spots = [center] if radius > 0.5 * size else []
+        spots += [
+            towards(center, math.radians(45.0 * turn), reach * far)
+            for far in (1.0, 1.8)
+            for turn in range(1, 9)
+        ]
+        spots = [spot for spot in spots if view.holds(spot, -0.5 * size)] or spots
+        spot = next((spot for spot in spots if is_free(spot, center)), spots[0])
+        taken.append(spot)
+        text = ax.text(*spot, str(moment.number), zorder=Z_MARK, **style.NUMBER)
+        text.set_gid(f"number:{moment.number}")
+        if spot != center:
+            text.set_path_effects([withStroke(**style.HALO)])
+
+
+def kinds(artists: Collection[Artist]) -> set[str]:
+    """What there is to explain: the gids without the numbers of single obstacles."""
+    gids = {artist.get_gid() or "" for artist in artists}
+    return {gid if gid.startswith(("path", "standing")) else gid.split(":")[0] for gid in gids}

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run's result as a table for terminals and logs."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from mfba_planner.core.episode import Episode, Outcome
+from mfba_planner.core.metrics import Result
+
+from . import words
+
+_ROOM_FOR_REMARKS = 60  # columns
+Row = tuple[str, str, str]
+
+
+def result_rows(
+    episode: Episode, result: Result, ticks_per_s: float | None = None
+) -> Iterator[Row]:
+    """Yield (name, figure, remark) for each line of the table."""
+    yield "outcome", words.outcome(result), _why_no_success(result)
+    yield "length", words.length(result), _against_straight(episode, result)
+    yield "time", words.time(result), "simulated"
+    yield "fitness", words.fitness(result), "1 / length"
+    between = "edge to edge" if math.isfinite(result.min_clearance_m) else ""
+    yield "min clearance", words.clearance(result), between
+    yield "collisions", str(result.collisions), ""
+    yield "encounters", str(len(result.encounters)), _numbered(result)
+    yield "mode switches", str(result.mode_switches), _standing(result)
+    rate = "" if ticks_per_s is None else f"{words.number(ticks_per_s, 0)} ticks/s"
+    yield "ticks", str(result.ticks), rate
+
+
+def _why_no_success(result: Result) -> str:
+    reached = result.outcome is Outcome.GOAL_REACHED
+    return "but not without collision" if reached and not result.success else ""
+
+
+def _against_straight(episode: Episode, result: Result) -> str:
+    straight = words.straight_m(episode)
+    line = f"straight line {words.number(straight, 3, 'm')}"
+    if result.outcome is not Outcome.GOAL_REACHED:
+        return line
+    excess = 100.0 * (result.length_m / straight - 1.0)
+    return f"{line} ({excess:+.1f} %)"
+
+
+def _numbered(result: Result) -> str:
+    if not result.encounters:
+        return ""
+    plural = "s" if len(result.encounters) > 1 else ""
+    return f"obstacle{plural} {', '.join(map(str, result.encounters))}"
+
+
+def _standing(result: Result) -> str:
+    counts = (
+        (result.avoidance_ticks, "avoiding"),
+        (result.blocked_ticks, "blocked"),
+        (result.stopped_ticks, "stopped"),
+    )
+    told = [f"{count} {what}" for count, what in counts if count]
+    return f"ticks: {', '.join(told)}" if told else ""
+
+
+def result_table(
+    episode: Episode, result: Result, ticks_per_s: float | None = None, *, remarks: bool = True
+) -> Table:
+    """The result as a rich table; its title tells scenario, algorithm, seed and driver."""
+    title = Text(words.run_title(episode), style="bold")
+    table = Table(title=title, title_justify="left", box=None, show_header=False, padding=(0, 2))
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(no_wrap=True)
+    if remarks:
+        table.add_column(style="dim")
+    good = {"outcome": result.success, "collisions": result.collisions == 0}
+    for name, figure, remark in result_rows(episode, result, ticks_per_s):
+        style = {True: "bold green", False: "bold red", None: ""}[good.get(name)]
+        table.add_row(name, Text(figure, style=style), *([remark] if remarks else []))
+    return table
+
+
+def result_text(
+    episode: Episode, result: Result, ticks_per_s: float | None = None, width: int = 80
+) -> str:
+    """The table as plain text without colour, for logs; at most width columns."""
+    sink = io.StringIO()
+    console = Console(file=sink, width=width, color_system=None)
+    print_result(console, episode, result, ticks_per_s)
+    return "".join(f"{line.rstrip()}\n" for line in sink.getvalue().splitlines())
+
+
+def print_result(
+    console: Console, episode: Episode, result: Result, ticks_per_s: float | None = None
+) -> None:
+    """Print the table; the console knows width, colour and encoding of where it goes."""
+    with console.capture() as captured:
+        remarks = console.width >= _ROOM_FOR_REMARKS
+        console.print(result_table(episode, result, ticks_per_s, remarks=remarks))
+    # a scenario's name may hold what the terminal's encoding does not
+    encoding = console.encoding
+    console.file.write(captured.get().encode(encoding, "replace").decode(encoding))
+    console.file.flush()

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figures of a run in words: the same in tables and pictures."""
+
+from __future__ import annotations
+
+import math
+
+from mfba_planner.core.episode import Episode, Outcome
+from mfba_planner.core.geometry import distance
+from mfba_planner.core.metrics import Result
+from mfba_planner.core.planner import Mode
+
+MODES = {
+    Mode.IDLE: "idle (no goal)",
+    Mode.PATH_GENERATION: "path generation",
+    Mode.OBSTACLE_AVOIDANCE: "obstacle avoidance",
+    Mode.BLOCKED: "blocked (every gap closed)",
+    Mode.STOPPED: "stopped (unusable input)",
+    Mode.ARRIVED: "arrived",
+}
+_OUTCOMES = {
+    Outcome.GOAL_REACHED: "goal reached",
+    Outcome.TIME_LIMIT: "time limit",
+    Outcome.INTERRUPTED: "interrupted",
+}
+
+
+def outcome(result: Result) -> str:
+    """How the run ended."""
+    return _OUTCOMES[result.outcome]
+
+
+def number(value: float, digits: int, unit: str = "", absent: str = "none") -> str:
+    """A figure with its unit, or the word for one that does not exist (inf, NaN)."""
+    if not math.isfinite(value):
+        return absent
+    size = f"{value:.{digits}f}" if abs(value) < 1e7 else f"{value:.6g}"
+    return f"{size} {unit}".rstrip()
+
+
+def length(result: Result) -> str:
+    """Path length."""
+    return number(result.length_m, 3, "m", absent="unknown")
+
+
+def time(result: Result) -> str:
+    """Simulated time."""
+    return number(result.time_s, 2, "s")
+
+
+def clearance(result: Result) -> str:
+    """Smallest gap between robot and obstacle edges."""
+    return number(result.min_clearance_m, 3, "m", absent="no obstacle")
+
+
+def fitness(result: Result) -> str:
+    """The reciprocal of the length, as Tables 5 and 7 print it."""
+    return number(result.fitness, 6, "1/m", absent="never moved")
+
+
+def straight_m(episode: Episode) -> float:
+    """Distance from start to goal (m): no path is shorter."""
+    return distance(episode.scenario.start_m, episode.scenario.goal_m)
+
+
+def one_line(text: str, limit: int) -> str:
+    """Text without line breaks or control characters, cut at limit characters."""
+    text = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return text if len(text) <= limit else f"{text[: limit - 3].rstrip()}..."
+
+
+def run_title(episode: Episode) -> str:
+    """One line that names the run: scenario, algorithm, seed, driver."""
+    return (
+        f"{one_line(episode.scenario.name, 40)}, {episode.planner.bat.algorithm.value},"
+        f" seed {one_line(str(episode.seed), 24)}, {episode.driver} driver"
+    )
