@@ -56,8 +56,8 @@ def _checked(name: str, value: Any, default: Any, spec: Spec) -> Any:
     """Return the value in the default's type, or raise ConfigError."""
     if isinstance(default, Enum):
         return _member(name, value, type(default))
-    if isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value)
+    if isinstance(default, float) and isinstance(value, int | float) and type(value) is not bool:
+        value = _as_float(value)
     if type(value) is not type(default):
         kind = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
         raise ConfigError(f"{name}={value!r}: give {kind.get(type(default), 'another type')}")
@@ -68,6 +68,13 @@ def _checked(name: str, value: Any, default: Any, spec: Spec) -> Any:
     if too_low or too_high:
         raise ConfigError(f"{name}={value}: out of range; give {_interval(spec)}")
     return value
+
+
+def _as_float(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # a whole number of more than 308 digits
+        return math.inf
 
 
 def _member(name: str, value: Any, kind: type[Enum]) -> Enum:
