@@ -35,14 +35,14 @@ def _finite(what: str, values: Iterable[float]) -> None:
 def pose2d(pose: Any, what: str) -> Pose2D:
     """geometry_msgs/Pose as planar pose; yaw from the quaternion (REP-103).
 
-    Raises InputError for NaN, inf or a quaternion without direction.
+    Raises InputError for NaN, inf or a quaternion that is nothing like a unit one.
     """
     p, q = pose.position, pose.orientation
     _finite(f"{what} position", (p.x, p.y))
     _finite(f"{what} orientation", (q.x, q.y, q.z, q.w))
     norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
-    if norm < 1e-6:
-        raise InputError(f"{what} orientation is all zero; send a unit quaternion (w=1)")
+    if not 1e-6 < norm < 1e6:
+        raise InputError(f"{what} orientation has norm {norm:g}; send a unit quaternion (w=1)")
     yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y) / norm, 1.0 - 2.0 * (q.y**2 + q.z**2) / norm)
     return Pose2D(p.x, p.y, yaw)
 

@@ -52,7 +52,7 @@ class Newest:
 
     def odom(self, stamp_ns: int, pose: Pose2D | Refused, now_s: float) -> Ready | None:
         """Keep odom for the next sectors; InputError for a stamp that goes back."""
-        if stamp_ns < self._odom_ns:
+        if stamp_ns < max(self._odom_ns, 0):
             raise InputError(_goes_back("odom", stamp_ns, self._odom_ns))
         self._odom_ns, self._pose, self._odom_s = stamp_ns, pose, now_s
         return None

@@ -39,12 +39,10 @@ class Pace:
         was_open, self._is_open = self._is_open, False
         return was_open
 
-    @property
     def may_move_on(self) -> bool:
         """Lockstep: the tick is answered and nobody holds the world."""
         return self.settings.lockstep and not self._is_open and not self.paused
 
-    @property
     def cannot_step(self) -> str:
         """Why a single step cannot be taken now; empty when it can."""
         if not self.paused:

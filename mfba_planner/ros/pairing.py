@@ -48,7 +48,8 @@ class StampPairs(Generic[A, B]):
         return None
 
     def _refuse_old(self, stamp_ns: int) -> None:
-        if stamp_ns <= self._answered_ns and not (self._again and stamp_ns == self._answered_ns):
+        oldest_ns = self._answered_ns + (0 if self._again else 1)
+        if stamp_ns < max(oldest_ns, 0):
             raise InputError(
                 f"stamp {stamp_ns} ns: not newer than {self._answered_ns} ns, answered before; "
                 "stamps must rise"

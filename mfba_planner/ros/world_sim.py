@@ -59,7 +59,7 @@ class WorldSim(GraphNode):
         """Go on from a pause; nothing when not paused."""
         if self._pace.paused:
             self._pace.paused = False
-            if self._pace.may_move_on:
+            if self._pace.may_move_on():
                 self._move_on()
 
     def _begin(self) -> None:
@@ -95,7 +95,7 @@ class WorldSim(GraphNode):
     def _watch(self) -> None:
         """Lockstep: begin when somebody is there; publish an unanswered tick again."""
         if not self._published:
-            if self._pace.may_move_on and self.count_subscribers(topics.ODOM.name):
+            if self._pace.may_move_on() and self.count_subscribers(topics.ODOM.name):
                 self._publish_tick()
         elif self._pace.must_repeat(time.monotonic(), self.world.tick):
             self.get_logger().warning(f"tick {self.world.tick} unanswered: published again")
@@ -110,7 +110,7 @@ class WorldSim(GraphNode):
         except InputError as error:
             self._refusals.add(error)
             self._velocity = (0.0, 0.0)
-        if self._pace.may_move_on:
+        if self._pace.may_move_on():
             self._move_on()
 
     def _on_initialpose(self, message: PoseWithCovarianceStamped) -> None:
@@ -128,7 +128,9 @@ class WorldSim(GraphNode):
         return response
 
     def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        refusal = "refused: the run is over; reset first" if self.over else self._pace.cannot_step
+        refusal = (
+            "refused: the run is over; reset first" if self.over else self._pace.cannot_step()
+        )
         if not refusal:
             self._move_on()
         response.success, response.message = not refusal, refusal or f"tick {self.world.tick}"
@@ -138,7 +140,7 @@ class WorldSim(GraphNode):
         self._ticks_before_reset += self.world.tick + 1
         self._pace.reset()
         self._begin()
-        if self._pace.may_move_on:
+        if self._pace.may_move_on():
             self._publish_tick()
         response.success, response.message = True, f"tick 0 at stamp {self.stamp_ns} ns"
         return response
