@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -15,19 +16,20 @@ from rclpy.parameter_client import AsyncParameterClient
 from . import params
 
 PERIOD_S = 0.05
+ASK_AGAIN_S = 1.0  # an answer can get lost while a server still looks for its client
 
 Found = dict[str, dict[str, Any]]
 
 
 class ParameterSurvey:
-    """Asks every wanted node once, as soon as it is there; done(found) when all have answered."""
+    """Asks every wanted node until it answers; done(found) when all have answered."""
 
     def __init__(self, node: Node, wanted: set[str], done: Callable[[Found], None]) -> None:
         """Begin to ask, while the node spins."""
         self._node = node
         self._done = done
         self._askers: dict[str, AsyncParameterClient] = {}
-        self._asked: set[str] = set()
+        self._asked_at: dict[str, float] = {}
         self.wanted = wanted
         self.found: Found = {}
         if wanted:
@@ -40,10 +42,13 @@ class ParameterSurvey:
         return sorted(self.wanted - self.found.keys())
 
     def _ask(self) -> None:
-        for name in self.wanted - self._asked:
-            asker = self._askers.setdefault(name, AsyncParameterClient(self._node, name))
-            if asker.services_are_ready():
-                self._asked.add(name)
+        now = time.monotonic()
+        for name in self.absent:
+            asker = self._askers.get(name) or AsyncParameterClient(self._node, name)
+            self._askers[name] = asker
+            waited = now - self._asked_at.get(name, float("-inf"))
+            if waited >= ASK_AGAIN_S and asker.services_are_ready():
+                self._asked_at[name] = now
                 asker.list_parameters(callback=partial(self._on_listed, name))
         if not self.absent:
             self._node.destroy_timer(self._timer)
