@@ -46,6 +46,16 @@ def ros_context(domain_id: int) -> Iterator[Any]:
 
 
 @pytest.fixture
+def graph(ros_context: Any) -> Iterator[Any]:
+    """Open a Graph: nodes of ours and a probe, on one executor."""
+    from graph import Graph
+
+    opened = Graph(ros_context)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
 def ros_env(domain_id: int) -> dict[str, str]:
     """Return the environment for a subprocess in this test's own domain."""
     return {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
