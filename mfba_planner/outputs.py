@@ -19,3 +19,9 @@ def refuse_existing(path: Path) -> Path:
     if path.exists() or path.is_symlink():
         raise OutputError(f"{path}: exists and is never overwritten; choose another --out")
     return path
+
+
+def bag_in(path: Path) -> Path:
+    """The bag of a run directory; anything else is taken for a bag itself."""
+    bag = path / "bag"
+    return bag if bag.is_dir() and not any(path.glob("*.mcap")) else path

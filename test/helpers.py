@@ -1,30 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What several test files share: waiting for facts, and domains nobody else uses."""
 
-import itertools
-import os
-import socket
 import time
 from collections.abc import Callable
 from typing import Any
 
-# Domains above 101 map to ports that Linux hands out to any program. Each process starts
-# elsewhere and goes round, so that a domain rests after use.
-_DOMAINS = range(1, 102)
-_candidates = itertools.islice(itertools.cycle(_DOMAINS), os.getpid() % len(_DOMAINS), None)
-
-
-def claim_domain() -> tuple[int, socket.socket]:
-    """Return a ROS domain id no other test process holds, and the lock to close after use."""
-    for domain in itertools.islice(_candidates, len(_DOMAINS)):
-        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            lock.bind(f"\0mfba_planner_test_domain_{domain}")
-        except OSError:
-            lock.close()
-        else:
-            return domain, lock
-    raise AssertionError(f"all {len(_DOMAINS)} ROS domains are taken; end other test runs")
+# The launcher's own: tests and runs must not meet in a domain.
+from mfba_planner.launcher.domain import claim_domain as claim_domain
 
 
 def spin_until(executor: Any, condition: Callable[[], bool], timeout_s: float = 5.0) -> None:

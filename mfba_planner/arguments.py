@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""argparse with our manners: a mistake is one ConfigError, and names the nearest option."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from .core.errors import ConfigError
+from .core.options import did_you_mean
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that raises ConfigError, in one line, instead of printing its usage and 2."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Take argparse's keywords; abbreviations are off: they would hide typing errors."""
+        super().__init__(
+            allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs
+        )
+
+    def parse(self, args: Sequence[str]) -> argparse.Namespace:
+        """Parse all of args; ConfigError for whatever is unknown, missing or refused."""
+        found, unknown = self.parse_known_args(args)
+        if unknown:
+            known = [name for name in self._option_string_actions if name.startswith("--")]
+            word = unknown[0].partition("=")[0]
+            hint = did_you_mean(word, known) if word.startswith("-") else self._see()
+            raise ConfigError(f"{unknown[0]}: unknown argument; {hint}")
+        return found
+
+    def error(self, message: str) -> NoReturn:
+        """Raise ConfigError."""
+        raise ConfigError(f"{message.removeprefix('argument ')}; {self._see()}")
+
+    def _see(self) -> str:
+        return f"see `{self.prog} --help`"

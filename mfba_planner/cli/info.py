@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba info`: what a bag holds, and how its run went; needs no ROS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..arguments import Parser
+from ..core.errors import BagError
+from ..core.metrics import evaluate
+from ..launcher.conclusion import show
+from ..outputs import bag_in
+from ..recording.configuration import ATTACHMENT_NAME
+from ..recording.episode import read_episode
+from ..recording.info import describe, format_info
+
+
+def main(args: list[str]) -> int:
+    """Describe a bag."""
+    parser = Parser(prog="mfba info", description="Say what a bag holds, and how its run went.")
+    parser.add_argument("bag", type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+    bag = bag_in(parser.parse(args).bag)
+    info = describe(bag)
+    print(format_info(info))
+    if any(name == ATTACHMENT_NAME for name, _, _ in info.attachments):
+        try:
+            episode = read_episode(bag, salvage=not info.complete)
+        except BagError as error:
+            print(f"Run:         {error}")
+        else:
+            print()
+            show(episode, evaluate(episode))
+    return 0

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba options`: what --set can change; needs no ROS."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Any
+
+from ..arguments import Parser
+from ..core.options import Spec
+from ..launcher.options import option_rows
+
+
+def main(args: list[str]) -> int:
+    """List the options."""
+    Parser(
+        prog="mfba options", description="List what `mfba run` and `mfba sim` --set can change."
+    ).parse(args)
+    rows = [
+        (name, _value(default), _meaning(default, spec)) for name, default, spec in option_rows()
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    for name, default, meaning in rows:
+        print(f"{name:<{widths[0]}}  {default:<{widths[1]}}  {meaning}")
+    return 0
+
+
+def _value(default: Any) -> str:
+    if isinstance(default, bool):
+        return str(default).lower()
+    return str(default.value if isinstance(default, Enum) else default)
+
+
+def _meaning(default: Any, spec: Spec) -> str:
+    notes = [spec.unit] if spec.unit else []
+    if isinstance(default, Enum):
+        notes.append(" | ".join(str(member.value) for member in type(default)))
+    elif spec.minimum is not None and spec.maximum is not None:
+        notes.append(f"{spec.minimum:g} to {spec.maximum:g}")
+    return f"{spec.doc} [{', '.join(notes)}]" if notes else spec.doc

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba recover`: an ordinary bag out of a broken one; needs no ROS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..arguments import Parser
+from ..outputs import bag_in
+from ..recording.recover import recover
+
+
+def main(args: list[str]) -> int:
+    """Recover a bag."""
+    parser = Parser(
+        prog="mfba recover",
+        description="Copy all that is whole of a killed, truncated or damaged bag into a new one.",
+    )
+    parser.add_argument("bag", type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+    parser.add_argument("out", type=Path, metavar="OUT", help="bag directory to create")
+    found = parser.parse(args)
+    report = recover(bag_in(found.bag), found.out)
+    for problem in report.problems:
+        print(f"problem: {problem}")
+    print(
+        f"wrote {report.output}: {report.messages} messages from {report.chunks} chunks, "
+        f"{report.attachments} attachments; {report.bytes_lost} bytes held nothing whole"
+    )
+    return 0

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba scenarios`: the worlds that are shipped; needs no ROS."""
+
+from __future__ import annotations
+
+from ..arguments import Parser
+from ..resources import scenario_names, share_dir
+from ..scenarios import load_scenario
+
+
+def main(args: list[str]) -> int:
+    """List the scenarios."""
+    Parser(prog="mfba scenarios", description="List the worlds that are shipped.").parse(args)
+    names = scenario_names()
+    width = max(map(len, names), default=0)
+    for name in names:
+        print(f"{name:<{width}}  {load_scenario(name).description}")
+    print(f"files: {share_dir() / 'config' / 'scenarios'}")
+    return 0

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba sim`: episodes by the core driver, one seed or many; needs no ROS."""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+from dataclasses import replace
+from pathlib import Path
+
+from ..arguments import Parser
+from ..core.episode import run
+from ..core.errors import ConfigError, MfbaError
+from ..core.metrics import Result, evaluate
+from ..launcher.conclusion import show, why_no_success
+from ..launcher.options import Order, add_world_arguments, read_config
+from ..run_config import Driver, RunConfig
+
+_DESCRIPTION = "Simulate episodes without ROS: the decisions of `mfba run`, but no bag."
+_HEAD = "    seed  outcome       length     time  clearance  collisions"
+_ROW = "{:>8}  {:<12}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"
+
+
+def main(args: list[str]) -> int:
+    """Simulate; 0 when every run reached the goal without collision."""
+    parser = Parser(prog="mfba sim", description=_DESCRIPTION)
+    add_world_arguments(parser)
+    parser.add_argument(
+        "--seeds", type=int, default=1, metavar="N", help="N seeds from --seed on (default: 1)"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="directory to create for result.json and run.png"
+    )
+    found = parser.parse(args)
+    _check(found)
+    config = read_config(found, driver=Driver.CORE)
+    if found.out is not None:
+        from ..launcher.run import run as launch
+
+        return launch(Order(config=config, out=found.out, node_args={}))
+    if found.seeds == 1:
+        return _one(config)
+    return _many([replace(config, seed=config.seed + k) for k in range(found.seeds)])
+
+
+def _check(found: argparse.Namespace) -> None:
+    if found.seeds < 1:
+        raise ConfigError(f"--seeds={found.seeds}: out of range; give at least 1")
+    if found.out is not None and found.seeds > 1:
+        raise ConfigError(f"--out {found.out}: holds one run; leave out --seeds")
+
+
+def _one(config: RunConfig) -> int:
+    episode = run(config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed)
+    result = evaluate(episode)
+    show(episode, result)
+    if not result.success:
+        raise MfbaError(why_no_success(episode, result))
+    return 0
+
+
+def _many(configs: list[RunConfig]) -> int:
+    print(_HEAD)
+    results = []
+    for config in configs:
+        episode = run(
+            config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed
+        )
+        results.append(evaluate(episode))
+        print(_row(config.seed, results[-1]), flush=True)
+    good = [result for result in results if result.success]
+    print(_summary(good, len(results)))
+    if len(good) < len(results):
+        raise MfbaError(
+            f"{len(results) - len(good)} of {len(results)} seeds failed; "
+            "look at one of them with --seed and --out"
+        )
+    return 0
+
+
+def _row(seed: int, r: Result) -> str:
+    return _ROW.format(
+        seed, r.outcome.value, r.length_m, r.time_s, r.min_clearance_m, r.collisions
+    )
+
+
+def _summary(good: list[Result], total: int) -> str:
+    """How many reached the goal without collision, and the spread of their lengths."""
+    text = f"{len(good)} of {total} at the goal without collision"
+    if good:
+        lengths = [result.length_m for result in good]
+        text += (
+            f"; length {min(lengths):.3f} to {max(lengths):.3f} m, "
+            f"mean {statistics.fmean(lengths):.3f} m"
+        )
+    return text

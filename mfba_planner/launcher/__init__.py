@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The launcher: one run under any driver, from the command line to the result."""
+
+
+def main(args: list[str], prog: str = "launcher") -> int:
+    """Run what args order; return the exit code. MfbaErrors pass through."""
+    from .options import read_order
+    from .run import run
+
+    return run(read_order(args, prog))

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is left of a run: its table on the screen, result.json, the picture, and a verdict."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..core.episode import Episode, Outcome
+from ..core.errors import MfbaError
+from ..core.geometry import distance
+from ..core.metrics import Result, evaluate
+from ..recording.episode import read_episode
+from .attempt import Attempt
+
+
+@dataclass(frozen=True, slots=True)
+class Conclusion:
+    """A run that was made, whatever came of it."""
+
+    directory: Path
+    episode: Episode
+    result: Result
+
+    def judge(self) -> None:
+        """Raise MfbaError, with the reason, unless the goal was reached without collision."""
+        if not self.result.success:
+            raise MfbaError(f"{self.directory}: {why_no_success(self.episode, self.result)}")
+
+
+def why_no_success(episode: Episode, result: Result) -> str:
+    """What kept a run from reaching the goal without collision, in words."""
+    faults = []
+    if result.collisions:
+        faults.append(f"{result.collisions} collisions")
+    if result.outcome is not Outcome.GOAL_REACHED:
+        left = distance(episode.ticks[-1].pose.position, episode.scenario.goal_m)
+        faults.append(
+            f"{left:.2f} m left to the goal after {result.time_s:.2f} s "
+            f"(time limit {episode.scenario.time_limit_s:g} s)"
+        )
+    return f"no success: {', '.join(faults)}; see the picture, or try another --seed"
+
+
+def conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> Conclusion:
+    """Print the table, write result.json and run.png; the episode comes from the bag if None.
+
+    Raises BagError where the bag holds no decision or was not closed.
+    """
+    from ..report.result import result_to_dict, write_result
+
+    directory = attempt.directory
+    if episode is None:
+        episode = read_episode(directory.bag)
+    result = evaluate(episode)
+    speed = result.ticks / attempt.wall_s if attempt.wall_s else None
+    extra = {"wall_s": attempt.wall_s, "ticks_per_s": speed, "failure": failure or None}
+    write_result(directory.result, result_to_dict(episode, extra))
+    if attempt.order.picture:
+        from ..report.figure import draw_run
+
+        draw_run(episode, directory.picture)
+    show(episode, result, speed)
+    print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
+    return Conclusion(directory.path, episode, result)
+
+
+def show(episode: Episode, result: Result, ticks_per_s: float | None = None) -> None:
+    """Print the table: with colours on a terminal, otherwise as plain text."""
+    from ..report.table import print_result, result_text
+
+    if sys.stdout.isatty():
+        from rich.console import Console
+
+        print_result(Console(), episode, result, ticks_per_s)
+    else:
+        sys.stdout.write(result_text(episode, result, ticks_per_s))

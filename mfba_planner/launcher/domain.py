@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A ROS domain of one's own: no other run of ours talks in it, nobody off this machine hears."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from ..core.errors import GraphError
+
+# Domains above 101 map to ports that Linux hands out to any program. Each process starts
+# elsewhere and goes round, so that a domain rests after use.
+DOMAINS = range(1, 102)
+_candidates = itertools.islice(itertools.cycle(DOMAINS), os.getpid() % len(DOMAINS), None)
+
+
+def claim_domain() -> tuple[int, socket.socket]:
+    """Return a ROS domain id that no other holder has, and the lock to close after use.
+
+    The lock is an abstract socket: the system drops it even after kill -9. Raises GraphError
+    when every domain is taken.
+    """
+    for domain in itertools.islice(_candidates, len(DOMAINS)):
+        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            lock.bind(f"\0mfba_planner_domain_{domain}")
+        except OSError:
+            lock.close()
+        else:
+            return domain, lock
+    raise GraphError(f"all {len(DOMAINS)} ROS domains are taken; end other runs first")
+
+
+@contextmanager
+def private_domain() -> Iterator[int]:
+    """Hold a domain, and keep this process and its children to it and to this machine."""
+    domain, lock = claim_domain()
+    ours = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    theirs = {name: os.environ.get(name) for name in ours}
+    os.environ.update(ours)
+    with lock:
+        try:
+            yield domain
+        finally:
+            for name, value in theirs.items():
+                if value is None:
+                    del os.environ[name]
+                else:
+                    os.environ[name] = value

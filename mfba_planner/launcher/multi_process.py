@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The multi-process driver: every node a process of its own, in a domain of its own."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+from ..core.errors import BagError, GraphError
+from ..recording.reader import BagReader
+from ..ros import topics
+from ..run_config import NODES, Parameters, node_parameters, run_facts
+from .attempt import Attempt
+from .crew import Crew
+from .directory import RunDirectory
+from .domain import private_domain
+from .monitor import Monitor
+from .options import RECORDER
+from .stop import StoppedError
+
+READY_TIMEOUT_S = 15.0
+ANSWER_TIMEOUT_S = 5.0
+FREEZE_TIMEOUT_S = 1.0
+TURN_S = 0.02
+
+
+def run_multi_process(attempt: Attempt) -> None:
+    """Run the graph until goal or time limit; the bag is closed and complete afterwards.
+
+    Raises GraphError for a node that ends or does not get ready, StoppedError for an attempt that
+    is stopped from outside: then the bag holds what happened until then. Raises BagError when
+    the recorder missed something.
+    """
+    attempt.screen.log_to(attempt.directory.log)
+    with (
+        private_domain() as domain,
+        Monitor(domain) as monitor,
+        Crew(attempt.screen.line, attempt.stop.is_urgent) as crew,
+    ):
+        attempt.screen.say(f"starting the nodes in ROS domain {domain}")
+        crew.start(_told(attempt), attempt.order.node_args)
+        ticks = _Conductor(attempt, monitor, crew).conduct()
+    if not attempt.order.config.real_time:
+        require_complete(attempt.directory, ticks)
+
+
+def _told(attempt: Attempt) -> Parameters:
+    """Every node's parameters, the recorder's first: what it hears first it must not miss."""
+    config = attempt.order.config
+    recorder = {
+        "output": str(attempt.directory.bag.absolute()),
+        "nodes": ",".join(NODES),
+        "sim_time": True,
+        "run": json.dumps(run_facts(config)),
+    }
+    return {RECORDER: recorder, **node_parameters(config, (*NODES, RECORDER))}
+
+
+class _Conductor:
+    """Lets the nodes get ready, play and stop together."""
+
+    def __init__(self, attempt: Attempt, monitor: Monitor, crew: Crew) -> None:
+        self._attempt = attempt
+        self._monitor = monitor
+        self._crew = crew
+
+    def conduct(self) -> int:
+        """Run from start to end; return the number of ticks."""
+        self._get_ready()
+        self._monitor.listen()
+        self._attempt.begin()
+        try:
+            self._let_go()
+            ticks = self._watch()
+        except (GraphError, StoppedError):
+            self._freeze()
+            raise
+        self._attempt.end()
+        return ticks
+
+    def _check(self) -> None:
+        self._crew.check()
+        self._attempt.stop.check()
+
+    def _wait(self, done: Callable[[], Any], timeout_s: float, explain: Callable[[], str]) -> None:
+        """Spin until done; GraphError with the explanation after timeout_s."""
+        deadline = time.monotonic() + timeout_s
+        while not done():
+            self._check()
+            if time.monotonic() > deadline:
+                raise GraphError(f"{explain()} after {timeout_s:g} s; see the nodes' lines above")
+            self._monitor.spin(TURN_S)
+
+    def _get_ready(self) -> None:
+        """Wait until no node misses anything, so that no first message is lost."""
+        questions = self._monitor.ask_ready([RECORDER, *NODES])
+        missing = dict.fromkeys(questions, "no answer yet")
+
+        def all_ready() -> bool:
+            for name in [*missing]:
+                answer = questions[name].answer()
+                if answer is not None:
+                    missing[name] = answer.message
+                    if answer.success:
+                        del missing[name]
+            return not missing
+
+        self._wait(
+            all_ready,
+            READY_TIMEOUT_S,
+            lambda: "not ready: " + "; ".join(f"{name}: {what}" for name, what in missing.items()),
+        )
+        self._crew.forget_parameters()
+
+    def _let_go(self) -> None:
+        question = self._monitor.ask_pause(False)
+        self._wait(question.answer, ANSWER_TIMEOUT_S, lambda: "world_sim does not answer ~/pause")
+
+    def _watch(self) -> int:
+        """Until the world says that it is over; without waking up for every message."""
+        tick_ns = self._attempt.order.config.planner.tick_ns
+        while (ticks := self._monitor.ticks_at_end()) is None:
+            self._check()
+            time.sleep(TURN_S)
+            self._monitor.take_in()
+            if self._attempt.screen.wants_progress() and (now := self._monitor.progress()):
+                self._attempt.show(now.stamp_ns // tick_ns - 1, now.distance_m, now.mode)
+        return ticks
+
+    def _freeze(self) -> None:
+        """Let the world stand still, if it lives, so that the bag ends with a whole tick."""
+        question = self._monitor.ask_pause(True)
+        deadline = time.monotonic() + FREEZE_TIMEOUT_S
+        while question.answer() is None and time.monotonic() < deadline:
+            if self._attempt.stop.is_urgent() or not self._crew.has(topics.WORLD_SIM):
+                return
+            self._monitor.spin(TURN_S)
+
+
+def require_complete(directory: RunDirectory, ticks: int) -> None:
+    """Raise BagError unless every topic of the loop has a message for each of the ticks."""
+    with BagReader(directory.bag) as reader:
+        counts = {name: topic.message_count for name, topic in reader.topics.items()}
+    for topic in topics.GRAPH:
+        found = counts.get(f"/{topic.name.lstrip('/')}", 0)
+        if topic.every_tick and found < ticks:
+            raise BagError(
+                f"{directory.bag}: incomplete, {found} of {ticks} messages on {topic.name}; "
+                "run again on a machine with less to do"
+            )

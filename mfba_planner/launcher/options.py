@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a run is ordered with: command line arguments turned into one checked Order."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..arguments import Parser
+from ..core.bat import Algorithm
+from ..core.errors import ConfigError
+from ..core.options import did_you_mean, override, walk
+from ..core.planner import PlannerParams
+from ..core.sensing import SensorParams
+from ..paper import readings
+from ..run_config import NODES, Driver, RunConfig
+from ..scenarios import load_scenario
+
+RECORDER = "recorder"
+TIMEOUT_S = 600.0
+
+_DESCRIPTION = """\
+Run one episode: a robot crosses a world of moving obstacles to its goal. Leaves a directory
+with the bag, result.json, a picture and, from several processes, their logs.
+"""
+_EPILOG = """\
+exit code: 0 goal reached without collision; 1 anything else, with the reason in one line;
+130 Ctrl-C (what was recorded until then is whole).
+
+examples:
+  {prog} case1 --seed 1
+  {prog} my_world.yaml --algorithm ba --set planner.step_length_m=0.08
+  {prog} case2 --real-time --speed 2 --planner-args='--log-level debug'
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """One run to be made; out is None for a new directory below ./runs."""
+
+    config: RunConfig
+    out: Path | None = None
+    timeout_s: float = TIMEOUT_S
+    picture: bool = True
+    node_args: dict[str, list[str]]
+
+
+def read_order(args: list[str], prog: str) -> Order:
+    """Turn a command line into an Order; ConfigError for whatever cannot be accepted."""
+    parser = Parser(prog=prog, description=_DESCRIPTION, epilog=_EPILOG.format(prog=prog))
+    add_world_arguments(parser)
+    driver = parser.add_argument_group("driver")
+    driver.add_argument(
+        "--driver",
+        choices=[member.value for member in Driver],
+        default=Driver.MULTI_PROCESS.value,
+        help="who turns the loop; the decisions are the same (default: %(default)s)",
+    )
+    driver.add_argument(
+        "--real-time", action="store_true", help="tick on a wall timer instead of in lockstep"
+    )
+    driver.add_argument(
+        "--speed",
+        type=float,
+        metavar="FACTOR",
+        help="simulated seconds per wall second; implies --real-time (default: 1)",
+    )
+    driver.add_argument(
+        "--timeout",
+        type=float,
+        metavar="SECONDS",
+        help=f"give up after so much wall time (default: {TIMEOUT_S:g}, or what the scenario's "
+        "time limit takes in real time if that is more)",
+    )
+    for node in (*NODES, RECORDER):
+        driver.add_argument(
+            f"--{node.replace('_', '-')}-args",
+            action="append",
+            default=[],
+            metavar="'ARGS'",
+            help=f"more --ros-args for {node}, such as '-p NAME:=VALUE' (multi-process only)",
+        )
+    output = parser.add_argument_group("output")
+    output.add_argument(
+        "--out", type=Path, metavar="DIR", help="directory to create (default: runs/run-NNN)"
+    )
+    output.add_argument("--no-picture", action="store_true", help="leave out run.png")
+    return _order(parser.parse(args))
+
+
+def add_world_arguments(parser: argparse.ArgumentParser) -> None:
+    """What decides how an episode goes, whoever turns the loop."""
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default="case1",
+        metavar="SCENARIO",
+        help="a name that `mfba scenarios` lists, or a .yaml file (default: %(default)s)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of all randomness (default: 0)")
+    parser.add_argument(
+        "--algorithm", choices=[a.value for a in Algorithm], help="mfba (default) or plain ba"
+    )
+    parser.add_argument(
+        "--reading",
+        default="section6",
+        metavar="NAME",
+        help="how the paper's path planning is read: "
+        f"{', '.join(readings.PLANNERS)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--swarm",
+        metavar="NAME",
+        help=f"how the paper's eq. 3-10 are read: {', '.join(readings.SWARMS)}",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help="an option of planner or sensor, such as planner.bat.population=30; "
+        "`mfba options` lists them",
+    )
+
+
+def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
+    """The RunConfig that add_world_arguments' values describe; later ones override earlier."""
+    planner = readings.planner(found.reading)
+    if found.swarm:
+        planner = replace(planner, bat=readings.swarm(found.swarm))
+    if found.algorithm:
+        planner = override(planner, {"bat.algorithm": found.algorithm})
+    changes = dict(map(_setting, found.settings))
+    return RunConfig(
+        scenario=load_scenario(found.scenario),
+        planner=override(planner, _below("planner", changes)),
+        sensor=override(SensorParams(), _below("sensor", changes)),
+        seed=found.seed,
+        **more,
+    )
+
+
+def option_rows() -> Iterable[tuple[str, Any, Any]]:
+    """(name for --set, default, Spec) of every option."""
+    for group, defaults in (("planner", PlannerParams()), ("sensor", SensorParams())):
+        for name, value, item in walk(defaults):
+            yield f"{group}.{name}", value, item.metadata["spec"]
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, found, value = text.partition("=")
+    if not found:
+        raise ConfigError(f"--set {text}: no value; give NAME=VALUE")
+    known = [row[0] for row in option_rows()]
+    if name not in known:
+        raise ConfigError(f"--set {name}: unknown option; {did_you_mean(name, known)}")
+    return name, _literal(value)
+
+
+def _literal(text: str) -> Any:
+    """The number or truth value that text shows, otherwise text itself."""
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _below(group: str, changes: dict[str, Any]) -> dict[str, Any]:
+    head = f"{group}."
+    return {name[len(head) :]: value for name, value in changes.items() if name.startswith(head)}
+
+
+def _order(found: argparse.Namespace) -> Order:
+    driver = Driver(found.driver)
+    real_time = found.real_time or found.speed is not None
+    if real_time and driver is Driver.CORE:
+        raise ConfigError("--real-time: the core driver has no clock; choose another --driver")
+    speed = {} if found.speed is None else {"speed_factor": found.speed}
+    config = read_config(found, driver=driver, real_time=real_time, **speed)
+    node_args = {
+        node: _split(f"--{node.replace('_', '-')}-args", getattr(found, f"{node}_args"))
+        for node in (*NODES, RECORDER)
+    }
+    given = [node for node, args in node_args.items() if args]
+    if given and driver is not Driver.MULTI_PROCESS:
+        raise ConfigError(
+            f"--{given[0].replace('_', '-')}-args: the {driver.value} driver starts no processes; "
+            "use --set, or --driver multi-process"
+        )
+    return Order(
+        config=config,
+        out=found.out,
+        timeout_s=_timeout_s(found.timeout, config),
+        picture=not found.no_picture,
+        node_args=node_args,
+    )
+
+
+def _split(option: str, texts: list[str]) -> list[str]:
+    try:
+        return [word for text in texts for word in shlex.split(text)]
+    except ValueError as error:
+        raise ConfigError(f"{option} {texts[-1]}: {error}; quote as in a shell") from None
+
+
+def _timeout_s(given: float | None, config: RunConfig) -> float:
+    if given is None:
+        wall_s = config.scenario.time_limit_s / config.speed_factor if config.real_time else 0.0
+        return max(TIMEOUT_S, 60.0 + wall_s)
+    if not 0.0 < given < float("inf"):
+        raise ConfigError(f"--timeout={given:g}: out of range; give seconds above 0")
+    return given

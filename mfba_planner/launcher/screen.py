@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the user sees of a run: whole lines, prefixed by who says them, and how far it is."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from threading import Lock
+from typing import IO, Any
+
+PLAIN_PERIOD_S = 2.0  # between two lines of progress where they cannot be overwritten
+LIVE_PERIOD_S = 0.1
+
+
+class Screen:
+    """Standard output, and a log file once there is a place for it.
+
+    On a terminal progress is one line that is overwritten, otherwise a line now and then.
+    """
+
+    def __init__(self) -> None:
+        """Look what standard output is."""
+        self._lock = Lock()
+        self._log: IO[str] | None = None
+        self._live: Any = None
+        self._shown_at = time.monotonic()
+        self._period_s = LIVE_PERIOD_S if sys.stdout.isatty() else PLAIN_PERIOD_S
+
+    def log_to(self, path: Path) -> None:
+        """Write all lines of nodes into a new file too."""
+        self._log = open(path, "x", encoding="utf-8")  # noqa: SIM115  (open as long as we are)
+
+    def close(self) -> None:
+        """End the progress line and the log file."""
+        with self._lock:
+            if self._live is not None:
+                self._live.stop()
+                self._live = None
+            if self._log is not None:
+                with suppress(OSError):
+                    self._log.close()
+                self._log = None
+
+    def line(self, who: str, text: str) -> None:
+        """Show a node's line; from any thread, and never torn apart."""
+        line = f"[{who}] {text}"
+        with self._lock, suppress(OSError):  # a full disk or a closed pipe is no node's fault
+            if self._log is not None:
+                self._log.write(f"{line}\n")
+                self._log.flush()
+            self._print(line)
+
+    def say(self, text: str) -> None:
+        """Show a line of our own."""
+        with self._lock:
+            self._print(text)
+
+    def wants_progress(self) -> bool:
+        """Whether it is time for the next progress."""
+        return time.monotonic() - self._shown_at >= self._period_s
+
+    def progress(self, text: str) -> None:
+        """Show how far the run is."""
+        self._shown_at = time.monotonic()
+        with self._lock:
+            if self._period_s == PLAIN_PERIOD_S:
+                self._print(text)
+                return
+            if self._live is None:
+                self._live = _live_line()
+            self._live.update(_plain(text), refresh=True)
+
+    def _print(self, line: str) -> None:
+        if self._live is not None:
+            self._live.console.print(_plain(line), soft_wrap=True)
+        else:
+            encoding = sys.stdout.encoding or "utf-8"
+            sys.stdout.write(f"{line}\n".encode(encoding, "replace").decode(encoding))
+            sys.stdout.flush()
+
+
+def _live_line() -> Any:
+    from rich.live import Live
+
+    live = Live(auto_refresh=False, transient=True)
+    live.start()
+    return live
+
+
+def _plain(text: str) -> Any:
+    """Text that rich takes literally."""
+    from rich.text import Text
+
+    return Text(text)

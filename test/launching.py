@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the launcher share: real processes, and who of them is still there."""
+
+import os
+import signal
+import subprocess
+import sys
+import uuid
+from collections.abc import Mapping
+from pathlib import Path
+
+from helpers import wait_until
+
+ROOT = Path(__file__).parents[1]
+MARK = "MFBA_TEST_MARK"
+PROGRAM = "import sys; from mfba_planner import entry; sys.exit(entry.{}())"
+# Thousands of ticks: long enough to be caught in the middle of it.
+LONG = ["case1", "--seed", "1", "--set", "planner.step_length_m=0.002", "--no-picture"]
+
+
+class Program:
+    """One of our commands as a process, and all that descend from it."""
+
+    def __init__(
+        self, name: str, *args: str, cwd: Path, more_env: Mapping[str, str] | None = None
+    ) -> None:
+        self.mark = uuid.uuid4().hex
+        env = {**os.environ, MARK: self.mark, "PYTHONPATH": str(ROOT), **(more_env or {})}
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", PROGRAM.format(name), *args],
+            cwd=cwd,
+            env=env,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.stdout = self.stderr = ""
+
+    def __enter__(self) -> "Program":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for pid in self.family():
+            os.kill(pid, signal.SIGKILL)
+        self.process.communicate()
+
+    def end(self, timeout_s: float = 60.0) -> int:
+        """Wait for the end; keep what was said."""
+        self.stdout, self.stderr = self.process.communicate(timeout=timeout_s)
+        return self.process.returncode
+
+    def family(self) -> list[int]:
+        """Processes that run and carry our mark, the first one included."""
+        return [pid for pid, environ in _environments() if f"{MARK}={self.mark}" in environ]
+
+    def node(self, name: str) -> int:
+        """The process of a node."""
+        found = [pid for pid in self.family() if f"entry.{name}()" in _read(pid, "cmdline")]
+        assert len(found) == 1, f"{name}: {found}"
+        return found[0]
+
+    def wait_for_data(self, run: Path) -> None:
+        """Wait until the run goes on and a first chunk of it is in the bag."""
+        bag = run / "bag" / "bag_0.mcap"
+        wait_until(lambda: bag.exists() and bag.stat().st_size > 30_000, timeout_s=60.0)
+
+
+def _environments() -> list[tuple[int, list[str]]]:
+    pids = [int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()]
+    return [(pid, _read(pid, "environ").split("\0")) for pid in pids]
+
+
+def _read(pid: int, what: str) -> str:
+    try:
+        return Path(f"/proc/{pid}/{what}").read_text(encoding="utf-8", errors="replace")
+    except OSError:  # it has ended
+        return ""
+
+
+def complete(name: str, *args: str, cwd: Path, **more_env: str) -> Program:
+    """Let a command run to its end."""
+    with Program(name, *args, cwd=cwd, more_env=more_env) as program:
+        program.end()
+        assert program.family() == []
+        return program

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The launcher from end to end: real processes, real DDS, and the core's decisions."""
+
+import json
+from pathlib import Path
+
+import pytest
+from launching import complete
+
+from mfba_planner import scenarios
+from mfba_planner.core import episode
+from mfba_planner.core.options import override
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.ros import topics
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def check_bag(bag: Path, expected: episode.Episode) -> None:
+    """Every topic of the loop once per tick, and the core's decisions."""
+    recorded = read_episode(bag)
+    assert recorded.ticks == expected.ticks
+    assert (recorded.scenario, recorded.planner, recorded.seed) == (
+        expected.scenario,
+        expected.planner,
+        expected.seed,
+    )
+    with BagReader(bag) as reader:
+        assert reader.complete
+        counts = {name: topic.message_count for name, topic in reader.topics.items()}
+        configuration = read_configuration(reader)
+    for topic in topics.GRAPH:
+        if topic.every_tick:
+            assert counts[f"/{topic.name.lstrip('/')}"] == len(expected.ticks), topic.name
+    assert set(configuration["nodes"]) == {"world_sim", "virtual_sensor", "planner"}
+    assert configuration["run"]["driver"] == recorded.driver
+
+
+@pytest.mark.parametrize(("scenario", "algorithm"), [("case1", "mfba"), ("case2", "ba")])
+def test_multi_process_run_is_the_core_s(tmp_path: Path, scenario: str, algorithm: str) -> None:
+    done = complete("launcher", scenario, "--seed", "3", "--algorithm", algorithm, cwd=tmp_path)
+    assert (done.process.returncode, done.stderr) == (0, "")
+    run = tmp_path / "runs" / "run-001"
+    assert sorted(path.name for path in run.iterdir()) == [
+        "bag",
+        "log.txt",
+        "result.json",
+        "run.png",
+    ]
+    params = override(PlannerParams(), {"bat.algorithm": algorithm})
+    expected = episode.run(scenarios.load_scenario(scenario), planner=params, seed=3)
+    check_bag(run / "bag", expected)
+    assert (run / "run.png").read_bytes().startswith(PNG)
+    result = json.loads((run / "result.json").read_text())
+    assert result["result"]["success"] is True
+    assert result["result"]["ticks"] == len(expected.ticks)
+    assert result["driver"] == "multi-process"
+    assert result["extra"]["ticks_per_s"] > 0
+    assert f"{scenario}, {algorithm}, seed 3, multi-process driver" in done.stdout
+    assert "[world_sim] INFO: run over: goal_reached" in done.stdout
+    assert "[world_sim] INFO: run over: goal_reached" in (run / "log.txt").read_text()
+    assert "wrote runs/run-001: bag, log.txt, result.json, run.png" in done.stdout
+
+
+def test_in_process_run_is_the_core_s(tmp_path: Path) -> None:
+    done = complete(
+        "launcher", "--driver", "in-process", "--out", "a/b", "--no-picture", cwd=tmp_path
+    )
+    assert (done.process.returncode, done.stderr) == (0, "")
+    check_bag(tmp_path / "a/b/bag", episode.run(scenarios.load_scenario("case1")))
+    assert sorted(path.name for path in (tmp_path / "a/b").iterdir()) == ["bag", "result.json"]
+
+
+def test_core_run_leaves_result_and_picture(tmp_path: Path) -> None:
+    done = complete("launcher", "case2", "--driver", "core", cwd=tmp_path)
+    assert (done.process.returncode, done.stderr) == (0, "")
+    assert "wrote runs/run-001: result.json, run.png" in done.stdout
+    result = json.loads((tmp_path / "runs/run-001/result.json").read_text())
+    assert (result["driver"], result["result"]["success"]) == ("core", True)
+
+
+def test_real_time_run_reaches_the_goal(tmp_path: Path) -> None:
+    done = complete(
+        "launcher", "empty", "--speed", "4", "--no-picture", "--out", "run", cwd=tmp_path
+    )
+    assert (done.process.returncode, done.stderr) == (0, "")
+    assert "m to the goal, path generation" in done.stdout  # progress, without a terminal
+    recorded = read_episode(tmp_path / "run/bag")
+    assert recorded.outcome is episode.Outcome.GOAL_REACHED
+
+
+def test_node_arguments_reach_their_node(tmp_path: Path) -> None:
+    done = complete(
+        "launcher",
+        "empty",
+        "--no-picture",
+        "--planner-args=-p view_period_s:=7.5 --log-level debug",
+        "--out",
+        "run",
+        cwd=tmp_path,
+    )
+    assert done.process.returncode == 0, done.stderr
+    assert "[planner] DEBUG: " in done.stdout
+    with BagReader(tmp_path / "run/bag") as reader:
+        assert read_configuration(reader)["nodes"]["planner"]["view_period_s"] == 7.5
+
+
+def test_time_limit_is_no_success(tmp_path: Path) -> None:
+    world = tmp_path / "far.yaml"
+    world.write_text("name: far\nstart_m: [0.0, 0.0]\ngoal_m: [90.0, 0.0]\ntime_limit_s: 3.0\n")
+    done = complete("launcher", "far.yaml", "--no-picture", "--out", "run", cwd=tmp_path)
+    assert done.process.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "launcher: run: no success: 87.30 m left to the goal after 3.29 s" in done.stderr
+    result = json.loads((tmp_path / "run/result.json").read_text())
+    assert result["result"]["outcome"] == "time_limit"
