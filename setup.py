@@ -45,7 +45,7 @@ setup(
     # workspace brings its own, requirements-ros.txt the wheels.
     install_requires=[
         "matplotlib>=3.8",
-        "mcap>=1.2",
+        "mcap>=1.5",
         "mcap-ros2-support>=0.5.5",
         "numpy>=1.26,<3",
         "pydantic>=2,<3",

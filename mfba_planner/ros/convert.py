@@ -4,16 +4,16 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Sequence
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point as PointMsg
-from geometry_msgs.msg import Pose, PoseArray, PoseStamped, Quaternion, Twist, TwistStamped
+from geometry_msgs.msg import Pose, PoseArray, PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry, Path
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Header, MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
+from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
 from ..core.episode import Outcome
 from ..core.geometry import Point, Pose2D
@@ -21,37 +21,57 @@ from ..core.planner import Decision, Mode
 from ..core.sensing import Bits, Ranges, SensorParams, longest_range_m
 from ..messages import SECOND_NS, bits_text, points_text, rotated
 
+# Messages are made whole and then filled in: a value handed to a constructor is built twice, as
+# rclpy's message classes build the default as well.
+
+
+def set_stamp(stamp: Time, stamp_ns: int) -> None:
+    """Write integer nanoseconds into a builtin_interfaces/Time."""
+    stamp.sec, stamp.nanosec = divmod(stamp_ns, SECOND_NS)
+
 
 def time_msg(stamp_ns: int) -> Time:
     """Integer nanoseconds as builtin_interfaces/Time."""
-    return Time(sec=stamp_ns // SECOND_NS, nanosec=stamp_ns % SECOND_NS)
+    message = Time()
+    set_stamp(message, stamp_ns)
+    return message
 
 
-def header(stamp_ns: int, frame_id: str) -> Header:
-    """A header."""
-    return Header(stamp=time_msg(stamp_ns), frame_id=frame_id)
+def set_header(header: Header, stamp_ns: int, frame_id: str) -> Header:
+    """Fill in a header; return it."""
+    set_stamp(header.stamp, stamp_ns)
+    header.frame_id = frame_id
+    return header
 
 
-def clock_msg(stamp_ns: int) -> Clock:
-    """Simulated time."""
-    return Clock(clock=time_msg(stamp_ns))
+def set_pose(pose: Pose, x: float, y: float, yaw_rad: float = 0.0) -> Pose:
+    """Fill in a planar pose (REP-103); return it."""
+    pose.position.x, pose.position.y = x, y
+    if yaw_rad:  # the default is no turn at all
+        pose.orientation.z, pose.orientation.w = math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad)
+    return pose
 
 
 def pose_msg(x: float, y: float, yaw_rad: float = 0.0) -> Pose:
     """A planar pose (REP-103)."""
-    half = 0.5 * yaw_rad
-    return Pose(
-        position=PointMsg(x=x, y=y, z=0.0),
-        orientation=Quaternion(x=0.0, y=0.0, z=math.sin(half), w=math.cos(half)),
-    )
+    return set_pose(Pose(), x, y, yaw_rad)
+
+
+def clock_msg(stamp_ns: int) -> Clock:
+    """Simulated time."""
+    message = Clock()
+    set_stamp(message.clock, stamp_ns)
+    return message
 
 
 def odometry_msg(
     pose: Pose2D, velocity: Point, stamp_ns: int, frame_id: str, child_frame_id: str
 ) -> Odometry:
     """The robot's pose in frame_id; velocity (odom frame, m/s) is given in the body frame."""
-    message = Odometry(header=header(stamp_ns, frame_id), child_frame_id=child_frame_id)
-    message.pose.pose = pose_msg(pose.x, pose.y, pose.yaw)
+    message = Odometry()
+    set_header(message.header, stamp_ns, frame_id)
+    message.child_frame_id = child_frame_id
+    set_pose(message.pose.pose, *pose)
     linear = message.twist.twist.linear
     linear.x, linear.y = rotated(velocity, -pose.yaw)
     return message
@@ -59,7 +79,10 @@ def odometry_msg(
 
 def obstacles_msg(centers: Sequence[Point], stamp_ns: int, frame_id: str) -> PoseArray:
     """Obstacle centres, in scenario order."""
-    return PoseArray(header=header(stamp_ns, frame_id), poses=[pose_msg(x, y) for x, y in centers])
+    message = PoseArray()
+    set_header(message.header, stamp_ns, frame_id)
+    message.poses = [pose_msg(x, y) for x, y in centers]
+    return message
 
 
 def sectors_msg(
@@ -67,37 +90,40 @@ def sectors_msg(
 ) -> LaserScan:
     """One beam per sector, through its middle; inf is free; intensities are a(i) of eq. 11."""
     width = 2.0 * math.pi / len(ranges_m)
-    farthest = max(
-        [longest_range_m(params, robot_radius_m), *(r for r in ranges_m if math.isfinite(r))]
-    )
-    return LaserScan(
-        header=header(stamp_ns, frame_id),
-        angle_min=0.5 * width,
-        angle_max=2.0 * math.pi - 0.5 * width,
-        angle_increment=width,
-        range_min=0.0,
-        range_max=farthest,
-        ranges=ranges_m,
-        intensities=[1.0 if math.isfinite(r) else 0.0 for r in ranges_m],
-    )
+    finite = [r for r in ranges_m if math.isfinite(r)]
+    message = LaserScan()
+    set_header(message.header, stamp_ns, frame_id)
+    message.angle_min = 0.5 * width
+    message.angle_max = 2.0 * math.pi - 0.5 * width
+    message.angle_increment = width
+    message.range_max = max([longest_range_m(params, robot_radius_m), *finite])
+    message.ranges = array("f", ranges_m)
+    message.intensities = array("f", map(math.isfinite, ranges_m))
+    return message
 
 
 def sensory_vector_msg(vs: Bits) -> UInt8MultiArray:
     """Vs of eq. 11 for people, bags and plots."""
-    n = len(vs)
-    dimension = MultiArrayDimension(label="sector", size=n, stride=n)
-    return UInt8MultiArray(layout=MultiArrayLayout(dim=[dimension], data_offset=0), data=vs)
+    message = UInt8MultiArray()
+    message.layout.dim = [MultiArrayDimension(label="sector", size=len(vs), stride=len(vs))]
+    message.data = array("B", vs)
+    return message
 
 
 def pose_stamped_msg(point: Point, stamp_ns: int, frame_id: str) -> PoseStamped:
     """A goal or goal step."""
-    return PoseStamped(header=header(stamp_ns, frame_id), pose=pose_msg(*point))
+    message = PoseStamped()
+    set_header(message.header, stamp_ns, frame_id)
+    set_pose(message.pose, *point)
+    return message
 
 
 def path_msg(points: Sequence[Point], stamp_ns: int, frame_id: str) -> Path:
     """A polyline."""
-    poses = [pose_stamped_msg(point, stamp_ns, frame_id) for point in points]
-    return Path(header=header(stamp_ns, frame_id), poses=poses)
+    message = Path()
+    set_header(message.header, stamp_ns, frame_id)
+    message.poses = [pose_stamped_msg(point, stamp_ns, frame_id) for point in points]
+    return message
 
 
 def plan_msg(decision: Decision, frame_id: str) -> Path:
@@ -119,7 +145,9 @@ def twist_msg(decision: Decision) -> Twist:
 
 def twist_stamped_msg(decision: Decision, frame_id: str) -> TwistStamped:
     """The same with a stamp, as Nav2's enable_stamped_cmd_vel."""
-    return TwistStamped(header=header(decision.stamp_ns, frame_id), twist=twist_msg(decision))
+    message = TwistStamped(twist=twist_msg(decision))
+    set_header(message.header, decision.stamp_ns, frame_id)
+    return message
 
 
 _LEVELS = {
@@ -143,13 +171,12 @@ def decision_msg(decision: Decision, algorithm: str, refused: int, name: str) ->
         "algorithm": algorithm,
         "refused_inputs": str(refused),
     }
-    status = DiagnosticStatus(
-        level=_LEVELS.get(decision.mode, DiagnosticStatus.OK),
-        name=name,
-        message=decision.reason,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )
-    return DiagnosticArray(header=header(decision.stamp_ns, ""), status=[status])
+    status = DiagnosticStatus(level=_LEVELS.get(decision.mode, DiagnosticStatus.OK), name=name)
+    status.message = decision.reason
+    status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+    message = DiagnosticArray(status=[status])
+    set_stamp(message.header.stamp, decision.stamp_ns)
+    return message
 
 
 def outcome_msg(outcome: Outcome | None, ticks: int) -> DiagnosticStatus:

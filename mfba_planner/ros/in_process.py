@@ -39,8 +39,8 @@ def run_in_process(
 ) -> float:
     """Run the graph until goal or time limit; return the seconds the loop took.
 
-    bag names the directory to record into, None for no recording. on_turn sees the world after every turn of the executor and ends the run by returning
-    False. Raises GraphError when the graph does not get ready or not finished in time.
+    bag names the directory to record into, None for no recording. on_turn sees the world
+    after every turn of the executor and ends the run by returning False. Raises GraphError when the graph does not get ready or not finished in time.
     """
     context = Context()
     context.init(domain_id=domain_id)

@@ -10,13 +10,13 @@ from typing import Any
 from geometry_msgs.msg import Point as PointMsg
 from geometry_msgs.msg import Transform, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
-from std_msgs.msg import ColorRGBA
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ..core.episode import World
 from ..core.geometry import Point, towards
 from ..core.planner import NANO, Decision, Mode
-from .convert import header, pose_msg
+from .convert import pose_msg, set_header
 
 Rgba = tuple[float, float, float, float]
 
@@ -104,7 +104,7 @@ def tf_msg(odom: Odometry) -> Any:
 
 
 def _array(marks: list[Marker], stamp_ns: int, frame_id: str) -> MarkerArray:
-    head = header(stamp_ns, frame_id)
+    head = set_header(Header(), stamp_ns, frame_id)
     for mark in marks:
         mark.header = head
     return MarkerArray(markers=marks)
