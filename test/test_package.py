@@ -48,7 +48,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "report": ({"core", "paper", "report"}, {"matplotlib", "numpy", "rich"}),
     "ros": (
-        {"core", "messages", "outputs", "recording", "ros", "run_config", "scenarios"},
+        {"arguments", "core", "messages", "outputs", "recording", "ros", "run_config"}
+        | {"scenarios"},
         {"numpy"} | ROS,
     ),
     "launcher": ({"*"}, {"rich", "yaml"} | ROS),

@@ -53,7 +53,7 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
         executor = make_executor()
         executor.add_node(node)
         while not stop.is_set and not node.finished:
-            executor.spin_once(timeout_sec=SPIN_S)
+            node.turn(executor)
         node.drain(executor)
         return 0
     finally:
@@ -156,6 +156,10 @@ class GraphNode(Node):
 
     def drain(self, executor: Executor) -> None:
         """Take in what has been sent already; called once after a signal, before close."""
+
+    def turn(self, executor: Executor) -> None:
+        """One turn of the process's loop, SPIN_S long at most."""
+        executor.spin_once(timeout_sec=SPIN_S)
 
     def close(self) -> None:
         """Release what must not be lost; called once, before the node is destroyed."""

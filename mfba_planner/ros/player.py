@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What replay does between two turns of its executor: publish what is due."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator
+from enum import Enum, auto
+
+from rclpy.event_handler import PublisherEventCallbacks
+
+from ..core.errors import ConfigError, GraphError
+from ..recording.reader import BagReader
+from ..recording.timeline import UNKNOWN_DEPTH, Due, Schedule, begin_ns, due_messages
+from . import topics
+from .convert import clock_msg
+from .flow import FlowControl, all_acknowledged, windowed
+from .replay_args import ReplaySettings
+from .replay_topics import awaited, choose
+from .runtime import SPIN_S, GraphNode
+
+BURST = 50  # messages that may follow each other before services and signals are looked at
+POLL_S = 0.002  # between two looks at what others have to do
+LOOP_GAP_NS = 100_000_000  # between the last message and the first of the next round
+END_S = 5.0  # longest wait for acknowledgements; Fast DDS may ask for them after 3 s only
+
+
+class Phase(Enum):
+    """Where in its life a player is."""
+
+    WAITING = auto()
+    PLAYING = auto()
+    ENDING = auto()
+    OVER = auto()
+
+
+class Player:
+    """Plays one bag through publishers of a node."""
+
+    def __init__(self, node: GraphNode, settings: ReplaySettings) -> None:
+        """Raise ConfigError or BagError for what cannot be played."""
+        self.settings = settings
+        self.phase = Phase.WAITING
+        self.counts: Counter[str] = Counter()
+        self._node = node
+        self._bag = BagReader(settings.bag)
+        try:
+            self._prepare()
+        except BaseException:
+            self._bag.close()
+            raise
+
+    def _prepare(self) -> None:
+        s = self.settings
+        fast = s.as_fast_as_possible
+        found, left_out = choose(self._bag.topics, s, self._resolve)
+        self._start_ns = begin_ns(self._bag, s.start_offset)
+        self._awaited = awaited(found, s, self._resolve)
+        self._publishers = {
+            topic.recorded: self._node.create_publisher(
+                topic.type,
+                topic.name,
+                windowed(topic.qos) if fast else topic.qos,
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+            )
+            for topic in found
+        }
+        self._latched = {t.recorded: t.qos.depth or UNKNOWN_DEPTH for t in found if t.latched}
+        self._flow = FlowControl(self._node, self._publishers, s.wait_timeout) if fast else None
+        self._clock = self._node.advertise(topics.CLOCK) if s.clock else None
+        self._clock_due_ns = 0
+        self._clock_period_ns = round(1e9 / s.clock) if s.clock else 0
+        self._schedule = Schedule(None if fast else s.rate, self._start_ns, paused=s.start_paused)
+        self._since_ns = time.monotonic_ns()  # when the present phase began
+        self._began_ns = self._played_ns = 0
+        self._rewind()
+        for line in [*self._bag.problems, *left_out]:
+            self._node.get_logger().warning(line)
+
+    def _resolve(self, name: str) -> str:
+        try:
+            return str(self._node.resolve_topic_name(name, only_expand=True))
+        except RuntimeError as error:  # rcl's
+            raise ConfigError(
+                f"{name!r}: no topic name ({str(error).split(', at /')[0]}); give one like /odom"
+            ) from None
+
+    def close(self) -> None:
+        """Close the bag."""
+        self._bag.close()
+
+    def advance(self) -> float:
+        """Publish what is due; return the seconds until there is more to do.
+
+        Raises GraphError when others are missing or hang, BagError when the bag is damaged.
+        """
+        now = time.monotonic_ns()
+        wait_s = SPIN_S
+        if self.phase is Phase.WAITING:
+            wait_s = self._wait(now)
+        elif self.phase is Phase.PLAYING:
+            wait_s = self._play(now)
+        elif self.phase is Phase.ENDING:
+            wait_s = self._end(now)
+        return min(wait_s, self._tell_time(time.monotonic_ns()))
+
+    def pause(self) -> None:
+        """Let time stand still."""
+        if not self._schedule.paused:
+            self._schedule.pause(time.monotonic_ns())
+
+    def resume(self) -> None:
+        """Go on."""
+        self._schedule.resume(time.monotonic_ns())
+
+    def step(self) -> tuple[bool, str]:
+        """Publish exactly one message while paused: whether it was, and what or why not."""
+        due = self._next
+        if not self._schedule.paused:
+            return False, "refused: pause first"
+        if self.phase is not Phase.PLAYING or due is None:
+            return False, f"refused: {self.phase.name.lower()}"
+        self._publish(due)
+        return True, f"{due.topic} at {(due.time_ns - self._start_ns) / 1e9:.6f} s"
+
+    def _begin(self, phase: Phase, now: int) -> None:
+        self.phase, self._since_ns = phase, now
+
+    def _rewind(self) -> None:
+        self._messages: Iterator[Due] = due_messages(
+            self._bag, self._publishers.keys(), self._latched, self.settings.start_offset
+        )
+        self._next = next(self._messages, None)
+        self._told_ns = -1
+
+    def _wait(self, now: int) -> float:
+        """Until those are there who must not miss the first message."""
+        found = {t: p.get_subscription_count() for t, p in self._publishers.items()}
+        wanted = self._awaited
+        if wanted:
+            missing = [topic for topic, count in wanted.items() if found[topic] < count]
+        else:
+            missing = [] if wanted is None or any(found.values()) else list(found)
+        if not missing:
+            self._begin(Phase.PLAYING, now)
+            self._began_ns = now
+            self._schedule.start(now)
+            return 0.0
+        if now - self._since_ns > self.settings.wait_timeout * 1e9:
+            raise GraphError(
+                f"no subscriber on {', '.join(missing)} after {self.settings.wait_timeout:g} s; "
+                "start the reader or give a longer --wait-timeout"
+            )
+        return POLL_S
+
+    def _play(self, now: int) -> float:
+        for _ in range(BURST):
+            due = self._next
+            if due is None:
+                self._begin(Phase.ENDING, now)
+                return 0.0
+            wait_ns = self._schedule.wait_ns(due.time_ns, now)
+            if wait_ns is None:
+                return SPIN_S
+            if wait_ns > 0:
+                return wait_ns * 1e-9
+            if (
+                self._flow
+                and not self._flow.allows(due.topic)
+                and not self._flow.settle(now * 1e-9)
+            ):
+                return POLL_S
+            self._publish(due)
+            now = time.monotonic_ns()
+        return 0.0
+
+    def _publish(self, due: Due) -> None:
+        self._schedule.step_to(due.time_ns)
+        if self._schedule.by_steps and due.time_ns > self._told_ns:
+            self._tell(due.time_ns)
+        self._publishers[due.topic].publish(due.data)
+        self.counts[due.topic] += 1
+        if self._flow:
+            self._flow.sent(due.topic)
+        self._next = next(self._messages, None)
+        if self._next is None and self.settings.loop:
+            self._schedule.rewind(due.time_ns, self._start_ns, LOOP_GAP_NS)
+            self._rewind()
+
+    def _end(self, now: int) -> float:
+        """Until everything has arrived; then say what was played."""
+        self._played_ns = self._played_ns or now - self._began_ns
+        if self._flow and not self._flow.settle(now * 1e-9):
+            return POLL_S
+        late = [t for t, p in self._publishers.items() if not all_acknowledged(p)]
+        if late and now - self._since_ns < END_S * 1e9:
+            return 5.0 * POLL_S
+        logger = self._node.get_logger()
+        if late:
+            logger.warning(f"{', '.join(late)}: not acknowledged by all after {END_S:g} s")
+        counts = ", ".join(f"{topic} {count}" for topic, count in sorted(self.counts.items()))
+        seconds = self._played_ns * 1e-9
+        logger.info(f"played {self.counts.total()} messages in {seconds:.3f} s: {counts}")
+        self._begin(Phase.OVER, now)
+        return 0.0
+
+    def _tell_time(self, now: int) -> float:
+        """Publish /clock if it is due; seconds until the next. It never overtakes a message."""
+        if self._clock is None:
+            return SPIN_S
+        if now >= self._clock_due_ns:
+            self._clock_due_ns = max(self._clock_due_ns, now) + self._clock_period_ns
+            time_ns = max(self._start_ns, self._schedule.time_ns(now))
+            self._tell(min(time_ns, self._next.time_ns) if self._next else time_ns)
+        return (self._clock_due_ns - now) * 1e-9
+
+    def _tell(self, time_ns: int) -> None:
+        if self._clock is not None:
+            self._told_ns = time_ns
+            self._clock.publish(clock_msg(time_ns))

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""replay: publishes a bag again, with its timing or as fast as the readers can."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rclpy.executors import Executor
+from rclpy.utilities import remove_ros_args
+from std_srvs.srv import Trigger
+
+from .player import Phase, Player
+from .replay_args import ReplaySettings, parse
+from .runtime import SPIN_S, GraphNode, spin_node
+
+FINE_S = 0.0015  # an executor wakes up late: so long before a message is due it is left
+
+
+class Replay(GraphNode):
+    """The services around a Player."""
+
+    def __init__(self, settings: ReplaySettings, **kwargs: Any) -> None:
+        """Raise ConfigError or BagError for what cannot be played."""
+        super().__init__("replay", **kwargs)
+        self.player = Player(self, settings)
+        self._served_s = 0.0
+        self.create_service(Trigger, "~/pause", self._on_pause)
+        self.create_service(Trigger, "~/resume", self._on_resume)
+        self.create_service(Trigger, "~/step", self._on_step)
+
+    def turn(self, executor: Executor) -> None:
+        """Publish what is due, then serve until shortly before the next is."""
+        wait_s = self.advance()
+        if 0.0 < wait_s < FINE_S and time.monotonic() - self._served_s < SPIN_S:
+            time.sleep(wait_s)
+            return
+        executor.spin_once(timeout_sec=max(0.0, wait_s - FINE_S))
+        self._served_s = time.monotonic()
+
+    def advance(self) -> float:
+        """Publish what is due; return the seconds (SPIN_S at most) until there is more to do."""
+        wait_s = self.player.advance()
+        self.finished = self.player.phase is Phase.OVER
+        return min(wait_s, SPIN_S)
+
+    def _on_pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self.player.pause()
+        response.success, response.message = True, "paused"
+        return response
+
+    def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self.player.resume()
+        response.success, response.message = True, "running"
+        return response
+
+    def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = self.player.step()
+        return response
+
+    def close(self) -> None:
+        """Close the bag."""
+        self.player.close()
+
+
+def main(args: list[str]) -> int:
+    """Entry point."""
+    return spin_node(lambda: Replay(parse(remove_ros_args(args))), args)

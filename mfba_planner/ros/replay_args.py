@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What replay can be told on its command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from ..arguments import Parser
+from ..core.errors import ConfigError
+from ..core.options import check, did_you_mean, option, walk
+
+CLOCK_HZ = 40.0  # as `ros2 bag play --clock`
+
+_EPILOG = """\
+~/pause, ~/resume and ~/step (one message) are std_srvs/Trigger services.
+As fast as possible, at most 5 messages of a topic are on their way before all nodes that
+listen have acknowledged them and answered a call of their parameter service, which an executor
+serves only after the messages: nothing is lost in a reader whose history holds 10, and what is
+latched has been read before anything follows.
+With --loop the stamps go back at each new start: give --clock, and use_sim_time to the readers,
+so that they notice. With --clock the bag's own /clock is not played.
+--ros-args -r FROM:=TO and the like may follow.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplaySettings:
+    """Settings of replay; topic names as given, not resolved yet."""
+
+    bag: str
+    rate: float = option(1.0, "bag seconds per second", minimum=0.001, maximum=1_000_000.0)
+    loop: bool = option(False, "begin again at the end, until stopped")
+    start_offset: float = option(
+        0.0, "skip so much; latched topics are sent again", unit="s", minimum=0.0
+    )
+    clock: float = option(
+        0.0,
+        f"publish /clock so many times a second ({CLOCK_HZ:g} without a number); 0: not at all",
+        unit="Hz",
+        minimum=0.0,
+        maximum=1000.0,
+    )
+    start_paused: bool = option(False, "wait for ~/resume or ~/step")
+    as_fast_as_possible: bool = option(False, "as fast as the readers can, losing nothing")
+    wait_timeout: float = option(
+        10.0, "longest wait for subscribers, and for their answers", unit="s", minimum=0.0
+    )
+    topics: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    inputs_of: tuple[str, ...] = ()
+    remap: tuple[tuple[str, str], ...] = ()
+    # None: wait for nobody; (): see the help; otherwise one number, or topics
+    wait_for_subscribers: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range, or two that exclude each other."""
+        check(self)
+        if self.as_fast_as_possible and self.rate != 1.0:
+            raise ConfigError(
+                f"rate={self.rate:g} with --as-fast-as-possible: one excludes the other; "
+                "leave one out"
+            )
+
+
+def parse(args: list[str]) -> ReplaySettings:
+    """Settings from a command line without ROS arguments. Raises ConfigError."""
+    parser = Parser(
+        prog="replay",
+        description="Play a bag: a directory or a .mcap file, ours or rosbag2's.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument("bag", metavar="BAG", help="bag directory or .mcap file")
+    for name, default, item in walk(ReplaySettings(bag="")):
+        flag, spec = "--" + name.replace("_", "-"), item.metadata["spec"]
+        if isinstance(default, bool):
+            parser.add_argument(flag, action="store_true", help=spec.doc)
+            continue
+        may: dict[str, Any] = {"nargs": "?", "const": CLOCK_HZ} if name == "clock" else {}
+        shown = f"{spec.doc} (default {default:g})"
+        parser.add_argument(
+            flag, type=float, default=default, metavar=spec.unit.upper() or "R", help=shown, **may
+        )
+    _add_lists(parser)
+    given: dict[str, Any] = vars(parser.parse(args))
+    given["remap"] = [_rule(text) for text in given["remap"]]
+    for name, value in given.items():
+        given[name] = tuple(value) if isinstance(value, list) else value
+    return ReplaySettings(**given)
+
+
+def _add_lists(parser: Parser) -> None:
+    for flag, metavar, text in (
+        ("--topics", "TOPIC", "play only these"),
+        ("--exclude", "TOPIC", "do not play these"),
+        ("--inputs-of", "NODE", "play only what these nodes of the graph read from others"),
+        ("--remap", "FROM:=TO", "play topics under another name"),
+    ):
+        parser.add_argument(flag, nargs="+", default=[], metavar=metavar, help=text)
+    parser.add_argument(
+        "--wait-for-subscribers",
+        nargs="*",
+        metavar="N|TOPIC",
+        help="begin when each played topic has N subscribers, or each of these has one; without "
+        "a value when any has one, or with --inputs-of each (the default when as fast as "
+        "possible)",
+    )
+
+
+def _rule(text: str) -> tuple[str, str]:
+    old, separator, new = text.partition(":=")
+    if not (old and separator and new):
+        raise ConfigError(f"--remap {text}: not a rule; give FROM:=TO")
+    return old, new
+
+
+def known(names: Iterable[str], of: Iterable[str], what: str) -> list[str]:
+    """The names, each of which must be among `of`; ConfigError with the nearest otherwise."""
+    choice = sorted(of)
+    chosen = list(names)
+    for name in chosen:
+        if name not in choice:
+            raise ConfigError(f"{what} {name}: not there; {did_you_mean(name, choice)}")
+    return chosen

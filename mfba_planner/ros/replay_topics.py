@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which topics of a bag are played: under which name, with which installed type and QoS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from ..core.errors import ConfigError, InputError
+from ..recording.metadata import BagTopic
+from ..recording.schemas import definition_of
+from ..recording.timeline import offer
+from . import qos, topics
+from .replay_args import ReplaySettings, known
+
+Resolve = Callable[[str], str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlayedTopic:
+    """One topic of the bag and the publisher it gets."""
+
+    recorded: str
+    name: str
+    type: Any
+    qos: QoSProfile
+    message_count: int
+
+    @property
+    def latched(self) -> bool:
+        """Whether a late subscriber gets the newest messages too."""
+        return bool(self.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def choose(
+    recorded: Mapping[str, BagTopic], settings: ReplaySettings, resolve: Resolve
+) -> tuple[list[PlayedTopic], list[str]]:
+    """What is played, and a line for each topic left out because of its type.
+
+    Raises ConfigError for names that are not in the bag, and when nothing is left.
+    """
+    new_names = {
+        known([resolve(old)], recorded, "--remap")[0]: resolve(new) for old, new in settings.remap
+    }
+    played, left_out = [], []
+    for name in _selected(recorded, settings, resolve):
+        topic = recorded[name]
+        try:
+            kind = _installed(topic)
+        except InputError as error:
+            left_out.append(f"left out {name} ({topic.message_count} messages): {error}")
+            continue
+        played.append(
+            PlayedTopic(
+                recorded=name,
+                name=new_names.get(name, name),
+                type=kind,
+                qos=qos.profile(offer(topic.qos)),
+                message_count=topic.message_count,
+            )
+        )
+    if not sum(topic.message_count for topic in played):
+        raise ConfigError(
+            f"{settings.bag}: no message to play{''.join('; ' + line for line in left_out)}; "
+            f"topics there: {', '.join(sorted(recorded)) or 'none'}"
+        )
+    _refuse_clashes(played)
+    return played, left_out
+
+
+def _selected(
+    recorded: Mapping[str, BagTopic], settings: ReplaySettings, resolve: Resolve
+) -> Iterator[str]:
+    only = set(known(map(resolve, settings.topics), recorded, "--topics"))
+    if settings.inputs_of:
+        only |= {resolve(name) for name in _inputs(settings.inputs_of)}
+    never = set(known(map(resolve, settings.exclude), recorded, "--exclude"))
+    if settings.clock:
+        never.add(topics.CLOCK.name)
+    narrowed = settings.topics or settings.inputs_of
+    return (name for name in recorded if name not in never and (name in only or not narrowed))
+
+
+def _inputs(nodes: tuple[str, ...]) -> Iterator[str]:
+    """What the nodes read, without what one of them writes itself."""
+    readers = {name for topic in topics.GRAPH for name in topic.readers}
+    chosen = set(known(nodes, readers, "--inputs-of"))
+    for topic in topics.GRAPH:
+        if chosen.intersection(topic.readers) and not chosen.intersection(topic.writers):
+            yield topic.name
+
+
+def _installed(topic: BagTopic) -> Any:
+    """The message class. Raises InputError where it is missing, or not what was recorded."""
+    package, _, rest = topic.type_name.partition("/")
+    folder, _, name = rest.partition("/")
+    try:
+        kind = getattr(import_module(f"{package}.{folder}"), name)
+        kind.get_fields_and_field_types()
+    except (ImportError, AttributeError, ValueError):
+        raise InputError(f"{topic.type_name} is not installed") from None
+    try:
+        installed = definition_of(topic.type_name).type_hash
+    except InputError:
+        return kind  # no hash to compare with
+    if topic.type_hash.startswith("RIHS01_") and topic.type_hash != installed:
+        raise InputError(f"{topic.type_name} is another than the recorded one")
+    return kind
+
+
+def awaited(
+    played: list[PlayedTopic], settings: ReplaySettings, resolve: Resolve
+) -> dict[str, int] | None:
+    """Subscribers that each topic must have before the first message; {}: any topic has one.
+
+    None: nobody is waited for. Raises ConfigError for a topic that is not played.
+    """
+    given = settings.wait_for_subscribers
+    names = [topic.recorded for topic in played]
+    if given is None and not settings.as_fast_as_possible:
+        return None
+    if given and len(given) == 1 and given[0].isdecimal():
+        return dict.fromkeys(names, int(given[0]))
+    if given:
+        return dict.fromkeys(known(map(resolve, given), names, "--wait-for-subscribers"), 1)
+    return dict.fromkeys(names, 1) if settings.inputs_of else {}
+
+
+def _refuse_clashes(played: list[PlayedTopic]) -> None:
+    by_name: dict[str, PlayedTopic] = {}
+    for topic in played:
+        other = by_name.setdefault(topic.name, topic)
+        if other.type is not topic.type:
+            raise ConfigError(
+                f"--remap: {other.recorded} and {topic.recorded} would both be {topic.name}, but "
+                "their types differ; choose another name"
+            )
