@@ -67,7 +67,7 @@ def ray_circle_distance(distance_m: float, radius_m: float, offset_rad: float) -
     under_root = radius_m * radius_m - across * across
     if along <= 0.0 or under_root < 0.0:
         return math.inf
-    return along - math.sqrt(under_root)
+    return max(0.0, along - math.sqrt(under_root))  # rounding, just outside the circle
 
 
 def closest_approach(a0: Point, a1: Point, b0: Point, b1: Point) -> float:
