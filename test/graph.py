@@ -13,7 +13,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from mfba_planner.ros.runtime import GraphNode, make_executor
-from mfba_planner.ros.topics import TICK_QOS, Topic
+from mfba_planner.ros.topics import Topic
 
 N = TypeVar("N", bound=GraphNode)
 SETTLE_TURNS = 40  # delivery within a process is synchronous: two turns bring one message
@@ -62,15 +62,15 @@ class Graph:
         )
         return heard
 
-    def hear_in_order(self, *topics: Topic) -> list[tuple[str, Any]]:
-        """One list of (name, message) for several topics, in the order of arrival."""
-        heard: list[tuple[str, Any]] = []
+    def hear_when(self, *topics: Topic) -> list[tuple[int, str]]:
+        """A list of (time it was published, name) for the messages of several topics."""
+        heard: list[tuple[int, str]] = []
 
-        def note(name: str) -> Callable[[Any], None]:
-            return lambda message: heard.append((name, message))
+        def note(name: str) -> Any:
+            return lambda _, info: heard.append((info["source_timestamp"], name))
 
         for topic in topics:
-            self.probe.create_subscription(topic.type, topic.name, note(topic.name), TICK_QOS)
+            self.probe.create_subscription(topic.type, topic.name, note(topic.name), topic.qos)
         return heard
 
     def until(self, condition: Callable[[], bool], timeout_s: float = 10.0) -> None:

@@ -1,0 +1,439 @@
+# SPDX-License-Identifier: Apache-2.0
+"""planner: the core's decisions, once per stamp, and never a move on inputs that are not sound."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TwistStamped
+from graph import Graph
+from nav_msgs.msg import Odometry
+from rclpy.qos import qos_profile_sensor_data, qos_profile_system_default
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+
+from mfba_planner.core.bat import Algorithm
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.geometry import Pose2D, distance
+from mfba_planner.core.planner import (
+    NANO,
+    Decision,
+    Mode,
+    Observation,
+    Planner,
+    PlannerParams,
+    Swarm,
+)
+from mfba_planner.core.sensing import Ranges, SensorParams
+from mfba_planner.messages import decision as read_decision
+from mfba_planner.messages import stamp_ns
+from mfba_planner.ros import topics
+from mfba_planner.ros.convert import odometry_msg, pose_stamped_msg, sectors_msg, time_msg
+from mfba_planner.ros.planner import PlannerNode
+
+INF, NAN = math.inf, math.nan
+FREE: Ranges = (INF,) * 12
+NORTH_EAST = (0.5, *FREE[1:])  # sector 1 is set
+GOAL = (10.0, 5.0)
+LOCKSTEP = {"lockstep": True, "seed": 3}
+
+
+def odom(stamp: int, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Odometry:
+    return odometry_msg(Pose2D(x, y, yaw), (0.0, 0.0), stamp, "odom", "base_link")
+
+
+def sectors(stamp: int, ranges: Ranges = FREE) -> LaserScan:
+    return sectors_msg(ranges, SensorParams(sectors=len(ranges)), 0.3, stamp, "odom")
+
+
+def goal(x: float, y: float) -> PoseStamped:
+    return pose_stamped_msg((x, y), 1, "odom")
+
+
+class Talk:
+    """A planner, what it is given and what it answers."""
+
+    def __init__(
+        self, graph: Graph, parameters: dict[str, Any], at: tuple[float, float] | None = GOAL
+    ) -> None:
+        self.graph = graph
+        self.odom = graph.writer(topics.ODOM)
+        self.sectors = graph.writer(topics.SECTORS)
+        self.goal = graph.writer(topics.GOAL_POSE)
+        self.decisions = graph.hear(topics.DECISION)
+        self.plans = graph.hear(topics.PLAN)
+        self.steps = graph.hear(topics.GOAL_STEP)
+        stamped = parameters.get("enable_stamped_cmd_vel")
+        self.cmd_vel = graph.hear(topics.CMD_VEL, TwistStamped if stamped else None)
+        if at:
+            self.goal.publish(goal(*at))  # latched
+        self.node = graph.start(PlannerNode, parameters)
+        if at:
+            graph.until(lambda: self.node._goal is not None)
+
+    def answers(self, *messages: Any) -> list[Any]:
+        """Publish in this order and return the decisions that come of it."""
+        count = len(self.decisions)
+        writers = {Odometry: self.odom, LaserScan: self.sectors, PoseStamped: self.goal}
+        for message in messages:
+            writers[type(message)].publish(message)
+            if isinstance(message, PoseStamped):
+                self.graph.settle()
+        self.graph.settle()
+        assert len(self.cmd_vel) == len(self.decisions), "each decision has its Twist"
+        return self.decisions[count:]
+
+    def answer(self, *messages: Any) -> Any:
+        (only,) = self.answers(*messages)
+        return only
+
+    @property
+    def velocity(self) -> tuple[float, float]:
+        """The Twist of the last decision."""
+        twist = getattr(self.cmd_vel[-1], "twist", self.cmd_vel[-1])
+        return (twist.linear.x, twist.linear.y)
+
+
+def fields(message: Any) -> dict[str, str]:
+    (status,) = message.status
+    return {item.key: item.value for item in status.values} | {"reason": status.message}
+
+
+def mode(message: Any) -> Mode:
+    return Mode(fields(message)["mode"])
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        PlannerParams(),
+        PlannerParams(speed_mps=0.5, step_length_m=0.1, swarm=Swarm.PERSISTENT),
+    ],
+    ids=["section6", "persistent"],
+)
+def test_decisions_are_the_cores_and_travel_whole(graph: Graph, params: PlannerParams) -> None:
+    told = {"speed_mps": params.speed_mps, "step_length_m": params.step_length_m}
+    talk = Talk(graph, {**LOCKSTEP, **told, "swarm": params.swarm.value})
+    core = Planner(params, seed=3)
+    rng = np.random.default_rng(4)
+    modes = set()
+    for stamp in range(1, 61):
+        x, y, yaw = rng.uniform(-3.0, 3.0, 3).tolist()
+        seen = np.where(rng.random(12) < 0.16 * (stamp % 7), rng.uniform(0, 1, 12), INF)
+        ranges = tuple(seen.astype(np.float32).tolist())
+        pair = [odom(stamp, x, y, yaw), sectors(stamp, ranges)]
+        message = talk.answer(*(pair if stamp % 2 else reversed(pair)))
+        answer = read_decision(message, ranges)
+        expected = core.decide(
+            Observation(stamp_ns=stamp, pose=answer.pose, ranges_m=ranges, goal=GOAL, now_ns=stamp)
+        )
+        assert answer == expected
+        assert answer.pose == pytest.approx(Pose2D(x, y, yaw), abs=1e-12)
+        modes.add(answer.mode)
+        check_the_rest(talk, answer)
+    assert modes == {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE, Mode.BLOCKED}
+
+
+def check_the_rest(talk: Talk, answer: Decision) -> None:
+    """Plan, goal step and Twist say the same as the decision, under the same stamp."""
+    plan, step = talk.plans[-1], talk.steps[-1]
+    assert stamp_ns(plan.header.stamp) == stamp_ns(step.header.stamp) == answer.stamp_ns
+    assert plan.header.frame_id == step.header.frame_id == "odom"
+    corners = [(p.pose.position.x, p.pose.position.y) for p in plan.poses]
+    assert corners[0] == answer.pose.position
+    assert corners[-1] == answer.goal
+    assert answer.waypoint in corners
+    assert (step.pose.position.x, step.pose.position.y) == answer.waypoint
+    # The Twist is in the body frame: turned by the yaw it is the way to the goal step.
+    vx, vy = talk.velocity
+    c, s = math.cos(answer.pose.yaw), math.sin(answer.pose.yaw)
+    dt = talk.node.brain.params.tick_ns * NANO
+    there = (
+        answer.pose.x + dt * (c * vx - s * vy),
+        answer.pose.y + dt * (s * vx + c * vy),
+    )
+    assert there == pytest.approx(answer.waypoint, abs=1e-9)
+
+
+def test_a_robot_that_looks_north_drives_east_by_moving_to_its_right(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP, at=(10.0, 0.0))
+    talk.answer(odom(1, yaw=math.pi / 2), sectors(1))
+    vx, vy = talk.velocity
+    assert vy < -0.5
+    assert abs(vx) < 0.3
+
+
+def test_cmd_vel_comes_last_as_the_world_waits_for_it(graph: Graph) -> None:
+    heard = graph.hear_when(topics.GOAL_STEP, topics.PLAN, topics.DECISION, topics.CMD_VEL)
+    talk = Talk(graph, LOCKSTEP)
+    for stamp in range(1, 6):
+        talk.answer(odom(stamp), sectors(stamp))
+    order = [name for _, name in sorted(heard)]
+    assert order == ["goal_step", "plan", "planner/decision", "cmd_vel"] * 5
+
+
+def test_each_pair_is_answered_once(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    assert not talk.answers(odom(1), odom(2))
+    assert stamp_ns(talk.answer(sectors(2)).header.stamp) == 2
+    for late in (sectors(2), odom(2), sectors(1), odom(1)):
+        assert not talk.answers(late)
+    after = talk.answer(sectors(3), odom(3))
+    assert fields(after)["refused_inputs"] == "4"
+
+
+def odom_with(stamp: int, position: Point | None = None, q: Quaternion | None = None) -> Odometry:
+    message = odom(stamp)
+    message.pose.pose.position = position or Point()
+    message.pose.pose.orientation = q or Quaternion()
+    return message
+
+
+@pytest.mark.parametrize("bad", [NAN, INF, -INF])
+def test_it_stops_on_inputs_that_are_not_sound_and_counts_them(graph: Graph, bad: float) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    assert mode(talk.answer(odom(1, 1.0, 1.0), sectors(1))) is Mode.PATH_GENERATION
+    assert talk.velocity != (0.0, 0.0)
+    given = [
+        (odom_with(2, Point(x=bad)), sectors(2), "refused input: odom position holds"),
+        (odom_with(3, Point(y=bad)), sectors(3), "refused input: odom position holds"),
+        (odom_with(4, q=Quaternion(z=bad)), sectors(4), "refused input: odom orientation holds"),
+        (odom_with(5, q=Quaternion(w=0.0)), sectors(5), "refused input: odom orientation has"),
+        (odom(6), sectors(6, (NAN,) * 12), "refused input: sector 1 holds nan"),
+        (odom(7), sectors(7, (*FREE[:11], NAN)), "refused input: sector 12 holds nan"),
+        (odom(8), sectors(8, (-1.0, *FREE[1:])), "refused input: sector 1 holds -1.0"),
+        (odom(9), LaserScan(header=sectors(9).header, ranges=[INF, INF]), "refused input: sect"),
+    ]
+    for count, (pose, seen, reason) in enumerate(given, start=1):
+        answer = talk.answer(pose, seen)
+        assert mode(answer) is Mode.STOPPED
+        assert fields(answer)["reason"].startswith(reason)
+        assert fields(answer)["refused_inputs"] == str(count)
+        assert talk.velocity == (0.0, 0.0)
+        assert answer.status[0].level == b"\x02"
+    assert mode(talk.answer(odom(10), sectors(10))) is Mode.PATH_GENERATION
+
+
+def test_a_refused_pose_does_not_move_where_the_robot_is_said_to_be(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    talk.answer(odom(1, 1.0, 2.0), sectors(1))
+    answer = read_decision(talk.answer(odom(2, NAN), sectors(2)), FREE)
+    assert answer.pose == Pose2D(1.0, 2.0, 0.0)
+    assert answer.waypoint == (1.0, 2.0)
+
+
+@pytest.mark.parametrize("bad", [NAN, INF])
+def test_a_goal_that_is_not_finite_is_no_goal(graph: Graph, bad: float) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    talk.answer(odom(1), sectors(1))
+    idle = talk.answer(goal(bad, 1.0), odom(2), sectors(2))
+    assert mode(idle) is Mode.IDLE
+    assert fields(idle)["refused_inputs"] == "1"
+    assert talk.velocity == (0.0, 0.0)
+    assert mode(talk.answer(goal(*GOAL), odom(3), sectors(3))) is Mode.PATH_GENERATION
+
+
+def test_without_a_goal_it_is_idle(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP, at=None)
+    answer = talk.answer(odom(1), sectors(1, NORTH_EAST))
+    assert (mode(answer), fields(answer)["reason"]) == (Mode.IDLE, "no goal given")
+    assert talk.velocity == (0.0, 0.0)
+
+
+def test_the_goals_orientation_is_not_used(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP, at=None)
+    place = Pose(position=Point(x=3.0), orientation=Quaternion(w=NAN))
+    answer = talk.answer(PoseStamped(pose=place), odom(1), sectors(1))
+    assert mode(answer) is Mode.PATH_GENERATION
+
+
+def test_a_new_goal_counts_at_once_even_after_arrival(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP, at=(1.0, 0.0))
+    assert mode(talk.answer(odom(1, 1.0, 0.0), sectors(1))) is Mode.ARRIVED
+    assert mode(talk.answer(odom(2, 5.0, 0.0), sectors(2))) is Mode.ARRIVED, "the trip is over"
+    answer = read_decision(talk.answer(goal(-4.0, 0.0), odom(3, 5.0), sectors(3)), FREE)
+    assert (answer.mode, answer.goal) == (Mode.PATH_GENERATION, (-4.0, 0.0))
+    assert distance(answer.waypoint, (-4.0, 0.0)) < 9.0
+
+
+@pytest.mark.parametrize(
+    "qos",
+    [topics.LATCHED_QOS, topics.VIEW_QOS, qos_profile_system_default],
+    ids=["latched", "rviz", "default"],
+)
+def test_goals_are_heard_once_from_latched_and_from_rviz_like_writers(
+    graph: Graph, qos: Any
+) -> None:
+    talk = Talk(graph, LOCKSTEP, at=None)
+    talk.goal = graph.writer(topics.GOAL_POSE, qos=qos)
+    answer = talk.answer(goal(NAN, 0.0), goal(2.0, 2.0), odom(1), sectors(1))
+    assert fields(answer)["goal"] == "2.0,2.0"
+    assert fields(answer)["refused_inputs"] == "1", "the bad one came once, not twice"
+
+
+REAL_TIME = {"input_timeout_s": 0.3, "seed": 3}
+
+
+def test_real_time_answers_each_sectors_with_the_newest_odom(graph: Graph) -> None:
+    talk = Talk(graph, {**REAL_TIME, "input_timeout_s": 60.0})
+    blind = talk.answer(sectors(1))
+    assert (mode(blind), fields(blind)["reason"]) == (Mode.STOPPED, "refused input: no odom yet")
+    assert not talk.answers(odom(90, 1.0), odom(91, 2.0, 2.0))
+    for stamp in (2, 3):
+        answer = talk.answer(sectors(stamp, NORTH_EAST))
+        assert stamp_ns(answer.header.stamp) == stamp
+        assert fields(answer)["pose"] == "2.0,2.0,0.0"
+    assert not talk.answers(sectors(3)), "a repeated stamp"
+    assert not talk.answers(sectors(2)), "a stamp that goes back"
+    assert not talk.answers(odom(5, 7.0, 7.0)), "an old pose is not taken"
+    answer = talk.answer(sectors(4))
+    assert fields(answer)["pose"] == "2.0,2.0,0.0"
+    assert fields(answer)["refused_inputs"] == "3"
+
+
+def test_real_time_hears_odom_of_best_effort_writers(graph: Graph) -> None:
+    talk = Talk(graph, {**REAL_TIME, "input_timeout_s": 60.0})
+    talk.odom = graph.writer(topics.ODOM, qos=qos_profile_sensor_data)
+    assert mode(talk.answer(odom(1), sectors(1))) is Mode.PATH_GENERATION
+
+
+def test_real_time_stops_when_nothing_comes_any_more(graph: Graph) -> None:
+    talk = Talk(graph, REAL_TIME)
+    talk.answers(odom(1))
+    assert mode(talk.answers(sectors(1))[0]) is Mode.PATH_GENERATION
+    assert talk.velocity != (0.0, 0.0)
+    graph.until(lambda: mode(talk.decisions[-1]) is Mode.STOPPED)
+    assert fields(talk.decisions[-1])["reason"].startswith("input is 0.")
+    graph.until(lambda: talk.velocity == (0.0, 0.0))
+    count = len(talk.decisions)
+    graph.until(lambda: len(talk.decisions) > count + 2)  # again and again: Twists may be lost
+    assert {mode(message) for message in talk.decisions[count:]} == {Mode.STOPPED}
+    assert mode(talk.answers(odom(2), sectors(2))[-1]) is Mode.PATH_GENERATION
+
+
+def test_real_time_stops_when_only_odom_is_old(graph: Graph) -> None:
+    talk = Talk(graph, REAL_TIME)
+    talk.answers(odom(1))
+    stamp = 0
+
+    def stopped() -> bool:
+        nonlocal stamp
+        stamp += 1
+        talk.sectors.publish(sectors(stamp))
+        return bool(talk.decisions) and mode(talk.decisions[-1]) is Mode.STOPPED
+
+    graph.until(stopped)
+    assert "s old" in fields(talk.decisions[-1])["reason"]
+    assert stamp_ns(talk.decisions[-1].header.stamp) > 1
+
+
+def test_before_any_sectors_it_says_nothing(graph: Graph) -> None:
+    talk = Talk(graph, {**REAL_TIME, "input_timeout_s": 0.01})
+    talk.answers(odom(1))
+    seen = graph.hear(topics.CLOCK)
+    ticks = iter(range(1, 10**6))
+    clock = graph.writer(topics.CLOCK)
+
+    def later() -> bool:
+        clock.publish(Clock(clock=time_msg(next(ticks))))
+        return len(seen) > 100
+
+    graph.until(later)
+    assert not talk.cmd_vel
+
+
+@pytest.mark.parametrize("parameters", [LOCKSTEP, {**REAL_TIME, "input_timeout_s": 60.0}])
+def test_it_starts_afresh_when_time_is_set_back(graph: Graph, parameters: dict[str, Any]) -> None:
+    talk = Talk(graph, {**parameters, "use_sim_time": True}, at=(1.0, 0.0))
+    clock = graph.writer(topics.CLOCK)
+
+    def set_time(stamp: int) -> None:
+        clock.publish(Clock(clock=time_msg(stamp)))
+        graph.until(lambda: talk.node.get_clock().now().nanoseconds == stamp)
+
+    set_time(100)
+    assert mode(talk.answer(odom(100, 1.0), sectors(100))) is Mode.ARRIVED
+    assert not talk.answers(odom(5), sectors(5))
+    set_time(5)
+    answer = talk.answer(odom(6), sectors(6))
+    assert mode(answer) is Mode.PATH_GENERATION, "arrival is forgotten, the goal is not"
+    set_time(7)  # forward: nothing happens
+    assert not talk.answers(sectors(6))
+
+
+def test_stamped_twists_where_they_are_asked_for(graph: Graph) -> None:
+    talk = Talk(graph, {**LOCKSTEP, "enable_stamped_cmd_vel": True, "base_frame": "base"})
+    talk.answer(odom(7), sectors(7))
+    (message,) = talk.cmd_vel
+    assert stamp_ns(message.header.stamp) == 7
+    assert message.header.frame_id == "base"
+    assert talk.velocity != (0.0, 0.0)
+
+
+def test_speed_and_algorithm_can_be_set_while_it_runs(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    slow = math.hypot(*(talk.answer(odom(1), sectors(1)) and talk.velocity))
+    assert graph.set_parameter("planner", "speed_mps", 1.64) == ""
+    assert graph.set_parameter("planner", "bat.algorithm", "ba") == ""
+    assert talk.node.brain.params.bat.algorithm is Algorithm.BA
+    answer = talk.answer(odom(2), sectors(2))
+    assert fields(answer)["algorithm"] == "ba"
+    assert math.hypot(*talk.velocity) == pytest.approx(2.0 * slow, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("speed_mps", 0.0, "Parameter speed_mps out of range Min: 0.01, Max: 100.0, value: 0.0"),
+        ("speed_mps", NAN, "out of range"),
+        ("speed_mps", 1, "Wrong parameter type, expected 'Type.DOUBLE' got 'Type.INTEGER'"),
+        ("bat.population", 1, "Parameter bat.population out of range. Min: 2, Max: 10000"),
+        ("bat.algorithm", "bee", "algorithm='bee': unknown; choose one of ba, mfba"),
+        ("bat.f_min", 11.0, "f_min=11: above f_max=10; give f_min <= f_max"),
+        ("seed", 4, "Trying to set a read-only parameter: seed."),
+        ("lockstep", False, "Trying to set a read-only parameter: lockstep."),
+        ("sped_mps", 1.0, "Invalid access to undeclared parameter"),
+    ],
+)
+def test_what_cannot_be_set_is_refused_with_the_reason(
+    graph: Graph, name: str, value: Any, reason: str
+) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    before = talk.node.brain.params
+    assert reason in graph.set_parameter("planner", name, value)
+    assert talk.node.brain.params is before
+
+
+@pytest.mark.parametrize(
+    ("parameters", "line"),
+    [
+        ({"bat.population": 1}, r"^population=1: out of range; give a value in \[2, 10000\]"),
+        ({"speed_mps": -1.0}, r"^speed_mps=-1.0: out of range"),
+        ({"speed_mps": NAN}, r"^speed_mps=nan: "),
+        ({"speed_mps": 1}, r"^parameter speed_mps=1: wrong type; give a float \(write 1.0, not"),
+        ({"bat.algorithm": "bee"}, r"^algorithm='bee': unknown; choose one of ba, mfba"),
+        ({"bat.f_min": 11.0}, r"^f_min=11: above f_max=10; give f_min <= f_max"),
+        ({"seed": -1}, r"^seed=-1: out of range"),
+    ],
+)
+def test_parameters_are_judged_at_the_door(
+    graph: Graph, parameters: dict[str, Any], line: str
+) -> None:
+    with pytest.raises(ConfigError, match=line):
+        graph.start(PlannerNode, parameters)
+
+
+def test_markers_show_where_the_goal_step_leads(graph: Graph) -> None:
+    marks = graph.hear(topics.MARKERS)
+    talk = Talk(graph, {**LOCKSTEP, "view_period_s": 2e-9})
+    for stamp in range(1, 6):
+        talk.answer(odom(stamp), sectors(stamp, NORTH_EAST if stamp > 3 else FREE))
+    graph.settle()
+    assert [stamp_ns(message.markers[0].header.stamp) for message in marks] == [1, 3, 5]
+    by_name = {mark.ns: mark for mark in marks[0].markers}
+    assert len(by_name["candidates"].points) == PlannerParams().bat.population
+    assert by_name["sectors"].action == by_name["sectors"].DELETE, "nothing is lit"
+    lit = {mark.ns: mark for mark in marks[-1].markers}
+    assert len(lit["sectors"].points) == 6
+    assert lit["candidates"].action == lit["candidates"].DELETE
