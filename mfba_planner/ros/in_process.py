@@ -40,7 +40,8 @@ def run_in_process(
     """Run the graph until goal or time limit; return the seconds the loop took.
 
     bag names the directory to record into, None for no recording. on_turn sees the world
-    after every turn of the executor and ends the run by returning False. Raises GraphError when the graph does not get ready or not finished in time.
+    after every turn of the executor and ends the run by returning False. Raises GraphError
+    when the graph does not get ready or does not finish in time.
     """
     context = Context()
     context.init(domain_id=domain_id)
@@ -88,6 +89,7 @@ def run_in_process(
             lambda: f"tick {world.world.tick} after {timeout_s:g} s",
         )
         took_s = time.perf_counter() - started
+        world.pace.paused = True  # so that the present tick is answered and no other follows
         for _ in range(DRAIN_TURNS):
             executor.spin_once(timeout_sec=0.0)
         return took_s

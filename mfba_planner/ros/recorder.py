@@ -30,6 +30,8 @@ from .settings import RecorderSettings, names
 from .survey import Found, ParameterSurvey
 
 QUIET_S = 0.2  # on one machine a message takes a hundredth of that, unless it is overloaded
+LIVE_S = 1.0  # from then on, IDLE_TURNS without a message are enough (one may be a timer's)
+IDLE_TURNS = 5
 DRAIN_S = 10.0
 
 
@@ -113,13 +115,19 @@ class Recorder(GraphNode):
         return f"parameters of {absent} not read yet" if absent else ""
 
     def drain(self, executor: Executor) -> None:
-        """Record on until nothing has come for a while: senders may be far ahead."""
-        count, heard = self.writer.message_count, time.monotonic()
-        deadline = heard + DRAIN_S
-        while time.monotonic() < min(heard + QUIET_S, deadline):
-            executor.spin_once(timeout_sec=QUIET_S)
+        """Record on until nothing has come for a while: senders may be far ahead.
+
+        Where they never end, as on a live robot, until what was waiting is written.
+        """
+        started = heard = time.monotonic()
+        count, idle = self.writer.message_count, 0
+        while idle < IDLE_TURNS and (now := time.monotonic()) < min(
+            heard + QUIET_S, started + DRAIN_S
+        ):
+            executor.spin_once(timeout_sec=QUIET_S if now < started + LIVE_S else 0.0)
+            idle += now >= started + LIVE_S
             if self.writer.message_count != count:
-                count, heard = self.writer.message_count, time.monotonic()
+                count, idle, heard = self.writer.message_count, 0, time.monotonic()
 
     def close(self) -> None:
         """Write what is held and finish the bag."""

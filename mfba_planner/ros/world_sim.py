@@ -34,7 +34,7 @@ class WorldSim(GraphNode):
         params.state(self, "scenario_json", scenario_to_json(self.scenario), "scenario in full")
         self.over = False
         self._ticks_before_reset = 0
-        self._pace = Pace(s)
+        self.pace = Pace(s)
         self._refusals = Refusals(self)
         self._out = WorldTopics(self, s)
         stamped = TwistStamped if s.enable_stamped_cmd_vel else None
@@ -57,9 +57,9 @@ class WorldSim(GraphNode):
 
     def resume(self) -> None:
         """Go on from a pause; nothing when not paused."""
-        if self._pace.paused:
-            self._pace.paused = False
-            if self._pace.may_move_on():
+        if self.pace.paused:
+            self.pace.paused = False
+            if self.pace.may_move_on():
                 self._move_on()
 
     def _begin(self) -> None:
@@ -84,25 +84,25 @@ class WorldSim(GraphNode):
 
     def _publish_tick(self) -> None:
         self._published = True
-        self._pace.published(time.monotonic())
+        self.pace.published(time.monotonic())
         self._out.tick(self.world, self._velocity, self.stamp_ns)
 
     def _on_timer(self) -> None:
         """Real time: one more tick."""
-        if not self._pace.paused and not self.over:
+        if not self.pace.paused and not self.over:
             self._move_on()
 
     def _watch(self) -> None:
         """Lockstep: begin when somebody is there; publish an unanswered tick again."""
         if not self._published:
-            if self._pace.may_move_on() and self.count_subscribers(topics.ODOM.name):
+            if self.pace.may_move_on() and self.count_subscribers(topics.ODOM.name):
                 self._publish_tick()
-        elif self._pace.must_repeat(time.monotonic(), self.world.tick):
+        elif self.pace.must_repeat(time.monotonic(), self.world.tick):
             self.get_logger().warning(f"tick {self.world.tick} unanswered: published again")
             self._out.tick(self.world, self._velocity, self.stamp_ns)
 
     def _on_cmd_vel(self, message: Any) -> None:
-        if not self._pace.take_answer():
+        if not self.pace.take_answer():
             return
         try:
             vx, vy, _ = velocity(message)
@@ -110,7 +110,7 @@ class WorldSim(GraphNode):
         except InputError as error:
             self._refusals.add(error)
             self._velocity = (0.0, 0.0)
-        if self._pace.may_move_on():
+        if self.pace.may_move_on():
             self._move_on()
 
     def _on_initialpose(self, message: PoseWithCovarianceStamped) -> None:
@@ -121,7 +121,7 @@ class WorldSim(GraphNode):
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if request.data:
-            self._pace.paused = True
+            self.pace.paused = True
         else:
             self.resume()
         response.success, response.message = True, "paused" if request.data else "running"
@@ -129,7 +129,7 @@ class WorldSim(GraphNode):
 
     def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         refusal = (
-            "refused: the run is over; reset first" if self.over else self._pace.cannot_step()
+            "refused: the run is over; reset first" if self.over else self.pace.cannot_step()
         )
         if not refusal:
             self._move_on()
@@ -138,9 +138,9 @@ class WorldSim(GraphNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._ticks_before_reset += self.world.tick + 1
-        self._pace.reset()
+        self.pace.reset()
         self._begin()
-        if self._pace.may_move_on():
+        if self.pace.may_move_on():
             self._publish_tick()
         response.success, response.message = True, f"tick 0 at stamp {self.stamp_ns} ns"
         return response

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The whole graph in one process takes the core's decisions, tick by tick."""
+
+from pathlib import Path
+
+import pytest
+from graph import Graph
+
+from mfba_planner.core import episode
+from mfba_planner.core.episode import Outcome, World
+from mfba_planner.core.errors import GraphError
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.options import override
+from mfba_planner.core.planner import Mode, PlannerParams
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.messages import stamp_ns
+from mfba_planner.paper import readings
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.ros import topics
+from mfba_planner.ros.in_process import run_in_process
+from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.ros.virtual_sensor import VirtualSensor
+from mfba_planner.ros.world_sim import WorldSim
+from mfba_planner.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios import load_scenario
+
+
+def config(
+    scenario: str, planner: PlannerParams, seed: int, sensor: SensorParams | None = None
+) -> RunConfig:
+    return RunConfig(
+        scenario=load_scenario(scenario),
+        planner=planner,
+        sensor=sensor or SensorParams(),
+        seed=seed,
+        driver=Driver.IN_PROCESS,
+    )
+
+
+def run_and_compare(told: RunConfig, bag: Path, domain_id: int) -> episode.Episode:
+    """Run the graph, read its bag back and hold it against the core's run."""
+    run_in_process(told, bag, domain_id=domain_id)
+    recorded = read_episode(bag)
+    expected = episode.run(told.scenario, planner=told.planner, sensor=told.sensor, seed=told.seed)
+    assert recorded.ticks == expected.ticks
+    assert recorded.outcome is expected.outcome
+    assert (recorded.scenario, recorded.sensor, recorded.planner, recorded.seed) == (
+        expected.scenario,
+        expected.sensor,
+        expected.planner,
+        expected.seed,
+    )
+    assert recorded.driver == "in-process"
+    return recorded
+
+
+@pytest.mark.parametrize("algorithm", ["mfba", "ba"])
+@pytest.mark.parametrize("scenario", ["case1", "case2"])
+def test_both_case_studies_with_both_algorithms(
+    scenario: str, algorithm: str, tmp_path: Path, domain_id: int
+) -> None:
+    planner = override(PlannerParams(), {"bat.algorithm": algorithm})
+    paths = set()
+    for seed in range(5):
+        bag = tmp_path / f"seed{seed}"
+        recorded = run_and_compare(config(scenario, planner, seed), bag, domain_id)
+        result = evaluate(recorded)
+        assert result.success, f"seed {seed}: {result}"
+        paths.add(recorded.ticks)
+    assert len(paths) == 5, "the seed does nothing"
+
+
+@pytest.mark.parametrize("scenario", ["walled", "empty"])
+def test_other_worlds(scenario: str, tmp_path: Path, domain_id: int) -> None:
+    recorded = run_and_compare(config(scenario, PlannerParams(), 1), tmp_path / "bag", domain_id)
+    assert recorded.outcome is Outcome.GOAL_REACHED
+
+
+def test_the_persistent_swarm_of_fig_1(tmp_path: Path, domain_id: int) -> None:
+    told = config("case2", readings.planner("fig1"), 2)
+    recorded = run_and_compare(told, tmp_path / "bag", domain_id)
+    assert recorded.outcome is Outcome.GOAL_REACHED
+
+
+def test_another_ring_of_sensors(tmp_path: Path, domain_id: int) -> None:
+    sensor = SensorParams(sectors=36, sensing_range_m=1.5)
+    told = config("case2", PlannerParams(), 4, sensor)
+    recorded = run_and_compare(told, tmp_path / "bag", domain_id)
+    assert len(recorded.ticks[0].vs) == 36
+
+
+def test_a_run_can_be_ended_early(tmp_path: Path, domain_id: int) -> None:
+    def first_ten(world: World) -> bool:
+        return world.tick < 10
+
+    told = config("case1", PlannerParams(), 0)
+    run_in_process(told, tmp_path / "bag", domain_id=domain_id, on_turn=first_ten)
+    recorded = read_episode(tmp_path / "bag")
+    assert recorded.outcome is Outcome.INTERRUPTED
+    count = len(recorded.ticks)
+    assert 10 <= count < 30
+    assert recorded.ticks == episode.run(told.scenario).ticks[:count]
+
+
+def test_a_run_that_takes_too_long_is_a_clear_error(tmp_path: Path, domain_id: int) -> None:
+    told = config("case1", PlannerParams(), 0)
+    with pytest.raises(GraphError, match=r"^the graph is stuck: tick \d+ after 0 s"):
+        run_in_process(told, tmp_path / "bag", domain_id=domain_id, timeout_s=0.0)
+    assert (tmp_path / "bag" / "metadata.yaml").exists(), "the bag is closed all the same"
+
+
+def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph) -> None:
+    told = node_parameters(config("case2", PlannerParams(), 7), peers=())
+    decisions = graph.hear(topics.DECISION)
+    world = graph.start(
+        WorldSim, {**told["world_sim"], "answer_timeout_s": 0.2, "answer_retries": 1000}
+    )
+    graph.start(VirtualSensor, told["virtual_sensor"])
+    first = graph.start(PlannerNode, told["planner"])
+    graph.until(lambda: first._goal is not None)
+    world.resume()
+    graph.until(lambda: world.world.tick > 20)
+    graph.stop(first)
+    graph.settle()
+    left_at = world.world.tick
+    second = graph.start(PlannerNode, told["planner"])
+    graph.until(lambda: world.over, timeout_s=60.0)
+    graph.settle()
+    assert second._refusals.count == 0
+    expected = episode.run(load_scenario("case2"), seed=7).ticks
+    fields = [{v.key: v.value for v in message.status[0].values} for message in decisions]
+    assert left_at < len(expected) - 5, "it was restarted too late to say anything"
+    assert [stamp_ns(message.header.stamp) for message in decisions] == [
+        tick.stamp_ns for tick in expected
+    ]
+    assert [(f["waypoint"], Mode(f["mode"])) for f in fields] == [
+        ("{!r},{!r}".format(*tick.waypoint), tick.mode) for tick in expected
+    ]
