@@ -80,6 +80,7 @@ def turn(names: tuple[str, ...], steps: int) -> float:
         print("up", flush=True)
         while first.count_subscribers("odom") < 1 or first.count_publishers("cmd_vel") < 1:
             executor.spin_once(timeout_sec=0.01)
+    if names == ("world",):
         sys.stdin.readline()
     started = time.perf_counter()
     made[0][1]()
