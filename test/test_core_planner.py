@@ -1,0 +1,491 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Algorithm 1: the table of modes, every event's decision, and the streams of randomness."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from mfba_planner.core.bat import Algorithm, BatParams, Bounds, Disc, Schedule, minimize
+from mfba_planner.core.episode import Outcome, World, run, sense
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.planner import (
+    Decision,
+    Event,
+    Mode,
+    Observation,
+    Planner,
+    PlannerParams,
+    Swarm,
+    decide,
+    fresh_step,
+    stream,
+    transition,
+)
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.core.world import Scenario
+from mfba_planner.paper import readings
+from mfba_planner.scenarios import load_scenario
+
+FREE = (math.inf,) * 12
+GOAL = (12.0, 12.0)
+PARAMS = PlannerParams()
+
+
+def ranges(vs: str) -> tuple[float, ...]:
+    return tuple(0.5 if bit == "1" else math.inf for bit in vs)
+
+
+def observe(**changes: Any) -> Observation:
+    plain: dict[str, Any] = {
+        "stamp_ns": 5_000_000_000,
+        "now_ns": 5_000_000_000,
+        "pose": Pose2D(1.0, 2.0, 0.5),
+        "ranges_m": FREE,
+        "goal": GOAL,
+    }
+    return Observation(**{**plain, **changes})
+
+
+def never(position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
+    raise AssertionError("the bats were asked")
+
+
+def answer(mode: Mode = Mode.IDLE, params: PlannerParams = PARAMS, **changes: Any) -> Decision:
+    """The decision on an observation that needs no bats."""
+    return decide(observe(**changes), mode, params, never)
+
+
+# --- the table ------------------------------------------------------------------------------
+
+RESTLESS = {
+    Event.NO_GOAL: Mode.IDLE,
+    Event.NEW_GOAL: Mode.IDLE,
+    Event.INVALID: Mode.STOPPED,
+    Event.STALE: Mode.STOPPED,
+    Event.AT_GOAL: Mode.ARRIVED,
+    Event.CLEAR: Mode.PATH_GENERATION,
+    Event.OBSTACLE: Mode.OBSTACLE_AVOIDANCE,
+    Event.NO_GAP: Mode.BLOCKED,
+}
+AT_REST = dict.fromkeys(Event, Mode.ARRIVED) | {
+    Event.NO_GOAL: Mode.IDLE,
+    Event.NEW_GOAL: Mode.IDLE,
+}
+TABLE = {mode: AT_REST if mode is Mode.ARRIVED else RESTLESS for mode in Mode}
+
+
+@pytest.mark.parametrize("event", Event)
+@pytest.mark.parametrize("mode", Mode)
+def test_transition(mode: Mode, event: Event) -> None:
+    assert transition(mode, event) is TABLE[mode][event]
+
+
+# --- one decision per event -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "mode", "reason"),
+    [
+        ({"refused": "odom holds nan"}, Mode.STOPPED, "refused input: odom holds nan"),
+        ({"now_ns": 6_000_000_001}, Mode.STOPPED, "input is 1.000 s old"),
+        ({"now_ns": 7_500_000_000}, Mode.STOPPED, "input is 2.500 s old"),
+        ({"goal": None}, Mode.IDLE, "no goal given"),
+        ({"goal": (1.0, 2.0199)}, Mode.ARRIVED, "goal reached"),
+        ({"ranges_m": ranges("1" * 12)}, Mode.BLOCKED,
+         "sectors 1+2+3+4+5+6+7+8+9+10+11+12 set: every gap is closed"),
+        ({"ranges_m": ranges("101010101010")}, Mode.BLOCKED,
+         "sectors 1+3+5+7+9+11 set: every gap is closed"),
+        ({"pose": Pose2D(math.nan, 2.0)}, Mode.STOPPED,
+         "refused input: pose (nan, 2.0, 0.0) is not finite"),
+        ({"pose": Pose2D(1.0, 2.0, math.inf)}, Mode.STOPPED,
+         "refused input: pose (1.0, 2.0, inf) is not finite"),
+        ({"goal": (math.inf, 0.0)}, Mode.STOPPED,
+         "refused input: goal (inf, 0.0) is not finite"),
+        ({"ranges_m": ()}, Mode.STOPPED, "refused input: 0 sectors are fewer than 3"),
+        ({"ranges_m": FREE[:2]}, Mode.STOPPED, "refused input: 2 sectors are fewer than 3"),
+        ({"ranges_m": (*FREE, math.nan)}, Mode.STOPPED,
+         "refused input: a sector's range is NaN"),
+        ({"stamp_ns": -1}, Mode.STOPPED, "refused input: stamp -1 ns is negative"),
+    ],
+)  # fmt: skip
+def test_whoever_does_not_plan_stands_still(
+    changes: dict[str, Any], mode: Mode, reason: str
+) -> None:
+    decision = answer(**changes)
+    assert (decision.mode, decision.reason) == (mode, reason)
+    assert decision.velocity == (0.0, 0.0)
+    assert decision.gap == 0
+    assert decision.candidates == ()
+    pose = changes.get("pose", Pose2D(1.0, 2.0))
+    assert repr(decision.waypoint) == repr(pose.position)
+
+
+ALL_AT_ONCE = {
+    "refused": "x",
+    "now_ns": 10**12,
+    "goal": None,
+    "ranges_m": ranges("1" * 12),
+}
+
+
+@pytest.mark.parametrize(
+    ("mended", "reason"),
+    [
+        ({}, "refused input: x"),
+        ({"refused": ""}, "input is 995.000 s old"),
+        ({"refused": "", "now_ns": 0}, "no goal given"),
+        ({"refused": "", "now_ns": 0, "goal": (1.0, 2.0)}, "goal reached"),
+        ({"refused": "", "now_ns": 0, "goal": (1.0, 2.0), "stamp_ns": -5},
+         "refused input: stamp -5 ns is negative"),
+    ],
+)  # fmt: skip
+def test_of_several_events_the_gravest_counts(mended: dict[str, Any], reason: str) -> None:
+    assert answer(**{**ALL_AT_ONCE, **mended}).reason == reason
+
+
+def test_input_as_old_as_the_timeout_is_not_stale() -> None:
+    gap: dict[str, Any] = {"ranges_m": ranges("110000000000")}
+    assert answer(now_ns=6_000_000_000, **gap).mode is Mode.OBSTACLE_AVOIDANCE
+    slow = replace(PARAMS, input_timeout_s=3.0)
+    assert answer(params=slow, now_ns=8_000_000_000, **gap).mode is Mode.OBSTACLE_AVOIDANCE
+    assert answer(params=slow, now_ns=8_000_000_001, **gap).mode is Mode.STOPPED
+
+
+def test_the_goal_tolerance_includes_its_edge() -> None:
+    near: dict[str, Any] = {"pose": Pose2D(0.0, 0.0), "ranges_m": ranges("1" * 12)}
+    params = replace(PARAMS, goal_tolerance_m=0.25)
+    assert answer(params=params, goal=(0.0, -0.25), **near).mode is Mode.ARRIVED
+    assert answer(params=params, goal=(0.0, -0.2500001), **near).mode is Mode.BLOCKED
+
+
+def test_obstacle_avoidance_takes_the_gap_nearest_to_the_goal() -> None:
+    # Fig. 5, goal at 45 degrees
+    decision = answer(pose=Pose2D(1.0, 2.0, 0.5), goal=(5.0, 6.0), ranges_m=ranges("110000111000"))
+    assert decision.mode is Mode.OBSTACLE_AVOIDANCE
+    assert decision.reason == "sectors 1+2+7+8+9 set: gap 3 is nearest to the goal"
+    assert "".join(map(str, decision.vs)) == "110000111000"
+    assert "".join(map(str, decision.vg)) == "110001111001"
+    assert decision.gap == 3
+    assert decision.waypoint == pytest.approx((1.0, 2.3)), "gap 3 is 90 degrees, whatever the yaw"
+    dt = PARAMS.tick_ns * 1e-9
+    assert decision.velocity == pytest.approx((0.0, 0.3 / dt))
+    assert math.hypot(*decision.velocity) == pytest.approx(0.82)
+    assert decision.candidates == ()
+
+
+def test_obstacle_avoidance_never_steps_further_than_the_goal_is() -> None:
+    decision = answer(goal=(1.0, 2.125), ranges_m=ranges("110000111000"))
+    assert decision.waypoint == pytest.approx((1.0, 2.125))
+
+
+def test_a_decision_carries_what_it_was_made_from() -> None:
+    obs = observe(ranges_m=ranges("010000000000"))
+    decision = decide(obs, Mode.IDLE, PARAMS, never)
+    for name in ("stamp_ns", "pose", "goal", "ranges_m"):
+        assert getattr(decision, name) == getattr(obs, name)
+
+
+def test_path_generation_asks_the_bats() -> None:
+    asked: list[tuple[Point, Point]] = []
+
+    def generate(position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
+        asked.append((position, goal))
+        return (1.1, 2.2), ((7.0, 8.0),)
+
+    decision = decide(observe(), Mode.BLOCKED, PARAMS, generate)
+    assert asked == [((1.0, 2.0), GOAL)]
+    assert (decision.mode, decision.gap) == (Mode.PATH_GENERATION, 0)
+    assert decision.reason == "no obstacle within SR"
+    assert decision.waypoint == (1.1, 2.2)
+    assert decision.candidates == ((7.0, 8.0),)
+    dt = PARAMS.tick_ns * 1e-9
+    assert decision.velocity == pytest.approx((0.1 / dt, 0.2 / dt))
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({}, "goal was reached before; no obstacle within SR"),
+        ({"ranges_m": ranges("110000000000")},
+         "goal was reached before; sectors 1+2 set: gap 3 is nearest to the goal"),
+        ({"refused": "x"}, "goal was reached before; refused input: x"),
+        ({"goal": (1.0, 2.0)}, "goal reached"),
+    ],
+)  # fmt: skip
+def test_after_arrival_the_loop_is_over(changes: dict[str, Any], reason: str) -> None:
+    decision = answer(Mode.ARRIVED, **changes)
+    assert (decision.mode, decision.reason) == (Mode.ARRIVED, reason)
+    assert (decision.velocity, decision.gap) == ((0.0, 0.0), 0)
+
+
+def test_a_tick_lasts_as_long_as_a_step_at_full_speed() -> None:
+    assert PARAMS.tick_ns == 365_853_659
+    assert PlannerParams(step_length_m=0.08, speed_mps=0.8).tick_ns == 100_000_000
+    assert PlannerParams(step_length_m=0.001, speed_mps=100.0).tick_ns == 10_000
+
+
+@given(
+    st.floats(-50.0, 50.0),
+    st.floats(-50.0, 50.0),
+    st.floats(-50.0, 50.0),
+    st.floats(-50.0, 50.0),
+    st.sampled_from([FREE, ranges("100000000001"), ranges("001100000000")]),
+    st.floats(0.05, 3.0),
+    st.floats(0.01, 1.0),
+    st.sampled_from(Bounds),
+    st.sampled_from(Swarm),
+    st.integers(0, 2**63),
+)
+def test_the_velocity_leads_to_the_waypoint_and_never_too_fast(
+    x: float,
+    y: float,
+    gx: float,
+    gy: float,
+    ring: tuple[float, ...],
+    speed: float,
+    step: float,
+    bounds: Bounds,
+    swarm: Swarm,
+    seed: int,
+) -> None:
+    assume(math.hypot(gx - x, gy - y) > 0.05)
+    bat = BatParams(bounds=bounds, schedule=Schedule.RAW)
+    params = PlannerParams(speed_mps=speed, step_length_m=step, swarm=swarm, bat=bat)
+    planner = Planner(params, seed)
+    decision = planner.decide(observe(pose=Pose2D(x, y), goal=(gx, gy), ranges_m=ring))
+    assert decision.mode in (Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE)
+    dt = params.tick_ns * 1e-9
+    reached = (x + decision.velocity[0] * dt, y + decision.velocity[1] * dt)
+    assert reached == pytest.approx(decision.waypoint, abs=1e-12)
+    assert math.dist((x, y), decision.waypoint) <= step * (1.0 + 1e-9) + 1e-12
+    assert math.hypot(*decision.velocity) <= speed * (1.0 + 1e-4)
+
+
+# --- the bats' step -------------------------------------------------------------------------
+
+
+def test_a_fresh_swarm_searches_the_disc_of_one_step() -> None:
+    position, goal = (1.0, 2.0), (4.0, 6.0)
+    params = PlannerParams(bat=BatParams(population=7, iterations=3))
+    waypoint, candidates = fresh_step(position, goal, params, stream(3, 77))
+
+    def cost(x: list[float]) -> float:
+        return math.hypot(x[0] - 3.0, x[1] - 4.0)
+
+    swarm = minimize(cost, Disc(0.3), params.bat, stream(3, 77))
+    assert waypoint == pytest.approx((1.0 + swarm.best_x[0], 2.0 + swarm.best_x[1]))
+    assert len(candidates) == 7
+    for candidate, x in zip(candidates, swarm.candidates):
+        assert candidate == pytest.approx((1.0 + x[0], 2.0 + x[1]))
+    assert math.dist(waypoint, goal) < 4.8, "nearly the whole step is gained"
+
+
+def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
+    bat = BatParams(bounds=Bounds.NONE, schedule=Schedule.RAW)
+    params = PlannerParams(bat=bat)
+    waypoint, candidates = fresh_step((1.0, 2.0), GOAL, params, stream(0, 1))
+    assert max(math.dist((1.0, 2.0), c) for c in candidates) > 0.3
+    assert math.dist((1.0, 2.0), waypoint) == pytest.approx(0.3)
+    swarm = minimize(lambda x: math.hypot(x[0] - 11.0, x[1] - 10.0), Disc(0.3), bat, stream(0, 1))
+    heading = math.atan2(waypoint[1] - 2.0, waypoint[0] - 1.0)
+    assert heading == pytest.approx(math.atan2(swarm.best_x[1], swarm.best_x[0]))
+
+
+@pytest.mark.parametrize("kind", Swarm)
+def test_the_last_step_is_cut_to_the_goal(kind: Swarm) -> None:
+    params = PlannerParams(step_length_m=0.25, swarm=kind)
+    for goal, exact in (((1.25, 2.0), True), ((1.1, 2.1), True), ((1.2500001, 2.0), False)):
+        decision = Planner(params, 0).decide(observe(goal=goal))
+        assert decision.mode is Mode.PATH_GENERATION
+        assert (decision.waypoint == goal) is exact
+        assert bool(decision.candidates) is not exact
+
+
+def test_the_stream_of_a_decision_is_named_by_seed_purpose_and_stamp() -> None:
+    expected = np.random.Generator(
+        np.random.PCG64(np.random.SeedSequence(4, spawn_key=(1, 123456789012)))
+    )
+    assert stream(4, 123456789012).random() == expected.random()
+    draws = {stream(seed, stamp).random() for seed in range(9) for stamp in range(9)}
+    assert len(draws) == 81
+
+
+def test_negative_seeds_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"^seed=-1: negative; give a whole number from 0 up$"):
+        Planner(PARAMS, -1)
+    assert Planner(PARAMS, 0).mode is Mode.IDLE
+
+
+# --- memory ---------------------------------------------------------------------------------
+
+
+def drive(planner: Planner, scenario: Scenario, ticks: int) -> list[Decision]:
+    """Drive a planner as the core driver does, for so many ticks."""
+    world = World(scenario, planner.params.tick_ns, planner.params.goal_tolerance_m)
+    decisions = []
+    for _ in range(ticks):
+        obs = observe(
+            stamp_ns=world.stamp_ns,
+            now_ns=world.stamp_ns,
+            pose=world.pose,
+            ranges_m=sense(world, SensorParams()),
+            goal=scenario.goal_m,
+        )
+        decisions.append(planner.decide(obs))
+        world.step(decisions[-1].velocity)
+    return decisions
+
+
+@pytest.mark.parametrize("name", ["case1", "case2"])
+def test_a_planner_that_is_restarted_decides_as_the_first_one_did(name: str) -> None:
+    episode = run(load_scenario(name), seed=5)
+    for k in (1, 7, 20, len(episode.ticks) - 1):
+        restarted = Planner(PARAMS, 5)
+        for tick in episode.ticks[k:]:
+            again = restarted.decide(
+                observe(
+                    stamp_ns=tick.stamp_ns,
+                    now_ns=tick.stamp_ns,
+                    pose=tick.pose,
+                    ranges_m=tick.ranges_m,
+                    goal=tick.goal,
+                )
+            )
+            assert again == tick
+
+
+def test_decisions_depend_on_the_seed_and_on_the_stamp() -> None:
+    ways = {
+        Planner(PARAMS, seed).decide(observe(stamp_ns=stamp, now_ns=stamp)).waypoint
+        for seed in range(5)
+        for stamp in (1, 2, 10**18)
+    }
+    assert len(ways) == 15
+
+
+def test_a_planner_remembers_its_mode_until_the_goal_changes() -> None:
+    planner = Planner(PARAMS, 0)
+    assert planner.decide(observe(goal=(1.0, 2.0))).mode is Mode.ARRIVED
+    away = {"pose": Pose2D(5.0, 5.0)}
+    assert planner.decide(observe(goal=(1.0, 2.0), **away)).mode is Mode.ARRIVED
+    assert planner.mode is Mode.ARRIVED
+    assert planner.decide(observe(goal=(1.0, 2.5), **away)).mode is Mode.PATH_GENERATION
+    assert planner.decide(observe(goal=(5.0, 5.0), **away)).mode is Mode.ARRIVED
+    assert planner.decide(observe(goal=None, **away)).mode is Mode.IDLE
+    assert planner.decide(observe(goal=(1.0, 2.0), **away)).mode is Mode.PATH_GENERATION
+
+
+def test_reset_forgets_arrival() -> None:
+    planner = Planner(PARAMS, 0)
+    planner.decide(observe(goal=(1.0, 2.0)))
+    planner.reset()
+    assert planner.mode is Mode.IDLE
+    away = observe(goal=(1.0, 2.0), pose=Pose2D(5.0, 5.0))
+    assert planner.decide(away).mode is Mode.PATH_GENERATION
+
+
+# --- the persistent swarm of Fig. 1 ---------------------------------------------------------
+
+FIG1 = readings.planner("fig1")
+
+
+def test_fig_1_keeps_its_swarm_over_the_trip() -> None:
+    scenario = load_scenario("empty")
+    fresh, kept = Planner(FIG1, 3), Planner(FIG1, 3)
+    trip = drive(kept, scenario, 10)
+    assert drive(fresh, scenario, 10) == trip
+    tick = trip[5]
+    obs = observe(
+        stamp_ns=tick.stamp_ns, now_ns=tick.stamp_ns, pose=tick.pose, goal=scenario.goal_m
+    )
+    assert Planner(FIG1, 3).decide(obs).candidates != tick.candidates, "it has a memory"
+    for restart in (fresh.reset, lambda: fresh.decide(replace(obs, goal=(0.0, 9.0)))):
+        restart()
+        assert fresh.decide(obs) == Planner(FIG1, 3).decide(obs)
+
+
+def test_fig_1_steps_one_bat_iteration_at_a_time_to_the_best_point_seen() -> None:
+    planner = Planner(FIG1, 3)
+    best = math.inf
+    for decision in drive(planner, load_scenario("empty"), 12):
+        assert len(decision.candidates) == 5
+        reach = [math.dist(decision.pose.position, c) for c in decision.candidates]
+        assert max(reach) <= 0.1 + 1e-9
+        here = math.dist(decision.pose.position, GOAL)
+        best = min([here, *(math.dist(c, GOAL) for c in decision.candidates)])
+        assert math.dist(decision.waypoint, GOAL) <= best + 1e-9
+
+
+def test_fig_1_with_more_iterations_goes_straighter() -> None:
+    def length(iterations: int) -> float:
+        params = replace(FIG1, bat=BatParams(iterations=iterations))
+        return evaluate(run(load_scenario("empty"), planner=params)).length_m
+
+    assert math.dist((0.0, 0.0), GOAL) < length(20) < length(1)
+
+
+def test_fig_1_spreads_the_schedule_of_eq_10_over_the_trip() -> None:
+    """With f = f_max beta and no walk, the second step of a bat shows T."""
+    bat = BatParams(iterations=1, population=2, r0=1.0, rho=0.0, f_max=1.0, bounds=Bounds.NONE)
+    params = replace(FIG1, bat=bat)
+    # 0.95 m to go in steps of 0.1 m: T = 10
+    planner, goal = Planner(params, 1), (1.95, 2.0)
+    first = planner.decide(observe(goal=goal))
+    second = planner.decide(observe(goal=goal))
+    best = min(first.candidates, key=lambda c: math.dist(c, goal))
+    for old, new in zip(first.candidates, second.candidates):
+        expected = [o + (b - o) * 0.1 for o, b in zip(old, best)]
+        assert list(new) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("algorithm", Algorithm)
+@pytest.mark.parametrize("name", ["case1", "case2"])
+def test_fig_1_runs_both_case_studies(name: str, algorithm: Algorithm) -> None:
+    params = replace(FIG1, bat=replace(FIG1.bat, algorithm=algorithm))
+    for seed in range(10):
+        episode = run(load_scenario(name), planner=params, seed=seed)
+        result = evaluate(episode)
+        assert episode.outcome is Outcome.GOAL_REACHED
+        assert result.success
+        assert 16.97 < result.length_m < 21.0
+
+
+# --- the named readings ---------------------------------------------------------------------
+
+
+def test_readings_by_name() -> None:
+    assert readings.swarm("robust") == BatParams()
+    assert readings.planner("section6") == PlannerParams()
+    assert readings.swarm("table3").bounds is Bounds.NONE
+    assert readings.swarm("literal").rho == 0.01
+    assert FIG1.swarm is Swarm.PERSISTENT
+
+
+@pytest.mark.parametrize(
+    ("look_up", "name", "message"),
+    [
+        (readings.swarm, "tabel3", "'tabel3': unknown swarm reading; did you mean 'table3'?"),
+        (readings.planner, "fig2", "'fig2': unknown planner reading; did you mean 'fig1'?"),
+        (readings.planner, "?", "'?': unknown planner reading; known: fig1, section6"),
+    ],
+)
+def test_unknown_readings(look_up: Any, name: str, message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        look_up(name)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("name", sorted(readings.SWARMS))
+def test_every_swarm_reading_can_plan(name: str) -> None:
+    bat = replace(readings.swarm(name), population=5, iterations=5)
+    result = evaluate(run(load_scenario("empty"), planner=PlannerParams(bat=bat)))
+    assert result.outcome in (Outcome.GOAL_REACHED, Outcome.TIME_LIMIT)
+    if name != "literal":  # which flies away from the best
+        assert result.success
