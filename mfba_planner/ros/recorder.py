@@ -24,15 +24,11 @@ from ..recording.qos import OfferedQos
 from ..recording.schemas import definition_of
 from ..recording.writer import BagWriter
 from . import params, topics
+from .drain import drain
 from .qos import offered
 from .runtime import GraphNode, spin_node
 from .settings import RecorderSettings, names
 from .survey import Found, ParameterSurvey
-
-QUIET_S = 0.2  # on one machine a message takes a hundredth of that, unless it is overloaded
-LIVE_S = 1.0  # from then on, IDLE_TURNS without a message are enough (one may be a timer's)
-IDLE_TURNS = 5
-DRAIN_S = 10.0
 
 
 class Recorder(GraphNode):
@@ -42,10 +38,7 @@ class Recorder(GraphNode):
         """Raise ConfigError or OutputError for what cannot be accepted or written."""
         super().__init__(topics.RECORDER, **kwargs)
         self.settings = s = params.declare(self, RecorderSettings(), read_only=True)
-        try:
-            self._facts = json.loads(s.run)
-        except ValueError:
-            raise ConfigError(f"parameter run={s.run!r}: not JSON; give an object") from None
+        self._facts = _facts(s.run)
         self._log_time_ns = 0
         self._held: list[tuple[str, bytes]] = []
         self._explained = False
@@ -115,19 +108,8 @@ class Recorder(GraphNode):
         return f"parameters of {absent} not read yet" if absent else ""
 
     def drain(self, executor: Executor) -> None:
-        """Record on until nothing has come for a while: senders may be far ahead.
-
-        Where they never end, as on a live robot, until what was waiting is written.
-        """
-        started = heard = time.monotonic()
-        count, idle = self.writer.message_count, 0
-        while idle < IDLE_TURNS and (now := time.monotonic()) < min(
-            heard + QUIET_S, started + DRAIN_S
-        ):
-            executor.spin_once(timeout_sec=QUIET_S if now < started + LIVE_S else 0.0)
-            idle += now >= started + LIVE_S
-            if self.writer.message_count != count:
-                count, idle, heard = self.writer.message_count, 0, time.monotonic()
+        """Record what is under way."""
+        drain(executor, lambda: self.writer.message_count)
 
     def close(self) -> None:
         """Write what is held and finish the bag."""
@@ -136,6 +118,16 @@ class Recorder(GraphNode):
             self._write(name, held)
         self.explain(self._survey.found)
         self.writer.close()
+
+
+def _facts(text: str) -> dict[str, Any]:
+    try:
+        facts = json.loads(text)
+    except ValueError:
+        facts = None
+    if not isinstance(facts, dict):
+        raise ConfigError(f"parameter run={text!r}: not JSON of an object; give '{{}}' or more")
+    return facts
 
 
 def _type_name(kind: Any) -> str:

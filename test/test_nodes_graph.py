@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The graph as others discover it: names, types, QoS, services, parameters, and namespaces."""
+
+from collections import Counter
+from typing import Any
+
+import pytest
+from graph import Graph
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from std_srvs.srv import Trigger
+
+from mfba_planner.core.episode import run
+from mfba_planner.ros import topics
+from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.ros.recorder import Recorder
+from mfba_planner.ros.virtual_sensor import VirtualSensor
+from mfba_planner.ros.world_sim import WorldSim
+from mfba_planner.run_config import NODES, RunConfig, node_parameters
+from mfba_planner.scenarios import load_scenario
+
+# The table of the design: name, type, who writes, who reads (besides the recorder), latched.
+TABLE = [
+    ("/clock", "rosgraph_msgs/msg/Clock", ["world_sim"], [], False),
+    ("/odom", "nav_msgs/msg/Odometry", ["world_sim"], ["virtual_sensor", "planner"], False),
+    ("/obstacles", "geometry_msgs/msg/PoseArray", ["world_sim"], ["virtual_sensor"], False),
+    ("/sectors", "sensor_msgs/msg/LaserScan", ["virtual_sensor"], ["planner"], False),
+    ("/sensory_vector", "std_msgs/msg/UInt8MultiArray", ["virtual_sensor"], [], False),
+    ("/goal_pose", "geometry_msgs/msg/PoseStamped", ["world_sim"], ["planner"], True),
+    ("/goal_step", "geometry_msgs/msg/PoseStamped", ["planner"], [], False),
+    ("/plan", "nav_msgs/msg/Path", ["planner"], [], False),
+    ("/trail", "nav_msgs/msg/Path", ["world_sim"], [], False),
+    ("/cmd_vel", "geometry_msgs/msg/Twist", ["planner"], ["world_sim"], False),
+    ("/planner/decision", "diagnostic_msgs/msg/DiagnosticArray", ["planner"], [], False),
+    ("/outcome", "diagnostic_msgs/msg/DiagnosticStatus", ["world_sim"], [], True),
+    ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", [], ["world_sim"], False),
+    ("/markers", "visualization_msgs/msg/MarkerArray", ["planner", "world_sim"], [], False),
+    ("/scan", "sensor_msgs/msg/LaserScan", [], [], False),
+]
+RCLPYS_OWN = {"/parameter_events", "/rosout"}
+SERVICES = {
+    "/world_sim/pause": "std_srvs/srv/SetBool",
+    "/world_sim/step": "std_srvs/srv/Trigger",
+    "/world_sim/reset": "std_srvs/srv/Trigger",
+    **{f"/{name}/ready": "std_srvs/srv/Trigger" for name in (*NODES, "recorder")},
+}
+
+
+def start_all(graph: Graph, bag: Any, **options: Any) -> dict[str, Any]:
+    """The graph as the launcher starts it, for case study 1."""
+    told = node_parameters(RunConfig(scenario=load_scenario("case1")), (*NODES, "recorder"))
+    recorder = {"output": str(bag), "sim_time": True, "nodes": ",".join(NODES)}
+    kinds: dict[str, Any] = {
+        "recorder": Recorder,
+        "world_sim": WorldSim,
+        "virtual_sensor": VirtualSensor,
+        "planner": PlannerNode,
+    }
+    told["recorder"] = recorder
+    return {name: graph.start(kind, told[name], **options) for name, kind in kinds.items()}
+
+
+@pytest.fixture
+def nodes(graph: Graph, tmp_path: Any) -> dict[str, Any]:
+    """All four nodes, not yet ticking."""
+    started = start_all(graph, tmp_path / "bag")
+    graph.until(lambda: not any(node.missing() for node in started.values()))
+    return started
+
+
+def test_topics_have_the_names_and_types_of_the_table(graph: Graph, nodes: dict[str, Any]) -> None:
+    found = dict(graph.probe.get_topic_names_and_types())
+    ours = {name: kinds for name, kinds in found.items() if name not in RCLPYS_OWN}
+    assert ours == {name: [kind] for name, kind, *_ in TABLE}
+
+
+@pytest.mark.parametrize(("name", "kind", "writers", "readers", "latched"), TABLE)
+def test_writers_readers_and_qos(
+    graph: Graph,
+    nodes: dict[str, Any],
+    name: str,
+    kind: str,
+    writers: list[str],
+    readers: list[str],
+    latched: bool,
+) -> None:
+    offered = graph.probe.get_publishers_info_by_topic(name)
+    assert sorted(info.node_name for info in offered) == writers
+    for info in offered:
+        assert info.topic_type == kind
+        assert info.qos_profile.reliability is ReliabilityPolicy.RELIABLE
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        assert info.qos_profile.durability is durability
+    asked = graph.probe.get_subscriptions_info_by_topic(name)
+    assert {info.node_name for info in asked} == {*readers, "recorder"}
+    for reader in {info.node_name for info in asked}:
+        # At least one of a node's subscriptions loses nothing.
+        reliability = [i.qos_profile.reliability for i in asked if i.node_name == reader]
+        assert ReliabilityPolicy.RELIABLE in reliability
+
+
+def test_in_lockstep_what_every_tick_brings_is_read_once(
+    graph: Graph, nodes: dict[str, Any]
+) -> None:
+    for topic in topics.GRAPH:
+        if topic.every_tick:
+            name = f"/{topic.name.lstrip('/')}"
+            asked = graph.probe.get_subscriptions_info_by_topic(name)
+            assert set(Counter(info.node_name for info in asked).values()) == {1}, name
+
+
+def test_services_have_their_names_and_types(graph: Graph, nodes: dict[str, Any]) -> None:
+    found = dict(graph.probe.get_service_names_and_types())
+    own = ("describe_parameters", "get_parameter", "list_parameters", "set_parameters")
+    ours = {
+        name: kinds[0]
+        for name, kinds in found.items()
+        if not any(word in name for word in own) and "type_description" not in name
+    }
+    assert ours == SERVICES
+
+
+def test_every_parameter_has_a_description_and_a_number_has_a_range(
+    graph: Graph, nodes: dict[str, Any]
+) -> None:
+    rclpys = {"use_sim_time", "start_type_description_service"}
+    for node in nodes.values():
+        names = [name for name in node.get_parameters_by_prefix("") if name not in rclpys]
+        assert len(names) > 4
+        for name in names:
+            descriptor = node.describe_parameter(name)
+            assert len(descriptor.description) > 8, name
+            if isinstance(node.get_parameter(name).value, float):
+                assert len(descriptor.floating_point_range) == 1, name
+            if type(node.get_parameter(name).value) is int:
+                assert len(descriptor.integer_range) == 1, name
+
+
+def test_a_node_is_ready_when_all_who_listen_to_it_are_there(graph: Graph, tmp_path: Any) -> None:
+    told = node_parameters(RunConfig(scenario=load_scenario("case1")), (*NODES, "recorder"))
+    graph.start(WorldSim, told["world_sim"])
+    response = graph.call(Trigger, "world_sim/ready")
+    assert not response.success
+    assert response.message == "/clock waits for recorder"
+    recorder = graph.start(Recorder, {"output": str(tmp_path / "bag")})
+    message = ""
+
+    def says(text: str) -> bool:
+        nonlocal message
+        message = graph.call(Trigger, "world_sim/ready").message
+        return message == text
+
+    graph.until(lambda: says("odom waits for planner, virtual_sensor"))
+    graph.start(VirtualSensor, told["virtual_sensor"])
+    graph.until(lambda: says("odom waits for planner"))
+    graph.start(PlannerNode, told["planner"])
+    graph.until(lambda: says(""))
+    assert graph.call(Trigger, "world_sim/ready").success
+    graph.until(lambda: graph.call(Trigger, "planner/ready").success)
+    graph.stop(recorder)
+    graph.until(lambda: says("/clock waits for recorder"))
+
+
+def test_a_planner_without_goal_is_not_ready(graph: Graph) -> None:
+    graph.start(PlannerNode, {"wait_for": "planner", "lockstep": True})
+    assert graph.call(Trigger, "planner/ready").message == "no goal_pose yet"
+
+
+def test_everything_works_in_a_namespace(graph: Graph, tmp_path: Any) -> None:
+    nodes = start_all(graph, tmp_path / "bag", namespace="robot1")
+    graph.until(lambda: not any(node.missing() for node in nodes.values()))
+    found = dict(graph.probe.get_topic_names_and_types())
+    ours = {name: kinds for name, kinds in found.items() if name not in RCLPYS_OWN}
+    # Time is one for all robots, as in any simulation.
+    assert set(ours) == {n if n == "/clock" else f"/robot1{n}" for n, *_ in TABLE}
+    world = nodes["world_sim"]
+    world.resume()
+    graph.until(lambda: world.over, timeout_s=60.0)
+    expected = run(load_scenario("case1"))
+    assert world.world.tick == len(expected.ticks) - 1
+    assert world.world.pose == expected.ticks[-1].pose

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: Apache-2.0
+"""recorder: everything that was said, once, under the right time, and what explains it."""
+
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import TwistStamped
+from graph import Graph
+from rclpy.context import Context
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Header
+
+from mfba_planner.core import episode
+from mfba_planner.core.errors import ConfigError, OutputError
+from mfba_planner.core.options import flatten
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.messages import stamp_ns
+from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.schemas import definition_of
+from mfba_planner.ros import topics
+from mfba_planner.ros.convert import clock_msg, odometry_msg, pose_stamped_msg, time_msg
+from mfba_planner.ros.in_process import run_in_process
+from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.ros.qos import offered
+from mfba_planner.ros.recorder import Recorder
+from mfba_planner.ros.virtual_sensor import VirtualSensor
+from mfba_planner.ros.world_sim import WorldSim
+from mfba_planner.run_config import NODES, Driver, RunConfig
+from mfba_planner.scenarios import load_scenario
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One recorded run of case study 2."""
+    from helpers import claim_domain
+
+    domain, lock = claim_domain()
+    with lock:
+        path = tmp_path_factory.mktemp("recorder") / "bag"
+        told = RunConfig(scenario=load_scenario("case2"), driver=Driver.IN_PROCESS, seed=9)
+        run_in_process(told, path, domain_id=domain)
+    return path
+
+
+def counts(path: Path) -> Counter[str]:
+    with BagReader(path) as reader:
+        return Counter({name: topic.message_count for name, topic in reader.topics.items()})
+
+
+def in_bag(topic: topics.Topic) -> str:
+    return f"/{topic.name.lstrip('/')}"
+
+
+def test_there_is_one_message_per_tick(bag: Path) -> None:
+    ticks = len(episode.run(load_scenario("case2"), seed=9).ticks)
+    found = counts(bag)
+    for topic in topics.GRAPH:
+        if topic.every_tick:
+            assert found[in_bag(topic)] == ticks, topic.name
+    assert found["/goal_pose"] == 1
+    assert found["/outcome"] == 2
+    assert found["/trail"] > 3
+    assert found["/markers"] > 3
+
+
+def test_every_topic_somebody_writes_is_there_with_its_type_and_qos(bag: Path) -> None:
+    with BagReader(bag) as reader:
+        found = dict(reader.topics)
+    written = [topic for topic in topics.GRAPH if topic.writers]
+    assert set(found) == {in_bag(topic) for topic in written}
+    for topic in written:
+        recorded = found[in_bag(topic)]
+        package = topic.type.__module__.split(".")[0]
+        assert recorded.type_name == f"{package}/msg/{topic.type.__name__}"
+        assert recorded.type_hash == definition_of(recorded.type_name).type_hash
+        assert recorded.qos == (offered(topic.qos),)
+
+
+def test_log_times_are_simulated_time(bag: Path) -> None:
+    tick_ns = PlannerParams().tick_ns
+    with BagReader(bag) as reader:
+        messages = list(reader.decoded())
+    now = 0
+    for message in messages:
+        assert message.log_time_ns % tick_ns == 0
+        assert message.log_time_ns >= now
+        now = message.log_time_ns
+        header = getattr(message.message, "header", None)
+        # A goal is stamped when it is given.
+        if header is not None and message.topic != "/goal_pose":
+            assert message.log_time_ns == stamp_ns(header.stamp), message.topic
+    latched = [m for m in messages if m.topic in ("/goal_pose", "/outcome")]
+    assert [m.log_time_ns for m in latched] == [tick_ns, tick_ns, now]
+
+
+def test_the_bag_holds_all_parameters_and_the_facts(bag: Path) -> None:
+    with BagReader(bag) as reader:
+        configuration = read_configuration(reader)
+    nodes, facts = configuration["nodes"], configuration["run"]
+    assert set(nodes) == set(NODES)
+    assert nodes["planner"].items() >= {**flatten(PlannerParams()), "seed": 9}.items()
+    assert nodes["virtual_sensor"].items() >= flatten(SensorParams()).items()
+    assert nodes["virtual_sensor"]["obstacle_radii_m"] == [0.3] * 5
+    assert load_scenario(nodes["world_sim"]["scenario_json"]) == load_scenario("case2")
+    assert facts["driver"] == "in-process"
+    assert {"python", "numpy", "mfba_planner"} <= set(facts)
+
+
+def test_parameters_are_asked_for_across_contexts(
+    graph: Graph, domain_id: int, tmp_path: Path
+) -> None:
+    """As across processes: only DDS leads from the recorder to the nodes."""
+    context = Context()
+    context.init(domain_id=domain_id)
+    others = Graph(context)
+    try:
+        others.start(WorldSim, {"scenario": "walled", "start_paused": True, "speed_factor": 2.5})
+        others.start(VirtualSensor, {"sectors": 24, "obstacle_radii_m": [0.5, 0.3, 0.2, 0.4]})
+        others.start(PlannerNode, {"seed": 5, "bat.algorithm": "ba"})
+        recorder = graph.start(
+            Recorder,
+            {"output": str(tmp_path / "bag"), "nodes": ",".join(NODES), "run": '{"a": 1}'},
+        )
+        assert recorder.missing().startswith("parameters of planner, virtual_sensor, world_sim")
+
+        def answered() -> bool:
+            others.settle()
+            return not recorder.missing()
+
+        graph.until(answered)
+        graph.stop(recorder)
+        with BagReader(tmp_path / "bag") as reader:
+            configuration = read_configuration(reader)
+        for node in others.nodes:
+            names = node.get_parameters_by_prefix("")
+            assert set(configuration["nodes"][node.get_name()]) == set(names)
+        nodes = configuration["nodes"]
+        assert (nodes["planner"]["seed"], nodes["planner"]["bat.algorithm"]) == (5, "ba")
+        assert nodes["virtual_sensor"]["obstacle_radii_m"] == [0.5, 0.3, 0.2, 0.4]
+        assert nodes["world_sim"]["speed_factor"] == 2.5
+        assert configuration["run"] == {"a": 1}
+    finally:
+        others.close()
+        context.try_shutdown()
+        context.destroy()
+
+
+def record(graph: Graph, path: Path, **parameters: Any) -> Recorder:
+    return graph.start(Recorder, {"output": str(path), **parameters})
+
+
+def test_log_times_are_of_the_wall_where_time_is_not_simulated(
+    graph: Graph, tmp_path: Path
+) -> None:
+    recorder = record(graph, tmp_path / "bag")
+    before = time.time_ns()
+    graph.writer(topics.CLOCK).publish(clock_msg(5))
+    graph.settle()
+    after = time.time_ns()
+    graph.stop(recorder)
+    with BagReader(tmp_path / "bag") as reader:
+        (message,) = reader.messages()
+    assert before <= message.log_time_ns <= after
+
+
+def test_what_comes_before_the_first_clock_is_held_for_it(graph: Graph, tmp_path: Path) -> None:
+    recorder = record(graph, tmp_path / "bag", sim_time=True)
+    graph.writer(topics.GOAL_POSE).publish(pose_stamped_msg((1.0, 2.0), 0, "odom"))
+    graph.settle()
+    assert recorder.writer.message_count == 0
+    graph.writer(topics.CLOCK).publish(clock_msg(77))
+    graph.settle()
+    graph.stop(recorder)
+    with BagReader(tmp_path / "bag") as reader:
+        assert [(m.topic, m.log_time_ns) for m in reader.messages()] == [
+            ("/goal_pose", 77),
+            ("/clock", 77),
+        ]
+
+
+def test_what_was_held_is_not_lost_without_any_clock(graph: Graph, tmp_path: Path) -> None:
+    recorder = record(graph, tmp_path / "bag", sim_time=True)
+    graph.writer(topics.GOAL_POSE).publish(pose_stamped_msg((1.0, 2.0), 0, "odom"))
+    graph.settle()
+    graph.stop(recorder)
+    assert counts(tmp_path / "bag") == {"/goal_pose": 1}
+
+
+@pytest.mark.parametrize("sim_time", [False, True])
+def test_other_peoples_writers_are_recorded_once(
+    graph: Graph, tmp_path: Path, sim_time: bool
+) -> None:
+    """A best-effort lidar and RViz's volatile goals, beside reliable and latched ones."""
+    recorder = record(graph, tmp_path / "bag", sim_time=sim_time)
+    graph.writer(topics.CLOCK).publish(clock_msg(1))
+    goal = pose_stamped_msg((1.0, 2.0), 0, "odom")
+    scan = LaserScan(header=Header(stamp=time_msg(1)), ranges=[1.0] * 300)
+    for qos in (topics.LATCHED_QOS, topics.VIEW_QOS):
+        graph.writer(topics.GOAL_POSE, qos=qos).publish(goal)
+    for qos in (topics.TICK_QOS, qos_profile_sensor_data):
+        graph.writer(topics.SCAN, qos=qos).publish(scan)
+    graph.settle()
+    graph.stop(recorder)
+    assert counts(tmp_path / "bag") == {"/clock": 1, "/goal_pose": 2, "/scan": 2}
+
+
+def test_on_a_robot_odom_of_best_effort_is_recorded_too(graph: Graph, tmp_path: Path) -> None:
+    recorder = record(graph, tmp_path / "bag")
+    message = odometry_msg(episode.Pose2D(0.0, 0.0), (0.0, 0.0), 1, "odom", "base_link")
+    for qos in (topics.TICK_QOS, qos_profile_sensor_data):
+        graph.writer(topics.ODOM, qos=qos).publish(message)
+    graph.settle()
+    graph.stop(recorder)
+    assert counts(tmp_path / "bag") == {"/odom": 2}
+
+
+def test_stamped_twists_are_recorded_as_such(graph: Graph, tmp_path: Path) -> None:
+    recorder = record(graph, tmp_path / "bag", enable_stamped_cmd_vel=True)
+    graph.writer(topics.CMD_VEL, TwistStamped).publish(TwistStamped())
+    graph.settle()
+    graph.stop(recorder)
+    with BagReader(tmp_path / "bag") as reader:
+        assert reader.topics["/cmd_vel"].type_name == "geometry_msgs/msg/TwistStamped"
+
+
+def test_a_namespace_is_recorded_under_its_names(graph: Graph, tmp_path: Path) -> None:
+    recorder = graph.start(Recorder, {"output": str(tmp_path / "bag")}, namespace="robot1")
+    pub = graph.probe.create_publisher(topics.ODOM.type, "/robot1/odom", topics.TICK_QOS)
+    pub.publish(odometry_msg(episode.Pose2D(0.0, 0.0), (0.0, 0.0), 1, "odom", "base_link"))
+    graph.writer(topics.CLOCK).publish(clock_msg(1))
+    graph.settle()
+    graph.stop(recorder)
+    assert counts(tmp_path / "bag") == {"/robot1/odom": 1, "/clock": 1}
+
+
+def test_a_long_message_is_recorded_whole(graph: Graph, tmp_path: Path) -> None:
+    recorder = record(graph, tmp_path / "bag")
+    scan = LaserScan(ranges=[float(k) for k in range(100_000)])
+    graph.writer(topics.SCAN).publish(scan)
+    graph.until(lambda: recorder.writer.message_count == 1)
+    graph.stop(recorder)
+    with BagReader(tmp_path / "bag") as reader:
+        (message,) = reader.decoded()
+        assert list(message.message.ranges) == list(scan.ranges)
+
+
+def test_without_a_name_each_recording_gets_a_new_one(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        graph.stop(graph.start(Recorder, {}))
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["run-001", "run-002"]
+    assert counts(Path("runs/run-002")) == {}
+
+
+def test_what_is_there_is_never_overwritten(graph: Graph, tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=f"^{tmp_path}: exists already and is never overwritten"):
+        record(graph, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_facts_must_be_json(graph: Graph, tmp_path: Path) -> None:
+    for text in ("{", "", "nan?", "[1]", "null"):
+        with pytest.raises(ConfigError, match=r"^parameter run=.*: not JSON of an object; give '{"):
+            record(graph, tmp_path / "bag", run=text)
+    assert not (tmp_path / "bag").exists()
