@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
-from launching import complete
+from launching import Program, complete
 
 from mfba_planner import scenarios
 from mfba_planner.core import episode
@@ -80,6 +80,20 @@ def test_core_run_leaves_result_and_picture(tmp_path: Path) -> None:
     assert "wrote runs/run-001: result.json, run.png" in done.stdout
     result = json.loads((tmp_path / "runs/run-001/result.json").read_text())
     assert (result["driver"], result["result"]["success"]) == ("core", True)
+
+
+def test_two_launchers_at_once_do_not_meet(tmp_path: Path) -> None:
+    with (
+        Program("launcher", "case1", "--seed", "1", "--no-picture", cwd=tmp_path) as first,
+        Program("launcher", "case2", "--seed", "2", "--no-picture", cwd=tmp_path) as second,
+    ):
+        assert [first.end(), second.end()] == [0, 0], first.stderr + second.stderr
+    episodes = [read_episode(run / "bag") for run in sorted((tmp_path / "runs").iterdir())]
+    found = {recorded.scenario.name: recorded.ticks for recorded in episodes}
+    assert found == {
+        name: episode.run(scenarios.load_scenario(name), seed=seed).ticks
+        for name, seed in (("case1", 1), ("case2", 2))
+    }
 
 
 def test_real_time_run_reaches_the_goal(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def run_multi_process(attempt: Attempt) -> None:
         Monitor(domain) as monitor,
         Crew(attempt.screen.line, attempt.stop.is_urgent) as crew,
     ):
-        attempt.screen.say(f"starting the nodes in ROS domain {domain}")
+        attempt.screen.say(f"starting the nodes; look on with ROS_DOMAIN_ID={domain}")
         crew.start(_told(attempt), attempt.order.node_args)
         ticks = _Conductor(attempt, monitor, crew).conduct()
     if not attempt.order.config.real_time:

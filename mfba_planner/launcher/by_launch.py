@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What simulate.launch.py offers and tells the nodes; here it can be tested without launch."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..core.errors import ConfigError
+from ..core.options import override
+from ..paper import readings
+from ..run_config import NODES, Parameters, RunConfig, node_parameters, run_facts
+from ..scenarios import load_scenario
+from .options import RECORDER
+
+_TRUE_OR_FALSE = ("true", "false")
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """A launch argument; choices are empty where there are too many to list."""
+
+    default: str
+    description: str
+    choices: tuple[str, ...] = ()
+
+
+ARGUMENTS = {
+    "scenario": Argument("case1", "a shipped scenario's name, or a .yaml file"),
+    "seed": Argument("0", "seed of all randomness"),
+    "algorithm": Argument("mfba", "law of beta in eq. 4", ("mfba", "ba")),
+    "reading": Argument("section6", "how section 6.2 is read", tuple(readings.PLANNERS)),
+    "real_time": Argument(
+        "true", "tick on a wall timer; false: as fast as it goes", _TRUE_OR_FALSE
+    ),
+    "speed_factor": Argument("1.0", "simulated seconds per wall second, in real time"),
+    "record": Argument("false", "write a bag", _TRUE_OR_FALSE),
+    "bag": Argument("", "bag directory to create; empty: a new one below ./runs"),
+    "params_file": Argument("", "a --params-file for all nodes, which has the last word"),
+}
+
+
+def told_by_launch(given: Mapping[str, str]) -> Parameters:
+    """Every node's parameters, the recorder's first if there is one; ConfigError if refused."""
+    config = RunConfig(
+        scenario=load_scenario(given["scenario"]),
+        planner=override(
+            readings.planner(given["reading"]), {"bat.algorithm": given["algorithm"]}
+        ),
+        seed=_number("seed", given["seed"], int),
+        real_time=given["real_time"] == "true",
+        speed_factor=_number("speed_factor", given["speed_factor"], float),
+    )
+    recorders = (RECORDER,) if given["record"] == "true" else ()
+    told = node_parameters(config, (*NODES, *recorders))
+    told["world_sim"]["start_paused"] = False  # nobody is there to let it go
+    recorder = {
+        "output": given["bag"],
+        "nodes": ",".join(NODES),
+        "sim_time": True,
+        "run": json.dumps(run_facts(config)),
+    }
+    return {**dict.fromkeys(recorders, recorder), **told}
+
+
+def _number(name: str, text: str, kind: type) -> Any:
+    try:
+        return kind(text)
+    except ValueError:
+        raise ConfigError(f"{name}:={text}: not a number; give one") from None

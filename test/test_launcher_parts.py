@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The launcher's parts: orders, directories, domains, children, lines."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from helpers import wait_until
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mfba_planner.core.bat import Algorithm
+from mfba_planner.core.errors import GraphError, OutputError
+from mfba_planner.core.options import flatten
+from mfba_planner.launcher import child as child_module
+from mfba_planner.launcher.child import Child
+from mfba_planner.launcher.crew import Crew, parameters_yaml
+from mfba_planner.launcher.directory import RunDirectory
+from mfba_planner.launcher.domain import DOMAINS, claim_domain, private_domain
+from mfba_planner.launcher.options import option_rows, read_order
+from mfba_planner.launcher.screen import Screen
+from mfba_planner.launcher.stop import StoppedError, StopRequest
+from mfba_planner.paper import readings
+from mfba_planner.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios import load_scenario
+
+
+def test_order_without_arguments_is_case_study_1() -> None:
+    order = read_order([], "launcher")
+    assert order.config == RunConfig(scenario=load_scenario("case1"))
+    assert order.config.driver is Driver.MULTI_PROCESS
+    assert (order.out, order.timeout_s, order.picture) == (None, 600.0, True)
+    assert order.node_args == {
+        name: [] for name in ("world_sim", "virtual_sensor", "planner", "recorder")
+    }
+
+
+def test_order_takes_readings_then_algorithm_then_single_options() -> None:
+    order = read_order(
+        ["--reading=fig1", "--swarm=table3", "--algorithm=ba", "--set=planner.bat.rho=7"]
+        + ["--set=planner.swarm=fresh", "--set=sensor.sectors=16", "--set=planner.speed_mps=1"],
+        "launcher",
+    )
+    planner = order.config.planner
+    assert planner.step_length_m == readings.planner("fig1").step_length_m
+    assert planner.bat.population == readings.swarm("table3").population
+    assert planner.bat.algorithm is Algorithm.BA
+    assert (planner.bat.rho, planner.speed_mps, planner.swarm.value) == (7.0, 1.0, "fresh")
+    assert order.config.sensor.sectors == 16
+
+
+def test_every_option_can_be_set_to_its_default() -> None:
+    settings = [
+        f"--set={name}={getattr(default, 'value', default)}" for name, default, _ in option_rows()
+    ]
+    assert len(settings) > 10
+    assert read_order(settings, "launcher").config == read_order([], "launcher").config
+
+
+def test_speed_means_real_time_and_time_enough() -> None:
+    order = read_order(["--speed=0.1"], "launcher")
+    assert order.config.real_time
+    assert order.config.speed_factor == 0.1
+    assert order.timeout_s > order.config.scenario.time_limit_s / 0.1
+
+
+def test_node_arguments_are_split_as_in_a_shell() -> None:
+    args = ["--planner-args=-p a:='x y'", "--planner-args", "--log-level debug"]
+    assert read_order(args, "launcher").node_args["planner"] == [
+        "-p",
+        "a:=x y",
+        "--log-level",
+        "debug",
+    ]
+
+
+@given(
+    st.dictionaries(
+        st.from_regex(r"[a-z_]{1,20}", fullmatch=True),
+        st.one_of(
+            st.booleans(),
+            st.integers(-(2**63), 2**63 - 1),
+            st.floats(allow_nan=False, allow_infinity=False),
+            st.text(st.characters(codec="utf-8", exclude_categories=("Cs", "Cc"))),
+            st.lists(st.floats(0.1, 1e300), min_size=1),
+        ),
+    )
+)
+def test_parameter_files_keep_values_and_types(parameters: dict[str, object]) -> None:
+    read = yaml.safe_load(parameters_yaml(parameters))["/**"]["ros__parameters"]
+    assert {k: (type(v), v) for k, v in read.items()} == {
+        k: (type(v), v) for k, v in parameters.items()
+    }
+
+
+def test_parameter_files_are_read_so_by_ros(tmp_path: Path, domain_id: int) -> None:
+    from rclpy.context import Context
+    from rclpy.node import Node
+
+    config = read_order(["case2", "--seed", str(2**63 - 1)], "launcher").config
+    told = node_parameters(config, ("planner", "recorder"))
+    told["planner"]["bat.rho"] = 1e-5
+    for name, parameters in told.items():
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(parameters_yaml(parameters), encoding="utf-8")
+        context = Context()
+        context.init(args=["--ros-args", "--params-file", str(path)], domain_id=domain_id)
+        node = Node(name, context=context, automatically_declare_parameters_from_overrides=True)
+        found = {key: node.get_parameter(key).value for key in parameters}
+        node.destroy_node()
+        context.try_shutdown()
+        context.destroy()
+        for key, value in parameters.items():
+            plain = list(found[key]) if isinstance(value, list) else found[key]
+            assert (key, type(plain), plain) == (key, type(value), value)
+    assert flatten(config.planner)["bat.rho"] == 0.01
+
+
+def test_directories_claimed_at_once_are_different(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    start = threading.Barrier(8)
+
+    def claim(_: int) -> Path:
+        start.wait()
+        return RunDirectory(None).path
+
+    with ThreadPoolExecutor(8) as pool:
+        claimed = list(pool.map(claim, range(8)))
+    assert sorted(map(str, claimed)) == [f"runs/run-{k:03d}" for k in range(1, 9)]
+
+
+def test_directory_is_claimed_once_and_discarded_whole(tmp_path: Path) -> None:
+    wanted = tmp_path / "a" / "b"
+    directory = RunDirectory(wanted)
+    with pytest.raises(OutputError, match="a/b: exists already and is never overwritten"):
+        RunDirectory(wanted)
+    (wanted / "file").touch()
+    directory.discard()
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_discard_keeps_a_parent_that_others_use(tmp_path: Path) -> None:
+    first, second = RunDirectory(tmp_path / "runs/1"), RunDirectory(tmp_path / "runs/2")
+    first.discard()
+    assert second.path.is_dir()
+    assert not first.path.exists()
+
+
+def test_domains_are_held_once_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    with private_domain() as first, private_domain() as second:
+        assert first != second
+        assert {first, second} <= set(DOMAINS)
+        assert os.environ["ROS_DOMAIN_ID"] == str(second)
+        assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
+    assert "ROS_DOMAIN_ID" not in os.environ
+
+
+def test_domain_is_free_again_after_kill_9() -> None:
+    program = (
+        "import os, signal; from mfba_planner.launcher.domain import claim_domain;"
+        "print(claim_domain()[0], flush=True); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, check=False
+    )
+    killed = int(done.stdout)
+    claimed: list[tuple[int, Any]] = []
+    try:
+        while killed not in [domain for domain, _ in claimed]:
+            claimed.append(claim_domain())  # GraphError when all but this one are held
+    finally:
+        for _, lock in claimed:
+            lock.close()
+
+
+PROGRAMS = {
+    "talker": "print('one'); print('two', end='', flush=True); sys.exit(3)",
+    "deaf": (
+        "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('up', flush=True);"
+        "signal.pause()"
+    ),
+    "patient": "import signal; print('up', flush=True); signal.pause()",
+    "garbled": "sys.stdout.buffer.write(b'\\xff\\xfe ok\\n')",
+}
+
+
+@pytest.fixture
+def programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Children that are quicker than nodes."""
+    boot = "import sys\nprograms = {programs!r}\nexec(programs[{program!r}])"
+    monkeypatch.setattr(
+        child_module,
+        "_BOOT",
+        boot.replace("{programs!r}", repr(PROGRAMS).replace("{", "{{").replace("}", "}}")),
+    )
+
+
+class Lines:
+    """A sink that remembers."""
+
+    def __init__(self) -> None:
+        self.all: list[tuple[str, str]] = []
+
+    def __call__(self, who: str, text: str) -> None:
+        self.all.append((who, text))
+
+
+@pytest.mark.usefixtures("programs")
+def test_child_says_everything_and_how_it_ended() -> None:
+    lines = Lines()
+    child = Child("talker", [], lines)
+    assert child.ended_within(10.0)
+    assert lines.all == [("talker", "one"), ("talker", "two")]
+    assert child.fate() == "exit code 3"
+    garbled = Child("garbled", [], lines)
+    assert garbled.ended_within(10.0)
+    assert lines.all[-1] == ("garbled", "\ufffd\ufffd ok")
+
+
+@pytest.mark.usefixtures("programs")
+def test_crew_ends_even_those_who_do_not_listen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mfba_planner.launcher.crew.GRACE_S", 0.2)
+    lines = Lines()
+    crew = Crew(lines, lambda: False)
+    crew.start({"deaf": {}, "patient": {}}, {})
+    children = [*crew.children]
+    wait_until(lambda: len(lines.all) == 2, timeout_s=10.0)
+    with pytest.raises(RuntimeError, match="inside"), crew:
+        raise RuntimeError("inside")
+    assert [child.fate() for child in children] == ["killed by SIGKILL", "killed by SIGTERM"]
+
+
+@pytest.mark.usefixtures("programs")
+def test_crew_does_not_wait_for_the_deaf_when_in_a_hurry() -> None:
+    lines, hurry = Lines(), threading.Event()
+    crew = Crew(lines, hurry.is_set)
+    crew.start({"deaf": {}}, {})
+    wait_until(lambda: bool(lines.all), timeout_s=10.0)
+    children = [*crew.children]
+    hurry.set()
+    crew.stop()
+    assert children[0].fate() == "killed by SIGKILL"
+
+
+@pytest.mark.usefixtures("programs")
+def test_crew_tells_of_a_death_and_of_a_bad_end() -> None:
+    with pytest.raises(GraphError, match=r"^talker ended \(exit code 3\); it said last: two$"):
+        _crew_of_one("talker", check=True)
+    with pytest.raises(GraphError, match=r"^talker ended \(exit code 3\)"):
+        _crew_of_one("talker", check=False)
+
+
+def _crew_of_one(name: str, check: bool) -> None:
+    with Crew(Lines(), lambda: False) as crew:
+        crew.start({name: {}}, {})
+        wait_until(lambda: not crew.has(name), timeout_s=10.0)
+        if check:
+            crew.check()
+
+
+def test_lines_are_not_torn(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    screen = Screen()
+    screen.log_to(tmp_path / "log.txt")
+
+    def talk(who: str) -> None:
+        for k in range(200):
+            screen.line(who, f"{k} " + who * 50)
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(talk, "abcd"))
+    screen.close()
+    said = capfd.readouterr().out
+    assert sorted(said.splitlines()) == sorted(
+        f"[{who}] {k} " + who * 50 for who in "abcd" for k in range(200)
+    )
+    assert (tmp_path / "log.txt").read_text() == said
+
+
+def test_stop_request_counts_signals_and_gives_the_handlers_back() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with StopRequest(60.0) as stop:
+        stop.check()
+        os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(StoppedError, match="interrupted by SIGINT") as caught:
+            stop.check()
+        assert (caught.value.exit_code, stop.is_urgent()) == (130, False)
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert stop.is_urgent()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_stop_request_runs_out_of_time() -> None:
+    with StopRequest(-1.0) as stop, pytest.raises(StoppedError, match="timeout of") as caught:
+        stop.check()
+    assert caught.value.exit_code == 1
