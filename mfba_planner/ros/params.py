@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ..core.errors import ConfigError
-from ..core.options import Spec, override, walk
+from ..core.options import Spec, did_you_mean, override, walk
 
 T = TypeVar("T")
 
@@ -116,6 +116,14 @@ def declare_radii(node: Node, default: list[float]) -> list[float]:
     if not all(math.isfinite(r) and r > 0.0 for r in radii):
         raise ConfigError(f"parameter {name}={radii}: give finite radii above 0")
     return radii
+
+
+def warn_of_unknown(node: Node) -> None:
+    """Name what was given but is no parameter of the node; rclpy passes over it in silence."""
+    declared = list(node._parameters)
+    for name in node._parameter_overrides:
+        if not node.has_parameter(name):
+            node.get_logger().warning(f"{name}: no such parameter; {did_you_mean(name, declared)}")
 
 
 def values(node: Node) -> dict[str, Any]:

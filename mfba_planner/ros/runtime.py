@@ -19,6 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
+from . import params
 from .topics import Topic, expected_readers, reading_qos
 
 SPIN_S = 0.1  # longest time until a signal is noticed
@@ -132,7 +133,11 @@ class GraphNode(Node):
         )
 
     def offer_ready(self, peers: set[str]) -> None:
-        """Offer ~/ready: true once every peer's subscription to our topics is matched."""
+        """Offer ~/ready: true once every peer's subscription to our topics is matched.
+
+        The last thing a node does to get going: what it was told in vain is named here.
+        """
+        params.warn_of_unknown(self)
         self._peers = peers
         self.create_service(Trigger, "~/ready", self._on_ready)
 

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The nodes as users start them: what is wrong is one line and exit code 1, signals are quiet."""
+
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from graph import Graph
+from launching import PROGRAM, ROOT
+from nav_msgs.msg import Path as PathMsg
+
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.recover import recover
+from mfba_planner.ros import topics
+from mfba_planner.ros.convert import path_msg
+
+PARAMS_FILE = "/**: {ros__parameters: {bat.population: 1}}\n"
+
+
+def start(
+    node: str, *args: str, env: dict[str, str], file_limit: int | None = None, cwd: Path = ROOT
+) -> "subprocess.Popen[str]":
+    """A node by its console entry."""
+
+    def limit() -> None:
+        if file_limit is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (file_limit, file_limit))
+
+    return subprocess.Popen(
+        [sys.executable, "-c", PROGRAM.format(node), *args],
+        cwd=cwd,
+        env={**env, "PYTHONPATH": str(ROOT)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=limit,
+    )
+
+
+def refused(node: str, *args: str, env: dict[str, str], cwd: Path = ROOT) -> str:
+    """The one line of a node that could not begin."""
+    process = start(node, *args, env=env, cwd=cwd)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    # rcl says in its log, too, that it does not understand arguments.
+    assert [line for line in out.splitlines() if "[rcl]: Failed to parse" not in line] == []
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    return err.rstrip()
+
+
+def parameters(*values: str) -> list[str]:
+    return ["--ros-args", *(word for value in values for word in ("-p", value))]
+
+
+@pytest.mark.parametrize(
+    ("node", "value", "line"),
+    [
+        (
+            "planner",
+            "bat.population:=1",
+            "planner: population=1: out of range; give a value in [2",
+        ),
+        (
+            "planner",
+            "speed_mps:=1",
+            "planner: parameter speed_mps=1: wrong type; give a float (wr",
+        ),
+        ("planner", "speed_mps:=-0.5", "planner: speed_mps=-0.5: out of range; give a value in ["),
+        ("planner", "speed_mps:=.nan", "planner: speed_mps=nan: not finite; give a value in"),
+        ("planner", "bat.algorithm:=bee", "planner: algorithm='bee': unknown; choose one of ba,"),
+        ("world_sim", "scenario:=case3", "world_sim: 'case3': no such scenario; did you mean 'ca"),
+        ("world_sim", "scenario:=a.yaml", "world_sim: a.yaml: No such file or directory; give"),
+        ("world_sim", "tick_ns:=0", "world_sim: tick_ns=0: out of range; give a value in [1000,"),
+        ("virtual_sensor", "sectors:=2", "virtual_sensor: sectors=2: out of range; give a value"),
+        ("virtual_sensor", "source:=gps", "virtual_sensor: source='gps': unknown; choose one of"),
+        ("recorder", "output:=/proc/bag", "recorder: /proc/bag: cannot be created ("),
+        ("recorder", "output:=.", f"recorder: {ROOT}: exists already and is never overwritten"),
+        (
+            "recorder",
+            "run:=ran",
+            "recorder: parameter run='ran': not JSON of an object; give '{}'",
+        ),
+    ],
+)
+def test_a_bad_parameter_is_one_line(
+    ros_env: dict[str, str], node: str, value: str, line: str
+) -> None:
+    assert refused(node, *parameters(value), env=ros_env).startswith(line)
+
+
+def test_bad_arguments_are_one_line(ros_env: dict[str, str], tmp_path: Path) -> None:
+    def line(*args: str) -> str:
+        return refused("planner", "--ros-args", *args, env=ros_env)
+
+    assert line("--odd").startswith("planner: ['--odd']: unknown ROS arguments; after --ros-args")
+    assert line("-p", "speed_mps").startswith("planner: failed to initialize rcl: Couldn't parse")
+    missing = line("--params-file", "/nowhere.yaml")
+    assert missing.startswith("planner: failed to initialize rcl: Couldn't parse params file")
+    file = tmp_path / "planner.yaml"
+    file.write_text(PARAMS_FILE)
+    assert line("--params-file", str(file)).startswith("planner: population=1: out of range")
+    file.write_text("planner: [1, 2")
+    assert "planner.yaml" in line("--params-file", str(file))
+
+
+def test_a_misspelt_parameter_is_named(ros_env: dict[str, str]) -> None:
+    told = parameters("sped_mps:=0.5", "use_sim_time:=false")
+    planner = start("planner", *told, env={**ros_env, "RCUTILS_LOGGING_BUFFERED_STREAM": "1"})
+    assert planner.stdout is not None
+    line = planner.stdout.readline()
+    assert line.endswith("[planner]: sped_mps: no such parameter; did you mean 'speed_mps'?\n")
+    planner.terminate()
+    assert planner.communicate(timeout=60) == ("", "")
+    assert planner.returncode == 0
+
+
+def test_a_world_nobody_answers_gives_up_in_one_line(
+    graph: Graph, ros_env: dict[str, str]
+) -> None:
+    odom = graph.hear(topics.ODOM)
+    told = parameters("lockstep:=true", "answer_timeout_s:=0.1", "answer_retries:=2")
+    world = start("world_sim", *told, env=ros_env)
+    graph.until(lambda: world.poll() is not None, timeout_s=60.0)
+    _, err = world.communicate()
+    assert world.returncode == 1
+    assert err == (
+        "world_sim: tick 0: no cmd_vel though published 3 times, 0.1 s apart; "
+        "is the planner running?\n"
+    )
+    graph.settle()
+    assert len(odom) == 3
+
+
+def test_a_full_disk_is_one_line_and_a_bag_that_can_be_recovered(
+    graph: Graph, ros_env: dict[str, str], tmp_path: Path
+) -> None:
+    """RLIMIT_FSIZE: the kernel refuses as it does on a full disk."""
+    told = parameters(f"output:={tmp_path / 'bag'}")
+    recorder = start("recorder", *told, env=ros_env, file_limit=100_000)
+    plans = graph.writer(topics.PLAN)
+    count = 0
+
+    def feed() -> bool:
+        nonlocal count
+        if plans.get_subscription_count():
+            count += 1
+            plans.publish(noise(count))
+        return recorder.poll() is not None
+
+    graph.until(feed, timeout_s=60.0)
+    _, err = recorder.communicate()
+    assert recorder.returncode == 1
+    assert err.startswith(f"recorder: {tmp_path / 'bag'}: disk full after ")
+    assert err.endswith(f"make room and run `mfba recover {tmp_path / 'bag'}`\n")
+    assert err.count("\n") == 1
+    saved = recover(tmp_path / "bag", tmp_path / "saved").messages
+    assert 0 < saved <= count
+    with BagReader(tmp_path / "saved") as reader:
+        assert reader.topics["/plan"].message_count == saved
+
+
+def noise(seed: int) -> PathMsg:
+    """A message that does not compress."""
+    digits = [int.from_bytes(os.urandom(6), "little") + seed for _ in range(200)]
+    return path_msg([(1.0 / (1 + d), d * 1e-3) for d in digits], seed, "odom")
+
+
+def test_signals_at_random_moments_are_quiet() -> None:
+    """Three of each to each node; the script judges exit code, stderr and bag."""
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "bench" / "signals.py"), "3"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == "30 of 30 ended well"
