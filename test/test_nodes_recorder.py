@@ -13,17 +13,19 @@ from rclpy.context import Context
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
+from std_srvs.srv import Trigger
 
 from mfba_planner.core import episode
 from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.options import flatten
-from mfba_planner.core.planner import PlannerParams
+from mfba_planner.core.planner import Mode, PlannerParams
 from mfba_planner.core.sensing import SensorParams
 from mfba_planner.messages import stamp_ns
 from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.episode import read_episode
 from mfba_planner.recording.reader import BagReader
 from mfba_planner.recording.schemas import definition_of
-from mfba_planner.ros import topics
+from mfba_planner.ros import params, topics
 from mfba_planner.ros.convert import clock_msg, odometry_msg, pose_stamped_msg, time_msg
 from mfba_planner.ros.in_process import run_in_process
 from mfba_planner.ros.planner import PlannerNode
@@ -220,6 +222,28 @@ def test_on_a_robot_odom_of_best_effort_is_recorded_too(graph: Graph, tmp_path: 
     assert counts(tmp_path / "bag") == {"/odom": 2}
 
 
+def test_an_episode_in_real_time_keeps_the_decision_not_the_stops_after_it(
+    graph: Graph, tmp_path: Path
+) -> None:
+    nodes = [
+        graph.start(WorldSim, {"start_paused": True, "scenario": "empty"}),
+        graph.start(VirtualSensor, {"obstacle_radii_m": [0.3]}),
+        planner := graph.start(PlannerNode, {"input_timeout_s": 0.1, "seed": 2}),
+    ]
+    recorder = record(graph, tmp_path / "bag")
+    recorder.explain({node.get_name(): params.values(node) for node in nodes})
+    outcomes = graph.hear(topics.DECISION)
+    graph.until(lambda: planner._goal is not None)
+    for _ in range(2):
+        graph.call(Trigger, "world_sim/step")
+        count = len(outcomes)
+        graph.until(lambda count=count: len(outcomes) > count + 3)  # type: ignore[misc]
+    graph.stop(recorder)
+    ticks = read_episode(tmp_path / "bag").ticks
+    assert [tick.mode for tick in ticks] == [Mode.PATH_GENERATION] * 2
+    assert [tick.stamp_ns for tick in ticks] == [PlannerParams().tick_ns * k for k in (1, 2)]
+
+
 def test_stamped_twists_are_recorded_as_such(graph: Graph, tmp_path: Path) -> None:
     recorder = record(graph, tmp_path / "bag", enable_stamped_cmd_vel=True)
     graph.writer(topics.CMD_VEL, TwistStamped).publish(TwistStamped())
@@ -268,6 +292,8 @@ def test_what_is_there_is_never_overwritten(graph: Graph, tmp_path: Path) -> Non
 
 def test_facts_must_be_json(graph: Graph, tmp_path: Path) -> None:
     for text in ("{", "", "nan?", "[1]", "null"):
-        with pytest.raises(ConfigError, match=r"^parameter run=.*: not JSON of an object; give '{"):
+        with pytest.raises(
+            ConfigError, match=r"^parameter run=.*: not JSON of an object; give '{"
+        ):
             record(graph, tmp_path / "bag", run=text)
     assert not (tmp_path / "bag").exists()

@@ -78,7 +78,8 @@ def _decisions(reader: BagReader) -> tuple[Decision, ...]:
         if message.topic == SECTORS:
             ranges[stamp] = _seen(message.message)
         else:
-            decisions[stamp] = message.message
+            # A later one on a stamp only says that its inputs have become stale.
+            decisions.setdefault(stamp, message.message)
     try:
         return tuple(decision(decisions[stamp], ranges[stamp]) for stamp in sorted(decisions))
     except KeyError as error:
