@@ -51,11 +51,14 @@ class _Obstacle(_Strict):
                 f"heading_deg={self.heading_deg:g}: heading_rad={self.heading_rad:g} is given "
                 "as well; keep one of them"
             )
+        heading_rad = self.heading_rad
+        if heading_rad is None:
+            heading_rad = math.radians(self.heading_deg or 0.0)
         return Obstacle(
             center_m=self.center_m,
             radius_m=self.radius_m,
             speed_mps=self.speed_mps,
-            heading_rad=self.heading_rad or math.radians(self.heading_deg or 0.0),
+            heading_rad=heading_rad,
         )
 
 
