@@ -22,6 +22,7 @@ from mfba_planner.core.planner import NANO, PlannerParams
 from mfba_planner.messages import robot_pose, stamp_ns, velocity
 from mfba_planner.ros import topics
 from mfba_planner.ros.convert import pose_msg
+from mfba_planner.ros.virtual_sensor import VirtualSensor
 from mfba_planner.ros.world_sim import WorldSim
 from mfba_planner.scenarios import load_scenario
 
@@ -321,6 +322,14 @@ def test_real_time_ticks_on_a_wall_timer_with_the_newest_twist(graph: Graph) -> 
     assert driver.stamps == [k * 10**9 for k in range(1, 8)]
     steps = [b[0] - a[0] for a, b in zip(driver.positions[2:], driver.positions[3:])]
     assert steps == pytest.approx([0.01] * len(steps))
+
+
+def test_real_time_begins_when_those_it_waits_for_are_there(graph: Graph) -> None:
+    driver = Driver(graph, {"speed_factor": 1000.0, "wait_for": "virtual_sensor"})
+    graph.settle()
+    assert driver.odom == []
+    graph.start(VirtualSensor, {})
+    graph.until(lambda: len(driver.odom) > 2)
 
 
 def test_real_time_can_be_paused_and_stepped(graph: Graph) -> None:

@@ -14,6 +14,7 @@ from ..core.planner import PlannerParams
 from ..core.world import Scenario
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
+_WORLD_WAITS_FOR = f"{_WAIT_FOR}; in real time tick 0 waits too"
 
 
 class Source(Enum):
@@ -56,7 +57,7 @@ class WorldSimSettings:
     view_period_s: float = option(
         0.2, "markers and trail: simulated time between two", unit="s", minimum=0.0, maximum=3600.0
     )
-    wait_for: str = option("", _WAIT_FOR)
+    wait_for: str = option("", _WORLD_WAITS_FOR)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range."""

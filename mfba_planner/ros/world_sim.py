@@ -88,8 +88,8 @@ class WorldSim(GraphNode):
         self._out.tick(self.world, self._velocity, self.stamp_ns)
 
     def _on_timer(self) -> None:
-        """Real time: one more tick."""
-        if not self.pace.paused and not self.over:
+        """Real time: one more tick; the first when everybody of wait_for is there."""
+        if not self.pace.paused and not self.over and (self._published or not self.missing()):
             self._move_on()
 
     def _watch(self) -> None:
