@@ -128,9 +128,8 @@ class WorldSim(GraphNode):
         return response
 
     def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        refusal = (
-            "refused: the run is over; reset first" if self.over else self.pace.cannot_step()
-        )
+        over = "refused: the run is over; reset first" if self.over else ""
+        refusal = over or self.pace.cannot_step()
         if not refusal:
             self._move_on()
         response.success, response.message = not refusal, refusal or f"tick {self.world.tick}"
