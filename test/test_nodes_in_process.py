@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole graph in one process takes the core's decisions, tick by tick."""
 
+import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
 from graph import Graph
 
 from mfba_planner.core import episode
@@ -11,12 +15,13 @@ from mfba_planner.core.episode import Outcome, World
 from mfba_planner.core.errors import GraphError
 from mfba_planner.core.metrics import evaluate
 from mfba_planner.core.options import override
-from mfba_planner.core.planner import Mode, PlannerParams
+from mfba_planner.core.planner import NANO, Mode, PlannerParams
 from mfba_planner.core.sensing import SensorParams
 from mfba_planner.messages import stamp_ns
 from mfba_planner.paper import readings
 from mfba_planner.recording.episode import read_episode
 from mfba_planner.ros import topics
+from mfba_planner.ros.convert import pose_msg
 from mfba_planner.ros.in_process import run_in_process
 from mfba_planner.ros.planner import PlannerNode
 from mfba_planner.ros.virtual_sensor import VirtualSensor
@@ -109,6 +114,71 @@ def test_a_run_that_takes_too_long_is_a_clear_error(tmp_path: Path, domain_id: i
     assert (tmp_path / "bag" / "metadata.yaml").exists(), "the bag is closed all the same"
 
 
+def test_in_real_time_the_goal_is_reached_too(tmp_path: Path, domain_id: int) -> None:
+    told = replace(config("case2", PlannerParams(), 1), real_time=True, speed_factor=20.0)
+    took_s = run_in_process(told, tmp_path / "bag", domain_id=domain_id)
+    recorded = read_episode(tmp_path / "bag")
+    assert recorded.outcome is Outcome.GOAL_REACHED
+    assert took_s >= 0.9 * (len(recorded.ticks) - 1) * told.planner.tick_ns * NANO / 20.0
+
+
+def start_loop(graph: Graph, scenario: str, seed: int, **more: Any) -> WorldSim:
+    """World, sensor and planner, paused before the first tick; more goes to all of them."""
+    told = node_parameters(config(scenario, PlannerParams(), seed), peers=())
+    graph.start(VirtualSensor, told["virtual_sensor"])
+    planner = graph.start(PlannerNode, {**told["planner"], **more})
+    world = graph.start(WorldSim, {**told["world_sim"], **more})
+    graph.until(lambda: planner._goal is not None)
+    return world
+
+
+def run_to_the_end(graph: Graph, world: WorldSim) -> None:
+    graph.until(lambda: world.over, timeout_s=60.0)
+    graph.settle()
+
+
+def modes_of(messages: list[Any]) -> list[Mode]:
+    fields = [{v.key: v.value for v in message.status[0].values} for message in messages]
+    return [Mode(f["mode"]) for f in fields]
+
+
+def test_a_loop_of_stamped_twists(graph: Graph) -> None:
+    decisions = graph.hear(topics.DECISION)
+    world = start_loop(graph, "case2", 6, enable_stamped_cmd_vel=True)
+    world.resume()
+    run_to_the_end(graph, world)
+    expected = episode.run(load_scenario("case2"), seed=6).ticks
+    assert modes_of(decisions) == [tick.mode for tick in expected]
+    assert world.world.pose == expected[-1].pose
+
+
+@pytest.mark.parametrize("yaw", [1.0, -2.5, math.pi])
+def test_a_robot_that_looks_elsewhere_takes_the_same_way(graph: Graph, yaw: float) -> None:
+    decisions = graph.hear(topics.DECISION)
+    world = start_loop(graph, "case2", 6)
+    teleport(graph, 0.0, 0.0, yaw)
+    world.resume()
+    run_to_the_end(graph, world)
+    expected = episode.run(load_scenario("case2"), seed=6).ticks
+    assert modes_of(decisions) == [tick.mode for tick in expected]
+    assert world.world.pose == pytest.approx((*expected[-1].pose.position, yaw), abs=1e-6)
+
+
+def test_a_kidnapped_robot_finds_the_goal_from_where_it_is(graph: Graph) -> None:
+    world = start_loop(graph, "case1", 6)
+    world.resume()
+    graph.until(lambda: world.world.tick > 20)
+    teleport(graph, 2.0, 11.0, 0.5)
+    run_to_the_end(graph, world)
+    assert world.world.outcome() is Outcome.GOAL_REACHED
+
+
+def teleport(graph: Graph, x: float, y: float, yaw: float) -> None:
+    pose = PoseWithCovariance(pose=pose_msg(x, y, yaw))
+    graph.writer(topics.INITIALPOSE).publish(PoseWithCovarianceStamped(pose=pose))
+    graph.settle()
+
+
 def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph) -> None:
     told = node_parameters(config("case2", PlannerParams(), 7), peers=())
     decisions = graph.hear(topics.DECISION)
@@ -124,15 +194,12 @@ def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph)
     graph.settle()
     left_at = world.world.tick
     second = graph.start(PlannerNode, told["planner"])
-    graph.until(lambda: world.over, timeout_s=60.0)
-    graph.settle()
+    run_to_the_end(graph, world)
     assert second._refusals.count == 0
     expected = episode.run(load_scenario("case2"), seed=7).ticks
-    fields = [{v.key: v.value for v in message.status[0].values} for message in decisions]
     assert left_at < len(expected) - 5, "it was restarted too late to say anything"
     assert [stamp_ns(message.header.stamp) for message in decisions] == [
         tick.stamp_ns for tick in expected
     ]
-    assert [(f["waypoint"], Mode(f["mode"])) for f in fields] == [
-        ("{!r},{!r}".format(*tick.waypoint), tick.mode) for tick in expected
-    ]
+    assert modes_of(decisions) == [tick.mode for tick in expected]
+    assert world.world.pose == expected[-1].pose
