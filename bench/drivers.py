@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The three drivers take the same decisions: both case studies, MFBA and BA, seed by seed.
+
+Every run goes through `mfba run`; the ROS drivers' Episodes are read back from their bags and
+compared with the core's, tick by tick, every field of every Decision.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from itertools import product
+from pathlib import Path
+
+from mfba_planner.core.episode import Episode, run
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.options import override
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.scenarios import load_scenario
+
+MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
+
+
+def recorded(scenario: str, algorithm: str, seed: int, driver: str, out: Path) -> Episode:
+    """Run through a ROS driver and read the bag."""
+    arguments = ["run", scenario, "--algorithm", algorithm, "--seed", str(seed)]
+    command = [sys.executable, "-c", MFBA, *arguments, "--driver", driver, "--out", str(out)]
+    subprocess.run([*command, "--no-picture"], check=True, stdout=subprocess.DEVNULL)
+    return read_episode(out / "bag")
+
+
+def main() -> int:
+    """Print one line per driver; exit 1 when a decision differs or a run fails."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--drivers", nargs="+", default=["in-process", "multi-process"])
+    options = parser.parse_args()
+    failed = 0
+    with tempfile.TemporaryDirectory() as root:
+        for driver in options.drivers:
+            runs = equal = good = decisions = 0
+            for scenario, algorithm, seed in product(
+                ("case1", "case2"), ("mfba", "ba"), range(options.seeds)
+            ):
+                params = override(PlannerParams(), {"bat.algorithm": algorithm})
+                core = run(load_scenario(scenario), planner=params, seed=seed)
+                out = Path(root) / f"{driver}-{scenario}-{algorithm}-{seed}"
+                ours = recorded(scenario, algorithm, seed, driver, out)
+                runs += 1
+                equal += ours.ticks == core.ticks
+                good += evaluate(ours).success
+                decisions += len(ours.ticks)
+            failed += runs - min(equal, good)
+            print(
+                f"{driver}: {runs} runs, {decisions} decisions, {equal} runs equal to the core's "
+                f"tick by tick, {good} at the goal without collision",
+                flush=True,
+            )
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
