@@ -24,6 +24,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from ..core.errors import GraphError
 
 WINDOW = 5  # messages of a topic on their way: half of what a reader holds by default
+HOLD_S = 0.1  # longest delay for the sake of a latched message, where timing counts
 _SILENT_S = 2.0  # a node whose service is not found so long after it subscribed has none
 _NAMELESS = "_UNKNOWN_"  # what rmw gives for a subscriber whose node it does not know (yet)
 _NOW = Duration(nanoseconds=0)
@@ -59,11 +60,17 @@ class _Reader:
 
 @dataclass(slots=True)
 class FlowControl:
-    """Counts what was published and not read yet; topics go by their keys in `publishers`."""
+    """Counts what was published and not read yet; topics go by their keys in `publishers`.
+
+    Not lossless it only sees to it that what is latched is read before anything that follows,
+    and gives that up for good where it takes longer than HOLD_S.
+    """
 
     node: Node
     publishers: dict[str, Publisher]
     timeout_s: float
+    lossless: bool = True
+    _given_up: bool = False
     _unread: Counter[str] = field(default_factory=Counter)
     _unacknowledged: Counter[str] = field(default_factory=Counter)
     _readers: dict[str, _Reader] = field(default_factory=dict)
@@ -76,19 +83,29 @@ class FlowControl:
 
     def sent(self, topic: str) -> None:
         """Count a message."""
-        self._unread[topic] += 1
-        self._unacknowledged[topic] += 1
         durability = self.publishers[topic].qos_profile.durability
-        self._latched_sent |= durability == DurabilityPolicy.TRANSIENT_LOCAL
+        latched = durability == DurabilityPolicy.TRANSIENT_LOCAL
+        if latched or self.lossless:
+            self._latched_sent |= latched
+            self._unread[topic] += 1
+            self._unacknowledged[topic] += 1
 
-    def allows(self, topic: str) -> bool:
-        """Whether the next message may be published before `settle` is true."""
-        return (
-            self._settling_since_s is None
-            and not self._latched_sent
-            and self._unread[topic] < WINDOW
-            and self._unacknowledged[topic] < self._depth(topic)
-        )
+    def allows(self, topic: str, *, alone: bool = False) -> bool:
+        """Whether the next message may be published before `settle` is true.
+
+        alone: only when all that was published is read.
+        """
+        if self._settling_since_s is not None or self._latched_sent:
+            return self._given_up
+        if not self.lossless:
+            return True
+        if alone and self._unread:
+            return False
+        return self._unread[topic] < WINDOW and self._unacknowledged[topic] < self._depth(topic)
+
+    def knows_readers(self, now_s: float) -> bool:
+        """Whether all who subscribe now can be asked, or will never be able to answer."""
+        return not self._find_readers(now_s)
 
     def settle(self, now_s: float) -> bool:
         """True once everything was read; call it again and again, and spin in between.
@@ -97,16 +114,21 @@ class FlowControl:
         """
         if self._settling_since_s is None:
             self._settling_since_s = now_s
-        missing = self._missing_acknowledgement() or self._missing_answer(now_s)
+        missing = self._missing_acknowledgement()
+        if not (missing and self._latched_sent):  # only what has arrived can be read in order
+            missing = self._missing_answer(now_s) or missing
         if not missing:
             self._unread.clear()
             self._answers, self._settling_since_s, self._latched_sent = None, None, False
             return True
-        if now_s - self._settling_since_s > self.timeout_s:
+        waited_s = now_s - self._settling_since_s
+        if not self.lossless and waited_s > HOLD_S:
+            self._given_up = True
+        elif waited_s > self.timeout_s:
             raise GraphError(
                 f"{missing} for {self.timeout_s:g} s; end what hangs or raise --wait-timeout"
             )
-        return False
+        return self._given_up
 
     def _depth(self, topic: str) -> int:
         return max(1, int(self.publishers[topic].qos_profile.depth))
@@ -131,11 +153,13 @@ class FlowControl:
                 if reader.client
                 for _ in range(max(self._unread[topic] for topic in reader.topics))
             ]
-        self._answers = [
-            (reader, answer)
-            for reader, answer in self._answers
-            if not answer.done() and reader.client and reader.client.service_is_ready()
-        ]
+        self._answers = [(reader, answer) for reader, answer in self._answers if not answer.done()]
+        if now_s - (self._settling_since_s or now_s) > _SILENT_S:
+            self._answers = [
+                (reader, answer)
+                for reader, answer in self._answers
+                if reader.client and reader.client.service_is_ready()  # it has not gone
+            ]
         return f"{self._answers[0][0].name}: no answer" if self._answers else ""
 
     def _find_readers(self, now_s: float) -> str:

@@ -18,6 +18,7 @@ from .convert import clock_msg
 from .flow import FlowControl, all_acknowledged, windowed
 from .replay_args import ReplaySettings
 from .replay_topics import awaited, choose
+from .replay_wait import Awaited
 from .runtime import SPIN_S, GraphNode
 
 BURST = 50  # messages that may follow each other before services and signals are looked at
@@ -56,7 +57,7 @@ class Player:
         fast = s.as_fast_as_possible
         found, left_out = choose(self._bag.topics, s, self._resolve)
         self._start_ns = begin_ns(self._bag, s.start_offset)
-        self._awaited = awaited(found, s, self._resolve)
+        wanted = awaited(found, s, self._resolve)
         self._publishers = {
             topic.recorded: self._node.create_publisher(
                 topic.type,
@@ -66,8 +67,9 @@ class Player:
             )
             for topic in found
         }
+        self._awaited = Awaited(self._node, self._publishers, wanted, s.inputs_of)
         self._latched = {t.recorded: t.qos.depth or UNKNOWN_DEPTH for t in found if t.latched}
-        self._flow = FlowControl(self._node, self._publishers, s.wait_timeout) if fast else None
+        self._flow = FlowControl(self._node, self._publishers, s.wait_timeout, lossless=fast)
         self._clock = self._node.advertise(topics.CLOCK) if s.clock else None
         self._clock_due_ns = 0
         self._clock_period_ns = round(1e9 / s.clock) if s.clock else 0
@@ -133,26 +135,22 @@ class Player:
         )
         self._next = next(self._messages, None)
         self._told_ns = -1
+        self._last_ns = self._start_ns
 
     def _wait(self, now: int) -> float:
         """Until those are there who must not miss the first message."""
-        found = {t: p.get_subscription_count() for t, p in self._publishers.items()}
-        wanted = self._awaited
-        if wanted:
-            missing = [topic for topic, count in wanted.items() if found[topic] < count]
-        else:
-            missing = [] if wanted is None or any(found.values()) else list(found)
-        if not missing:
+        missing = self._awaited.missing()
+        if not missing and (self._awaited.nobody or self._flow.knows_readers(now * 1e-9)):
             self._begin(Phase.PLAYING, now)
             self._began_ns = now
             self._schedule.start(now)
             return 0.0
-        if now - self._since_ns > self.settings.wait_timeout * 1e9:
+        timeout_s = self.settings.wait_timeout
+        if missing and now - self._since_ns > timeout_s * 1e9:
             raise GraphError(
-                f"no subscriber on {', '.join(missing)} after {self.settings.wait_timeout:g} s; "
-                "start the reader or give a longer --wait-timeout"
+                f"{missing} after {timeout_s:g} s; start the readers or raise --wait-timeout"
             )
-        return POLL_S
+        return 5.0 * POLL_S
 
     def _play(self, now: int) -> float:
         for _ in range(BURST):
@@ -165,11 +163,10 @@ class Player:
                 return SPIN_S
             if wait_ns > 0:
                 return wait_ns * 1e-9
-            if (
-                self._flow
-                and not self._flow.allows(due.topic)
-                and not self._flow.settle(now * 1e-9)
-            ):
+            # Time goes on only where everything of the past has been read.
+            alone = self._clock is not None and due.time_ns > self._told_ns
+            allowed = self._flow.allows(due.topic, alone=alone)
+            if not allowed and not self._flow.settle(now * 1e-9):
                 return POLL_S
             self._publish(due)
             now = time.monotonic_ns()
@@ -180,9 +177,9 @@ class Player:
         if self._schedule.by_steps and due.time_ns > self._told_ns:
             self._tell(due.time_ns)
         self._publishers[due.topic].publish(due.data)
+        self._last_ns = due.time_ns
         self.counts[due.topic] += 1
-        if self._flow:
-            self._flow.sent(due.topic)
+        self._flow.sent(due.topic)
         self._next = next(self._messages, None)
         if self._next is None and self.settings.loop:
             self._schedule.rewind(due.time_ns, self._start_ns, LOOP_GAP_NS)
@@ -191,7 +188,7 @@ class Player:
     def _end(self, now: int) -> float:
         """Until everything has arrived; then say what was played."""
         self._played_ns = self._played_ns or now - self._began_ns
-        if self._flow and not self._flow.settle(now * 1e-9):
+        if not self._flow.settle(now * 1e-9):
             return POLL_S
         late = [t for t, p in self._publishers.items() if not all_acknowledged(p)]
         if late and now - self._since_ns < END_S * 1e9:
@@ -211,8 +208,9 @@ class Player:
             return SPIN_S
         if now >= self._clock_due_ns:
             self._clock_due_ns = max(self._clock_due_ns, now) + self._clock_period_ns
-            time_ns = max(self._start_ns, self._schedule.time_ns(now))
-            self._tell(min(time_ns, self._next.time_ns) if self._next else time_ns)
+            limit_ns = self._next.time_ns if self._next else self._last_ns
+            time_ns = min(limit_ns, self._schedule.time_ns(now))
+            self._tell(max(self._start_ns, time_ns))
         return (self._clock_due_ns - now) * 1e-9
 
     def _tell(self, time_ns: int) -> None:

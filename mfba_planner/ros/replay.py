@@ -7,11 +7,10 @@ import time
 from typing import Any
 
 from rclpy.executors import Executor
-from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
 from .player import Phase, Player
-from .replay_args import ReplaySettings, parse
+from .replay_args import ReplaySettings, parse, split_ros_args
 from .runtime import SPIN_S, GraphNode, spin_node
 
 FINE_S = 0.0015  # an executor wakes up late: so long before a message is due it is left
@@ -22,7 +21,8 @@ class Replay(GraphNode):
 
     def __init__(self, settings: ReplaySettings, **kwargs: Any) -> None:
         """Raise ConfigError or BagError for what cannot be played."""
-        super().__init__("replay", **kwargs)
+        # It has no parameters of its own, and each service costs at every turn of the executor.
+        super().__init__("replay", start_parameter_services=False, **kwargs)
         self.player = Player(self, settings)
         self._served_s = 0.0
         self.create_service(Trigger, "~/pause", self._on_pause)
@@ -65,4 +65,5 @@ class Replay(GraphNode):
 
 def main(args: list[str]) -> int:
     """Entry point."""
-    return spin_node(lambda: Replay(parse(remove_ros_args(args))), args)
+    ours, for_ros = split_ros_args(args)
+    return spin_node(lambda: Replay(parse(ours)), for_ros)

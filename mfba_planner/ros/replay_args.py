@@ -64,6 +64,20 @@ class ReplaySettings:
             )
 
 
+def split_ros_args(args: list[str]) -> tuple[list[str], list[str]]:
+    """Ours, and those from --ros-args to -- or the end.
+
+    rcl must not see ours: it would take FROM:=TO for a rule of ROS 2's early days.
+    """
+    parts: tuple[list[str], list[str]] = ([], [])
+    is_ros = False
+    for arg in args:
+        starts, ends = arg == "--ros-args", is_ros and arg == "--"
+        is_ros = (is_ros or starts) and not ends
+        parts[is_ros or ends].append(arg)
+    return parts
+
+
 def parse(args: list[str]) -> ReplaySettings:
     """Settings from a command line without ROS arguments. Raises ConfigError."""
     parser = Parser(
@@ -103,8 +117,8 @@ def _add_lists(parser: Parser) -> None:
         nargs="*",
         metavar="N|TOPIC",
         help="begin when each played topic has N subscribers, or each of these has one; without "
-        "a value when any has one, or with --inputs-of each (the default when as fast as "
-        "possible)",
+        "a value when any has one, or with --inputs-of each and the nodes' ~/ready says yes "
+        "(the default when as fast as possible)",
     )
 
 

@@ -96,20 +96,17 @@ def _inputs(nodes: tuple[str, ...]) -> Iterator[str]:
 
 def _installed(topic: BagTopic) -> Any:
     """The message class. Raises InputError where it is missing, or not what was recorded."""
-    package, _, rest = topic.type_name.partition("/")
-    folder, _, name = rest.partition("/")
-    try:
-        kind = getattr(import_module(f"{package}.{folder}"), name)
-        kind.get_fields_and_field_types()
-    except (ImportError, AttributeError, ValueError):
-        raise InputError(f"{topic.type_name} is not installed") from None
-    try:
-        installed = definition_of(topic.type_name).type_hash
-    except InputError:
-        return kind  # no hash to compare with
+    # First of all: what a file names is only imported where it is a message type.
+    installed = definition_of(topic.type_name).type_hash
     if topic.type_hash.startswith("RIHS01_") and topic.type_hash != installed:
-        raise InputError(f"{topic.type_name} is another than the recorded one")
-    return kind
+        raise InputError(f"{topic.type_name} was another type when it was recorded")
+    package, folder, name = topic.type_name.split("/")
+    try:
+        return getattr(import_module(f"{package}.{folder}"), name)
+    except (ImportError, AttributeError):
+        raise InputError(
+            f"{topic.type_name}: no Python module; install the ROS 2 package {package}"
+        ) from None
 
 
 def awaited(

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The order of replay and its deadlines: no ROS, no clock."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from recording_bags import FOREIGN, LATCHED, SECOND, SENSOR, START_NS, text
+
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.recording.qos import OfferedQos
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.timeline import Schedule, begin_ns, due_messages, offer
+from mfba_planner.recording.writer import BagWriter
+
+S = SECOND
+STRING = "std_msgs/msg/String"
+
+
+def bag_of(path: Path, *messages: tuple[float, str, str]) -> BagReader:
+    """(seconds, topic, content) each; a topic named /latched* is latched."""
+    with BagWriter(path) as writer:
+        for seconds, topic, content in messages:
+            writer.add_topic(topic, STRING, LATCHED if "latched" in topic else OfferedQos())
+            time_ns = START_NS + round(seconds * S)
+            writer.write(topic, text(content), time_ns, time_ns)
+    return BagReader(path)
+
+
+def contents(
+    bag: BagReader, topics: set[str], latched: dict[str, int], offset_s: float = 0.0
+) -> list[tuple[str, float]]:
+    with bag:
+        return [
+            (due.data[8:-1].decode(), (due.time_ns - START_NS) / S)
+            for due in due_messages(bag, topics, latched, offset_s)
+        ]
+
+
+def test_all_messages_come_in_log_time_order(tmp_path: Path) -> None:
+    bag = bag_of(tmp_path / "b", (0, "/a", "a0"), (2, "/a", "a2"), (1, "/b", "b1"), (3, "/c", "-"))
+    assert contents(bag, {"/a", "/b"}, {}) == [("a0", 0), ("b1", 1), ("a2", 2)]
+
+
+def test_after_an_offset_the_newest_latched_messages_come_first(tmp_path: Path) -> None:
+    bag = bag_of(
+        tmp_path / "b",
+        (0, "/latched_one", "old"),
+        (0.5, "/latched_two", "x"),
+        (1, "/latched_one", "newest"),
+        (2, "/latched_two", "y"),
+        (3, "/latched_two", "z"),
+        (3.5, "/plain", "gone"),
+        (4, "/plain", "first"),
+        (5, "/latched_one", "later"),
+    )
+    topics = {"/latched_one", "/latched_two", "/plain"}
+    latched = {"/latched_one": 1, "/latched_two": 2}
+    assert contents(bag, topics, latched, 4.0) == [
+        ("newest", 4),
+        ("y", 4),
+        ("z", 4),
+        ("first", 4),
+        ("later", 5),
+    ]
+
+
+def test_a_latched_message_at_the_offset_comes_once(tmp_path: Path) -> None:
+    bag = bag_of(tmp_path / "b", (0, "/latched", "old"), (1, "/latched", "new"))
+    assert contents(bag, {"/latched"}, {"/latched": 1}, 1.0) == [("old", 1), ("new", 1)]
+
+
+def test_what_was_latched_long_ago_is_still_found(tmp_path: Path) -> None:
+    bag = bag_of(tmp_path / "b", (0, "/latched", "old"), (9, "/plain", "now"))
+    assert contents(bag, {"/latched", "/plain"}, {"/latched": 1}, 8.0) == [("old", 8), ("now", 9)]
+
+
+def test_an_offset_beyond_the_end_is_refused() -> None:
+    with BagReader(FOREIGN) as bag:
+        assert begin_ns(bag, bag.duration_ns / S) == bag.end_ns
+        with pytest.raises(ConfigError, match=r"start_offset=13.3 s: beyond the end .* 13.2021 s"):
+            begin_ns(bag, 13.3)
+
+
+def test_one_publisher_is_offered_as_it_was() -> None:
+    assert offer((SENSOR,)) == SENSOR
+    assert offer(()).depth == 0
+
+
+def test_several_publishers_are_offered_as_the_strongest() -> None:
+    both = offer((SENSOR, LATCHED))
+    assert (both.reliability, both.durability) == ("reliable", "transient_local")
+    assert (both.depth, both.deadline_ns) == (5, SENSOR.deadline_ns)
+    weak = OfferedQos(reliability="best_effort", depth=1)
+    assert offer((weak, OfferedQos(reliability="best_effort", depth=7))).reliability == (
+        "best_effort"
+    )
+    assert offer((weak, OfferedQos(depth=0))).depth == 0  # one of unknown depth
+    assert offer((weak, OfferedQos(history="keep_all"))).history == "keep_all"
+
+
+@given(
+    rate=st.floats(0.01, 100.0),
+    times=st.lists(st.integers(0, 10**12), max_size=20),
+    begin=st.integers(0, 10**15),
+    late=st.integers(0, 10**10),
+)
+def test_deadlines_do_not_depend_on_when_they_are_asked_for(
+    rate: float, times: list[int], begin: int, late: int
+) -> None:
+    schedule = Schedule(rate, START_NS)
+    schedule.start(begin)
+    for time_ns in times:
+        wait = schedule.wait_ns(START_NS + time_ns, begin + late)
+        assert wait == round(time_ns / rate) - late
+
+
+@given(
+    rate=st.floats(0.1, 10.0),
+    pauses=st.lists(st.tuples(st.integers(0, 10**10), st.integers(0, 10**10)), max_size=5),
+)
+def test_pauses_shift_the_deadlines_by_their_length(
+    rate: float, pauses: list[tuple[int, int]]
+) -> None:
+    schedule = Schedule(rate, 0)
+    now = 5
+    schedule.start(now)
+    due = round(10**12 / rate) + now
+    for running, standing in pauses:
+        now += running
+        schedule.pause(now)
+        before = schedule.time_ns(now)
+        assert schedule.wait_ns(10**12, now) is None
+        now += standing
+        assert schedule.time_ns(now) == before
+        schedule.resume(now)
+        due += standing
+    wait = schedule.wait_ns(10**12, now)
+    assert wait is not None
+    assert abs(wait - (due - now)) <= 20 / rate + 2  # one rounding per pause
+
+
+def test_time_stands_until_the_start_and_while_paused() -> None:
+    schedule = Schedule(2.0, START_NS, paused=True)
+    schedule.start(0)
+    assert schedule.time_ns(99) == START_NS
+    assert [schedule.by_steps] == [True]
+    schedule.step_to(START_NS + 10)
+    schedule.step_to(START_NS + 4)  # never back
+    assert schedule.time_ns(99) == START_NS + 10
+    schedule.resume(1000)
+    schedule.resume(2000)  # it runs already
+    assert [schedule.by_steps] == [False]
+    schedule.step_to(START_NS + 10**9)  # time runs by itself
+    assert schedule.time_ns(1005) == START_NS + 20
+    assert schedule.wait_ns(START_NS + 30, 1005) == 5
+
+
+def test_resumed_before_the_start_it_runs_from_the_start() -> None:
+    schedule = Schedule(1.0, 0, paused=True)
+    schedule.resume(10)
+    assert schedule.wait_ns(5, 20) is None
+    schedule.start(100)
+    assert schedule.wait_ns(5, 100) == 5
+
+
+def test_as_fast_as_possible_everything_is_due_and_time_follows_the_messages() -> None:
+    schedule = Schedule(None, START_NS)
+    assert schedule.wait_ns(START_NS, 0) is None
+    schedule.start(0)
+    assert schedule.wait_ns(START_NS + 10**15, 0) == 0
+    assert schedule.time_ns(10**15) == START_NS
+    schedule.step_to(START_NS + 7)
+    assert schedule.time_ns(10**15) == START_NS + 7
+    schedule.rewind(START_NS + 7, START_NS, 100)
+    assert schedule.time_ns(10**15) == START_NS
+
+
+def test_the_next_round_begins_after_the_gap_whenever_that_is_asked() -> None:
+    schedule = Schedule(2.0, START_NS)
+    schedule.start(1000)
+    for round_ in range(1, 4):
+        schedule.rewind(START_NS + 600, START_NS, 50)
+        assert schedule.wait_ns(START_NS, 0) == 1000 + round_ * 350
