@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bag of a real run, opened by readers others wrote: every topic, every tick, decoded."""
+
+from pathlib import Path
+
+import pytest
+from helpers import claim_domain
+from recording_bags import count_with_all
+
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.ros import topics
+from mfba_planner.ros.in_process import run_in_process
+from mfba_planner.run_config import Driver, RunConfig
+from mfba_planner.scenarios import load_scenario
+
+NEVER = {topics.SCAN.name, topics.INITIALPOSE.name}  # nobody publishes them in a simulation
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("run") / "bag"
+    config = RunConfig(scenario=load_scenario("case2"), driver=Driver.IN_PROCESS, seed=4)
+    domain, lock = claim_domain()
+    with lock:
+        run_in_process(config, directory, domain_id=domain)
+    return directory
+
+
+def test_readers_of_others_find_every_topic_with_a_message_per_tick(bag: Path) -> None:
+    """rosbags, mcap-ros2-support, pybag and small-mcap decode it all and agree."""
+    ticks = len(read_episode(bag).ticks)
+    assert ticks > 50
+    counts = count_with_all(bag)
+    for topic in topics.GRAPH:
+        name = f"/{topic.name.lstrip('/')}"
+        if topic.every_tick:
+            assert counts[name] == ticks, name
+        else:
+            assert (counts[name] >= 1) == (topic.name not in NEVER), name
+
+
+def test_the_bag_explains_itself(bag: Path) -> None:
+    with BagReader(bag) as reader:
+        found = read_configuration(reader)
+    assert found["nodes"]["planner"]["seed"] == 4
+    assert found["run"]["driver"] == "in-process"
+    episode = read_episode(bag)
+    assert episode.scenario == load_scenario("case2")
+    assert evaluate(episode).success
