@@ -23,7 +23,7 @@ from mfba_planner.launcher import child as child_module
 from mfba_planner.launcher.child import Child
 from mfba_planner.launcher.crew import Crew, parameters_yaml
 from mfba_planner.launcher.directory import RunDirectory
-from mfba_planner.launcher.domain import DOMAINS, claim_domain, private_domain
+from mfba_planner.launcher.domain import DOMAINS, claim_domain, private_domain, require_network
 from mfba_planner.launcher.options import option_rows, read_order
 from mfba_planner.launcher.screen import Screen
 from mfba_planner.launcher.stop import StoppedError, StopRequest
@@ -304,3 +304,9 @@ def test_stop_request_runs_out_of_time() -> None:
     with StopRequest(-1.0) as stop, pytest.raises(StoppedError, match="timeout of") as caught:
         stop.check()
     assert caught.value.exit_code == 1
+
+
+def test_without_a_network_the_reason_is_told() -> None:
+    require_network()
+    with pytest.raises(GraphError, match=r"^255.255.255.255: .*ip link set lo up"):
+        require_network("255.255.255.255")  # as little to be had as 127.0.0.1 without loopback

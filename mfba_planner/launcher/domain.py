@@ -34,9 +34,22 @@ def claim_domain() -> tuple[int, socket.socket]:
     raise GraphError(f"all {len(DOMAINS)} ROS domains are taken; end other runs first")
 
 
+def require_network(address: str = "127.0.0.1") -> None:
+    """Raise GraphError when not even this machine can be reached: no node would find another."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((address, 9))
+        except OSError as error:
+            raise GraphError(
+                f"{address}: {error.strerror}, so the nodes cannot talk; "
+                "bring the loopback interface up (ip link set lo up)"
+            ) from None
+
+
 @contextmanager
 def private_domain() -> Iterator[int]:
     """Hold a domain, and keep this process and its children to it and to this machine."""
+    require_network()
     domain, lock = claim_domain()
     ours = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     theirs = {name: os.environ.get(name) for name in ours}
