@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from . import __version__
+from .core.errors import ConfigError
 from .core.options import Scalar, check, flatten, option
-from .core.planner import PlannerParams
+from .core.planner import NANO, PlannerParams
 from .core.sensing import SensorParams
 from .core.world import Scenario
 from .scenarios import scenario_to_json
@@ -45,8 +46,14 @@ class RunConfig:
     )
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range."""
+        """Raise ConfigError for a value out of range, or a planner that would stop every tick."""
         check(self)
+        tick_s, timeout_s = self.planner.tick_ns * NANO, self.planner.input_timeout_s
+        if self.real_time and timeout_s <= tick_s:
+            raise ConfigError(
+                f"planner.input_timeout_s={timeout_s:g}: a tick takes {tick_s:g} s, so in real "
+                "time the robot would stop before each; give more, or a shorter step_length_m"
+            )
 
 
 def run_facts(config: RunConfig) -> dict[str, Scalar]:
@@ -66,6 +73,8 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     peers names all nodes that must be matched before the first tick.
     """
     lockstep = not config.real_time
+    # What lasts a second must last longer in slow motion; never less than on a real robot.
+    timeout_s = min(config.planner.input_timeout_s / min(config.speed_factor, 1.0), 3600.0)
     # In lockstep nobody watches, and markers cost more than the decisions.
     common = {"lockstep": lockstep, "wait_for": ",".join(peers)}
     viewed = common | {"view_period_s": 2.0 if lockstep else 0.2}
@@ -85,5 +94,8 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             "robot_radius_m": config.scenario.robot_radius_m,
             **({"obstacle_radii_m": radii} if radii else {}),
         },
-        "planner": viewed | flatten(config.planner) | {"seed": config.seed},
+        "planner": viewed
+        | flatten(config.planner)
+        | {"seed": config.seed}
+        | ({} if lockstep else {"input_timeout_s": timeout_s}),
     }

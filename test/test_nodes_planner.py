@@ -248,6 +248,13 @@ def test_the_goals_orientation_is_not_used(graph: Graph) -> None:
     assert mode(answer) is Mode.PATH_GENERATION
 
 
+def test_a_goal_in_another_frame_is_taken_as_in_odom(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP, at=None)
+    elsewhere = goal(3.0, 0.0)
+    elsewhere.header.frame_id = "map"
+    assert fields(talk.answer(elsewhere, odom(1), sectors(1)))["goal"] == "3.0,0.0"
+
+
 def test_a_new_goal_counts_at_once_even_after_arrival(graph: Graph) -> None:
     talk = Talk(graph, LOCKSTEP, at=(1.0, 0.0))
     assert mode(talk.answer(odom(1, 1.0, 0.0), sectors(1))) is Mode.ARRIVED

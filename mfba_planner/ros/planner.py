@@ -18,8 +18,6 @@ from .inputs import Lockstep, Newest, Ready
 from .runtime import GraphNode, Refusals, spin_node
 from .settings import PlannerSettings, names
 
-WATCH_S = 0.05  # how often, in real time, the age of the inputs is looked at
-
 
 class PlannerNode(GraphNode):
     """Algorithm 1 as a node: convert, decide, convert."""
@@ -47,7 +45,8 @@ class PlannerNode(GraphNode):
         self.offer_ready(names(s.wait_for))
         self.on_time_set_back(self._start_afresh)
         if not s.lockstep:
-            self.create_timer(WATCH_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            period_s = min(max(0.25 * self.brain.params.input_timeout_s, 0.02), 0.25)
+            self.create_timer(period_s, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def missing(self) -> str:
         """Besides the subscribers: the goal, when peers are waited for."""
@@ -64,6 +63,9 @@ class PlannerNode(GraphNode):
     def _on_goal(self, message: Any) -> None:
         self.brain.reset()
         self._goal = None
+        frame, ours = message.header.frame_id, self.settings.odom_frame
+        if frame not in ("", ours):
+            self.get_logger().warning(f"goal_pose is in frame {frame!r}: taken as {ours!r}")
         try:
             self._goal = goal_point(message)
         except InputError as error:

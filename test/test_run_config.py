@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each node is told, and what makes no sense to tell them."""
+
+import pytest
+
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.options import flatten
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.run_config import NODES, RunConfig, node_parameters
+from mfba_planner.scenarios import load_scenario
+
+CASE1 = load_scenario("case1")
+
+
+def test_lockstep_tells_the_planner_its_parameters_as_they_are() -> None:
+    told = node_parameters(RunConfig(scenario=CASE1, seed=5, speed_factor=0.1), NODES)
+    assert set(told) == set(NODES)
+    assert told["planner"].items() >= {**flatten(PlannerParams()), "seed": 5}.items()
+    assert all(told[name]["lockstep"] for name in NODES)
+    assert all(told[name]["wait_for"] == ",".join(NODES) for name in NODES)
+    assert told["world_sim"]["tick_ns"] == PlannerParams().tick_ns
+
+
+@pytest.mark.parametrize(
+    ("speed_factor", "timeout_s"), [(1.0, 1.0), (0.1, 10.0), (20.0, 1.0), (0.01, 100.0)]
+)
+def test_in_slow_motion_inputs_are_stale_later(speed_factor: float, timeout_s: float) -> None:
+    config = RunConfig(scenario=CASE1, real_time=True, speed_factor=speed_factor)
+    told = node_parameters(config, ())
+    assert told["planner"]["input_timeout_s"] == pytest.approx(timeout_s)
+    assert told["world_sim"]["speed_factor"] == speed_factor
+    assert not any(told[name]["lockstep"] for name in NODES)
+
+
+def test_a_timeout_within_a_tick_makes_no_sense_in_real_time() -> None:
+    slow = PlannerParams(step_length_m=1.0, speed_mps=0.5)
+    RunConfig(scenario=CASE1, planner=slow)
+    with pytest.raises(ConfigError, match=r"^planner.input_timeout_s=1: a tick takes 2 s, so in"):
+        RunConfig(scenario=CASE1, planner=slow, real_time=True)
+
+
+def test_a_world_without_obstacles_leaves_the_sensor_its_default_radii() -> None:
+    empty = node_parameters(RunConfig(scenario=load_scenario("empty")), ())
+    walled = node_parameters(RunConfig(scenario=load_scenario("walled")), ())
+    assert "obstacle_radii_m" not in empty["virtual_sensor"]
+    assert walled["virtual_sensor"]["obstacle_radii_m"] == [0.5, 0.3, 0.2, 0.4]
+
+
+def test_values_out_of_range_are_refused() -> None:
+    for bad in ({"seed": -1}, {"speed_factor": 0.0}, {"real_time": 1}):
+        with pytest.raises(ConfigError, match=next(iter(bad))):
+            RunConfig(scenario=CASE1, **bad)  # type: ignore[arg-type]
