@@ -178,3 +178,15 @@ def test_everything_works_in_a_namespace(graph: Graph, tmp_path: Any) -> None:
     expected = run(load_scenario("case1"))
     assert world.world.tick == len(expected.ticks) - 1
     assert world.world.pose == expected.ticks[-1].pose
+
+
+def test_topics_can_be_remapped(graph: Graph) -> None:
+    """To the names of a robot that was there before."""
+    odom: list[Any] = []
+    graph.probe.create_subscription(topics.ODOM.type, "/base/pose", odom.append, topics.TICK_QOS)
+    cmd_vel = graph.probe.create_publisher(topics.CMD_VEL.type, "/base/go", topics.TICK_QOS)
+    remaps = ["--ros-args", "-r", "odom:=base/pose", "-r", "cmd_vel:=/base/go"]
+    graph.start(WorldSim, {"lockstep": True, "answer_timeout_s": 60.0}, cli_args=remaps)
+    for tick in range(1, 4):
+        graph.until(lambda tick=tick: len(odom) == tick)  # type: ignore[misc]
+        cmd_vel.publish(topics.CMD_VEL.type())

@@ -95,7 +95,7 @@ class WorldSim(GraphNode):
     def _watch(self) -> None:
         """Lockstep: begin when somebody is there; publish an unanswered tick again."""
         if not self._published:
-            if self.pace.may_move_on() and self.count_subscribers(topics.ODOM.name):
+            if self.pace.may_move_on() and self._out.are_heard:
                 self._publish_tick()
         elif self.pace.must_repeat(time.monotonic(), self.world.tick):
             self.get_logger().warning(f"tick {self.world.tick} unanswered: published again")

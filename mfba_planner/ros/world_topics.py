@@ -31,6 +31,11 @@ class WorldTopics:
         self._path: deque[Point] = deque(maxlen=TRAIL_POINTS)
         self._view = markers.Seldom(settings.view_period_s)
 
+    @property
+    def are_heard(self) -> bool:
+        """Whether somebody reads odom."""
+        return bool(self._odom.get_subscription_count())
+
     def begin(self, goal: Point, stamp_ns: int) -> None:
         """A run begins: where it leads to, and that it is under way."""
         self._path.clear()
