@@ -15,12 +15,19 @@ CLOCK_HZ = 40.0  # as `ros2 bag play --clock`
 
 _EPILOG = """\
 ~/pause, ~/resume and ~/step (one message) are std_srvs/Trigger services.
-As fast as possible, at most 5 messages of a topic are on their way before all nodes that
-listen have acknowledged them and answered a call of their parameter service, which an executor
-serves only after the messages: nothing is lost in a reader whose history holds 10, and what is
-latched has been read before anything follows.
+
+As fast as possible, at most 5 messages of a topic are under way before all nodes that listen
+have acknowledged them and answered a call of their parameter service, which an executor serves
+only after the messages. So nothing is lost by a reader whose history holds 10 (the default),
+however slow it is; but what was recorded best effort is offered best effort. With --clock time
+moves on only when everything of the past has been read.
+
+What is latched is read before anything that follows is published, at any rate where the readers
+answer within 0.1 s.
+
 With --loop the stamps go back at each new start: give --clock, and use_sim_time to the readers,
 so that they notice. With --clock the bag's own /clock is not played.
+
 --ros-args -r FROM:=TO and the like may follow.
 """
 
