@@ -91,7 +91,7 @@ def laser_scan(message: Any) -> Scan:
 
 
 def velocity(twist: Any) -> tuple[float, float, float]:
-    """geometry_msgs/Twist(Stamped) to (vx, vy, wz) in the body frame; InputError for NaN or inf."""
+    """geometry_msgs/Twist(Stamped) to body-frame (vx, vy, wz); InputError for NaN or inf."""
     twist = getattr(twist, "twist", twist)
     values = (twist.linear.x, twist.linear.y, twist.angular.z)
     _finite("cmd_vel", values)
