@@ -49,8 +49,8 @@ def long_run(ticks: int) -> RunConfig:
     return RunConfig(scenario=scenario, planner=planner)
 
 
-def measure(ticks: int) -> dict[str, list[tuple[int, float]]]:
-    """Per node, (tick, MB) from the end of the warm-up to the last tick."""
+def measure(ticks: int) -> dict[str, list[float]]:
+    """Per node, MB from the end of the warm-up to the last tick."""
     config = long_run(ticks)
     peers = (*NODES, RECORDER)
     with (
@@ -71,7 +71,7 @@ def measure(ticks: int) -> dict[str, list[tuple[int, float]]]:
             agreed(crew, monitor, question)
         monitor.listen()
         agreed(crew, monitor, monitor.ask_pause(False))
-        history: dict[str, list[tuple[int, float]]] = {c.name: [] for c in crew.children}
+        history: dict[str, list[float]] = {c.name: [] for c in crew.children}
         due, begun = float(WARM_UP), time.monotonic()
         while due <= ticks:
             time.sleep(0.05)
@@ -82,7 +82,9 @@ def measure(ticks: int) -> dict[str, list[tuple[int, float]]]:
             if tick >= due:
                 due += (ticks - WARM_UP) / READINGS
                 for child in crew.children:
-                    history[child.name].append((tick, resident_mb(child.process.pid)))
+                    history[child.name].append(resident_mb(child.process.pid))
+                now_mb = ", ".join(f"{node} {mb[-1]:.1f}" for node, mb in history.items())
+                print(f"tick {tick}: {now_mb} MB", flush=True)
         print(f"{tick} ticks in {time.monotonic() - begun:.0f} s")
         size = sum(path.stat().st_size for path in Path(f"{root}/bag").iterdir())
         print(f"bag of {size / 1e6:.0f} MB")
@@ -100,20 +102,16 @@ def main() -> int:
     """Print start, end, largest and growth per node."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ticks", type=int, default=100_000)
-    parser.add_argument("--verbose", action="store_true", help="print every reading")
     options = parser.parse_args()
     history = measure(options.ticks)
     print("node            start MB    end MB  largest MB   growth MB")
     bad = False
-    for node, readings in history.items():
-        values = [mb for _, mb in readings]
+    for node, values in history.items():
         growth = values[-1] - values[0]
         bad |= max(values) > ROOM_MB or growth > GROWTH_MB
         print(
             f"{node:15} {values[0]:8.1f}  {values[-1]:8.1f}  {max(values):10.1f}  {growth:10.1f}"
         )
-        if options.verbose:
-            print("   ", " ".join(f"{tick}:{mb:.1f}" for tick, mb in readings))
     return int(bad)
 
 
