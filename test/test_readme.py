@@ -13,6 +13,7 @@ import reference
 
 from mfba_planner.core.options import walk
 from mfba_planner.launcher.by_launch import ARGUMENTS
+from mfba_planner.ros.replay_args import parse
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -80,7 +81,11 @@ def test_make_targets_exist() -> None:
 def test_ros2_run_names_programs_and_parameters_that_exist(words: list[str]) -> None:
     _, _, package, program, *rest = words
     assert package == "mfba_planner"
-    declared = {name for defaults in reference.NODES[program] for name, _, _ in walk(defaults)}
+    declared = {
+        name for defaults in reference.NODES.get(program, ()) for name, _, _ in walk(defaults)
+    }
+    if program == "replay":  # it takes a command line
+        assert parse(rest).inputs_of == ("planner",)
     given = {rest[i + 1].partition(":=")[0] for i, word in enumerate(rest) if word == "-p"}
     assert given <= declared
 
