@@ -71,7 +71,7 @@ def _decisions(reader: BagReader) -> tuple[Decision, ...]:
     ranges: dict[int, Ranges] = {}
     decisions: dict[int, Any] = {}
     for topic in (SECTORS, DECISION):
-        if topic not in reader.topics:
+        if topic not in reader.topics or not reader.topics[topic].message_count:
             raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
     for message in reader.decoded([SECTORS, DECISION]):
         stamp = stamp_ns(message.message.header.stamp)
@@ -98,8 +98,6 @@ def _seen(sectors: Any) -> Ranges:
 
 def _outcome(scenario: Scenario, params: PlannerParams, ticks: tuple[Decision, ...]) -> Outcome:
     """How the run ended, judged as the simulated world judges it."""
-    if not ticks:
-        return Outcome.INTERRUPTED
     world = World(scenario, params.tick_ns, params.goal_tolerance_m)
     world.tick, world.pose = ticks[-1].stamp_ns // params.tick_ns - 1, ticks[-1].pose
     return world.outcome() or Outcome.INTERRUPTED
