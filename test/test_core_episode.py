@@ -247,6 +247,10 @@ def test_fitness_is_the_reciprocal_length_of_tables_5_and_7() -> None:
     )
 
 
+def test_fitness_of_a_very_short_trip() -> None:
+    assert evaluate(trip([(0.0, 0.0), (0.0, 0.5)])).fitness == 2.0
+
+
 @pytest.mark.parametrize("count", [0, 1])
 def test_an_episode_without_a_step(count: int) -> None:
     result = evaluate(trip([(1.0, 2.0)] * count, obstacles=(post((1.0, 5.0)),)))

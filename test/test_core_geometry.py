@@ -111,6 +111,12 @@ def test_a_ray_that_misses_sees_nothing() -> None:
     assert ray_circle_distance(2.0, 1.0, math.radians(30.1)) == math.inf
     assert ray_circle_distance(2.0, 1.0, math.radians(90.0)) == math.inf
     assert ray_circle_distance(2.0, 1.0, math.radians(180.0)) == math.inf, "behind is not ahead"
+    assert ray_circle_distance(0.6, 0.5, math.radians(180.0)) == math.inf
+
+
+def test_a_tangent_touches() -> None:
+    radius = 2.0 * math.sin(0.5)  # the very float that the ray's distance aside is
+    assert ray_circle_distance(2.0, radius, 0.5) == 2.0 * math.cos(0.5)
 
 
 def test_on_or_inside_a_circle_every_ray_hits_at_once() -> None:

@@ -171,6 +171,7 @@ def test_override_checks_changes_as_a_whole() -> None:
 
 def test_far_off_words_get_the_whole_list() -> None:
     assert did_you_mean("zzzz", ["b", "a"]) == "known: a, b"
+    assert did_you_mean("coat", ["case1"]) == "known: case1", "two letters of five are too few"
     assert did_you_mean("case", ["case1", "empty"]) == "did you mean 'case1'?"
 
 

@@ -43,8 +43,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "run_config": ({"core", "scenarios"}, {"numpy"}),
     "paper": ({"core", "paper"}, {"numpy"}),
     "recording": (
-        {"core", "messages", "outputs", "recording", "run_config", "scenarios"},
-        {"mcap", "mcap_ros2", "numpy", "yaml", "zstandard"},
+        {"core", "messages", "recording", "scenarios"},
+        {"mcap", "mcap_ros2", "yaml", "zstandard"},
     ),
     "report": ({"core", "paper", "report"}, {"matplotlib", "numpy", "rich"}),
     "ros": (
