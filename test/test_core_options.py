@@ -242,7 +242,10 @@ def test_the_range_of_every_parameter(kind: type, name: str, low: float, high: f
     rest = {"f_max": 1000.0} if name == "f_min" else {}
     for value in (low, high):
         assert getattr(kind(**{name: value}, **rest), name) == value
-    for value in (low - 1, high + 1):
+    whole = type(low) is int
+    below = low - 1 if whole else math.nextafter(low, -math.inf)
+    above = high + 1 if whole else math.nextafter(high, math.inf)
+    for value in (below, above):
         with pytest.raises(ConfigError, match=f"^{name}=.*: out of range; give a value in"):
             kind(**{name: value}, **rest)
 

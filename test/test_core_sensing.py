@@ -273,12 +273,12 @@ def test_a_tangent_on_a_bound_has_a_range_in_spite_of_rounding() -> None:
         for k in range(n):
             width = 2.0 * math.pi / n
             half = 0.4 * width
-            circle = ((math.cos(k * width + half), math.sin(k * width + half)), math.sin(half))
+            circle = towards(ORIGIN, k * width + half, 1.5), 1.5 * math.sin(half)
             ring = sense_circles(ORIGIN, [circle], SensorParams(sectors=n, sensing_range_m=2.0))
-            assert ring[k] < 1.0
+            assert ring[k] < 1.5
             found += ring[(k - 1) % n] < math.inf
             if ring[(k - 1) % n] < math.inf:
-                assert ring[(k - 1) % n] == pytest.approx(math.cos(half), abs=1e-5)
+                assert ring[(k - 1) % n] == pytest.approx(1.5 * math.cos(half), abs=1e-5)
     assert found > 0, "some tangent was rounded over the bound"
 
 

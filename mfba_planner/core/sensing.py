@@ -91,7 +91,7 @@ def _mark(ranges: list[float], d: float, radius: float, direction: float) -> Non
         nearest = min(max(direction, sector * width), (sector + 1) * width)
         r = ray_circle_distance(d, radius, nearest - direction)
         if not math.isfinite(r):  # a tangent that only touches: rounding put it just outside
-            r = math.sqrt(max(0.0, d * d - radius * radius))
+            r = math.sqrt(d * d - radius * radius)
         index = sector % n
         if r < ranges[index]:
             ranges[index] = r
