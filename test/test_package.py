@@ -8,6 +8,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from configparser import ConfigParser
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -217,18 +218,25 @@ def test_every_import_is_declared_and_every_dependency_justified(distribution: A
     assert wheels | ros <= justified
 
 
-def test_installs_every_shipped_file(distribution: Any) -> None:
-    installed = {source for _, sources in distribution.data_files for source in sources}
+def test_installs_every_shipped_file_in_its_place(distribution: Any) -> None:
+    placed = {path: target for target, paths in distribution.data_files for path in paths}
     shipped = {
         relative(path)
-        for pattern in ("config/**/*.yaml", "launch/*.py", "layout/*", "resource/*")
+        for pattern in ("package.xml", "config/**/*.yaml", "launch/*.py", "layout/*")
         for path in ROOT.glob(pattern)
     }
-    assert installed == shipped | {"package.xml"}
-    assert "config/scenarios/case1.yaml" in installed
-    assert {path.parent.name for path in SOURCES} == {
-        package.rpartition(".")[2] for package in distribution.packages
+    assert {"config/scenarios/case1.yaml", "launch/simulate.launch.py"} <= shipped
+    share = Path("share/mfba_planner")
+    assert placed == {path: str(share / Path(path).parent) for path in shipped} | {
+        "resource/mfba_planner": "share/ament_index/resource_index/packages"
     }
+    assert {str(path.parent.relative_to(ROOT)).replace("/", ".") for path in SOURCES} == set(
+        distribution.packages
+    )
+    scripts = ConfigParser(interpolation=None)
+    scripts.read(ROOT / "setup.cfg")
+    assert scripts["install"]["install_scripts"] == "$base/lib/mfba_planner"
+    assert scripts["develop"]["script_dir"] == "$base/lib/mfba_planner"
 
 
 def test_programs_lead_to_a_main(distribution: Any) -> None:
