@@ -194,9 +194,10 @@ def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph)
     graph.stop(first)
     graph.settle()
     left_at = world.world.tick
-    second = graph.start(PlannerNode, told["planner"])
+    # On a slow machine ticks are repeated while their answers are on the way, and the repetitions
+    # refused: what counts is that each tick is decided once, and as the first would have.
+    graph.start(PlannerNode, told["planner"])
     run_to_the_end(graph, world)
-    assert second._refusals.count == 0
     expected = episode.run(load_scenario("case2"), seed=7).ticks
     assert left_at < len(expected) - 5, "it was restarted too late to say anything"
     assert [stamp_ns(message.header.stamp) for message in decisions] == [
