@@ -194,8 +194,8 @@ def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph)
     graph.stop(first)
     graph.settle()
     left_at = world.world.tick
-    # On a slow machine ticks are repeated while their answers are on the way, and the repetitions
-    # refused: what counts is that each tick is decided once, and as the first would have.
+    # The second planner's refusals are not asserted: 0 is expected, but 603 were seen once on a
+    # loaded machine after a single repeated tick, and the cause is not known yet.
     graph.start(PlannerNode, told["planner"])
     run_to_the_end(graph, world)
     expected = episode.run(load_scenario("case2"), seed=7).ticks
