@@ -16,6 +16,7 @@ import copy
 import importlib.abc
 import importlib.machinery
 import os
+import resource
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -45,6 +46,7 @@ TESTS = {
 }
 SLOW = "not 200_seeds and not fig_1_runs_both"
 TIMEOUT_S = 120
+MEMORY = 2 * 2**30  # of a mutant that never stops to collect things
 
 SWAPS: dict[type, list[type]] = {
     ast.Lt: [ast.LtE, ast.Gt],
@@ -176,6 +178,7 @@ def _start(module: str, tree: ast.Module) -> int:
     if pid:
         return pid
     signal.alarm(TIMEOUT_S)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
     os.dup2(null, 2)

@@ -127,6 +127,14 @@ def test_every_motion_starts_where_it_is_told_to(obstacle: Obstacle) -> None:
     assert center_at(obstacle, 0.0, ROOM) == center_at(obstacle, 0.0) == obstacle.center_m
 
 
+def test_a_room_hardly_wider_than_the_obstacle() -> None:
+    corridor = Walls(lower_m=(0.0, 0.0), upper_m=(1.25, 9.0))  # x runs from 0.5 to 0.75
+    obstacle = mover((0.5, 2.0), 0.0)
+    xs = [center_at(obstacle, t, corridor)[0] for t in (0.125, 0.25, 0.375, 0.5, 1.125)]
+    assert xs == [0.625, 0.75, 0.625, 0.5, 0.625]
+    assert bounce_times(obstacle, 0.1, 0.9, corridor) == [0.25, 0.5, 0.75]
+
+
 def test_an_obstacle_that_fills_the_room_stays() -> None:
     tight = Walls(lower_m=(0.0, 0.0), upper_m=(1.0, 9.0))
     obstacle = mover((0.5, 2.0), 45.0, math.sqrt(2.0))
@@ -237,7 +245,8 @@ def test_a_bounce_within_the_step_is_followed() -> None:
 
 def test_without_time_the_gap_is_that_of_the_moment() -> None:
     post = mover((2.0, 0.0), 0.0)
-    assert step_clearances(world(post), 1.0, 1.0, (0.0, 0.0), (0.0, 0.0)) == [3.0 - 0.8]
+    for end in ((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0)):  # wherever it is next
+        assert step_clearances(world(post), 1.0, 1.0, (0.0, 0.0), end) == [3.0 - 0.8]
 
 
 def test_no_obstacles_no_gaps() -> None:
