@@ -113,6 +113,29 @@ class Observation:
     refused: str = ""
 
 
+Refused = str  # an input that was refused travels as its reason
+
+
+def observe(
+    stamp_ns: int,
+    pose: Pose2D | Refused,
+    ranges_m: Ranges | Refused,
+    goal: Point | None,
+    last_pose: Pose2D,
+    age_ns: int = 0,
+) -> Observation:
+    """Join what was read into an Observation; last_pose stands in for a pose that was refused."""
+    refused = next((x for x in (pose, ranges_m) if isinstance(x, str)), "")
+    return Observation(
+        stamp_ns=stamp_ns,
+        pose=last_pose if isinstance(pose, str) else pose,
+        ranges_m=() if isinstance(ranges_m, str) else ranges_m,
+        goal=goal,
+        now_ns=stamp_ns + age_ns,
+        refused=refused,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
     """One answer of the planner and why; gap counts from 1, 0 is none; lengths in metres."""

@@ -117,6 +117,11 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"how the paper's eq. 3-10 are read: {', '.join(readings.SWARMS)}",
     )
+    add_set_argument(parser)
+
+
+def add_set_argument(parser: argparse.ArgumentParser) -> None:
+    """--set, as often as wanted."""
     parser.add_argument(
         "--set",
         action="append",
@@ -135,13 +140,24 @@ def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
         planner = replace(planner, bat=readings.swarm(found.swarm))
     if found.algorithm:
         planner = override(planner, {"bat.algorithm": found.algorithm})
-    changes = dict(map(_setting, found.settings))
+    planner, sensor = with_settings(planner, SensorParams(), found.settings)
     return RunConfig(
         scenario=load_scenario(found.scenario),
-        planner=override(planner, _below("planner", changes)),
-        sensor=override(SensorParams(), _below("sensor", changes)),
+        planner=planner,
+        sensor=sensor,
         seed=found.seed,
         **more,
+    )
+
+
+def with_settings(
+    planner: PlannerParams, sensor: SensorParams, settings: list[str]
+) -> tuple[PlannerParams, SensorParams]:
+    """Both with NAME=VALUE changes of --set; ConfigError for what cannot be set so."""
+    changes = dict(map(_setting, settings))
+    return (
+        override(planner, _below("planner", changes)),
+        override(sensor, _below("sensor", changes)),
     )
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from mfba_planner.core.episode import Episode, Outcome, World
 from mfba_planner.core.options import flatten, override
@@ -37,23 +37,48 @@ def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
 
 
 def _read(reader: BagReader) -> Episode:
+    setup = read_setup(reader)
+    return setup.episode(_decisions(reader))
+
+
+class Setup(NamedTuple):
+    """What a bag's configuration says about the run."""
+
+    scenario: Scenario
+    sensor: SensorParams
+    planner: PlannerParams
+    seed: int
+    driver: str
+    lockstep: bool
+
+    def episode(self, ticks: tuple[Decision, ...]) -> Episode:
+        """The Episode of these decisions, at least one."""
+        return Episode(
+            scenario=self.scenario,
+            sensor=self.sensor,
+            planner=self.planner,
+            seed=self.seed,
+            driver=self.driver,
+            ticks=ticks,
+            outcome=_outcome(self.scenario, self.planner, ticks),
+        )
+
+
+def read_setup(reader: BagReader) -> Setup:
+    """The configuration a bag carries, checked. Raises BagError."""
     configuration = read_configuration(reader)
     nodes = configuration.get("nodes", {})
     try:
         world, planner, sensor = (
             nodes[name] for name in ("world_sim", "planner", "virtual_sensor")
         )
-        scenario = load_scenario(world["scenario_json"])
-        params = _only(PlannerParams(), planner)
-        ticks = _decisions(reader)
-        return Episode(
-            scenario=scenario,
+        return Setup(
+            scenario=load_scenario(world["scenario_json"]),
             sensor=_only(SensorParams(), sensor),
-            planner=params,
+            planner=_only(PlannerParams(), planner),
             seed=planner["seed"],
             driver=configuration["run"].get("driver", "by hand"),
-            ticks=ticks,
-            outcome=_outcome(scenario, params, ticks),
+            lockstep=bool(planner["lockstep"]),
         )
     except KeyError as error:
         raise BagError(

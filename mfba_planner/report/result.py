@@ -15,6 +15,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from mfba_planner import __version__
+from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.metrics import Result, evaluate
@@ -31,6 +32,7 @@ _KINDS = {
     "algorithm": str,
     "parameters": dict,
     "versions": dict,
+    "digest": str,
     "result": dict,
     "extra": dict,
 }
@@ -59,6 +61,7 @@ def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str,
             "python": platform.python_version(),
             "numpy": np.__version__,
         },
+        "digest": digest(episode.ticks),
         "result": _plain(asdict(evaluate(episode))),
         "extra": _plain(extra),
     }

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 from ..core.errors import InputError
 from ..core.geometry import Pose2D
+from ..core.planner import Refused
 from ..core.sensing import Ranges
 from .pairing import StampPairs
-
-Refused = str  # an input that was refused travels as its reason
 
 
 class Ready(NamedTuple):

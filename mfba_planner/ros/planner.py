@@ -10,7 +10,7 @@ from geometry_msgs.msg import TwistStamped
 
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner import NANO, Decision, Mode, Observation, Planner, PlannerParams
+from ..core.planner import NANO, Decision, Mode, Planner, PlannerParams, observe
 from ..messages import goal_point, robot_pose, sector_ranges, stamp_ns
 from . import convert, markers, params, topics
 from .inputs import Lockstep, Newest, Ready
@@ -104,19 +104,9 @@ class PlannerNode(GraphNode):
         if self.settings.lockstep and self._last and self._last.stamp_ns == stamp:
             self._move(self._last)  # asked again: that answer got lost, or is on its way
             return
-        refused = next((x for x in (pose, ranges) if isinstance(x, str)), "")
-        if not isinstance(pose, str):
-            self._pose = pose
-        decision = self.brain.decide(
-            Observation(
-                stamp_ns=stamp,
-                pose=self._pose,
-                ranges_m=() if isinstance(ranges, str) else ranges,
-                goal=self._goal,
-                now_ns=stamp + round(age_s / NANO),
-                refused=refused,
-            )
-        )
+        seen = observe(stamp, pose, ranges, self._goal, self._pose, round(age_s / NANO))
+        self._pose = seen.pose
+        decision = self.brain.decide(seen)
         if decision.mode is Mode.STOPPED:
             self.get_logger().warning(decision.reason, throttle_duration_sec=1.0)
         self._last = decision

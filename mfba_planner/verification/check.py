@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Decide again on what a bag recorded, and hold every recorded answer against it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..core.digest import digest
+from ..core.errors import BagError, ConfigError, InputError
+from ..core.geometry import Point, Pose2D
+from ..core.planner import Decision, Mode, Planner, observe
+from ..core.sensing import sense_circles, sensory_vector
+from ..messages import decision as read_decision
+from ..messages import obstacle_centers, robot_pose, rotated, sector_ranges, velocity
+from ..recording.episode import Setup, read_setup
+from ..recording.reader import BagReader
+from .compare import Divergence, first_divergence
+from .evidence import (
+    DECISION,
+    OBSTACLES,
+    ODOM,
+    SECTORS,
+    STEP,
+    TWIST,
+    VECTOR,
+    Evidence,
+    Tick,
+    gather,
+)
+
+
+@dataclass(slots=True, kw_only=True)
+class Report:
+    """What a check of a bag has found; identical when nothing speaks against it."""
+
+    setup: Setup
+    recorded: tuple[Decision, ...]
+    decided: tuple[Decision, ...]
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def divergence(self) -> Divergence | None:
+        """The first recorded decision that is not what the planner decides."""
+        return first_divergence(self.recorded, self.decided)
+
+    @property
+    def is_identical(self) -> bool:
+        """Whether all decisions are equal and nothing else in the bag contradicts them."""
+        return not self.faults and self.divergence is None
+
+    @property
+    def digest(self) -> str:
+        """Decision digest of what was recorded."""
+        return digest(self.recorded)
+
+
+def verify(path: str | Path) -> Report:
+    """Check a bag of ours. Raises BagError for one that cannot be checked at all."""
+    with BagReader(path) as reader:
+        try:
+            setup = read_setup(reader)
+            evidence = gather(reader, setup.planner.tick_ns if setup.lockstep else None)
+        except (ConfigError, InputError) as error:
+            raise BagError(f"{path}: {error}") from None
+    return _check(setup, evidence)
+
+
+def _check(setup: Setup, evidence: Evidence) -> Report:
+    report = Report(
+        setup=setup, recorded=(), decided=(), faults=evidence.faults, notes=evidence.notes
+    )
+    brain = Planner(setup.planner, setup.seed)
+    goals = deque(evidence.goals)
+    goal: Point | None = None
+    pose = Pose2D(0.0, 0.0)
+    recorded, decided = [], []
+    unchecked = 0
+    for tick in evidence.ticks:
+        if DECISION not in tick.said or SECTORS not in tick.said:
+            continue  # named by evidence where it must not be
+        ranges = _read(sector_ranges, tick.said[SECTORS])
+        try:
+            was = read_decision(tick.said[DECISION], () if isinstance(ranges, str) else ranges)
+        except InputError as error:
+            report.faults.append(f"stamp {tick.stamp_ns} ns: {error}")
+            continue
+        if was.goal != goal:
+            while goals and goal != was.goal:
+                goal = goals.popleft()
+                brain.reset()
+            if goal != was.goal:
+                report.faults.append(
+                    f"stamp {tick.stamp_ns} ns: decided for a goal that no /goal_pose gave"
+                )
+                goal = was.goal
+        seen: Any = was.pose
+        if setup.lockstep:
+            seen = _read(robot_pose, tick.said[ODOM]) if ODOM in tick.said else pose
+        elif was.mode is Mode.STOPPED:
+            unchecked += 1  # what was refused or how old it was is not recorded
+            continue
+        observation = observe(tick.stamp_ns, seen, ranges, goal, pose)
+        pose = observation.pose
+        recorded.append(was)
+        decided.append(brain.decide(observation))
+        report.faults += _contradictions(setup, tick, was)
+    if unchecked:
+        report.notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
+    report.recorded, report.decided = tuple(recorded), tuple(decided)
+    return report
+
+
+def _read(reader: Any, message: Any) -> Any:
+    """What the planner read: the value, or the reason why it was refused."""
+    try:
+        return reader(message)
+    except InputError as error:
+        return str(error)
+
+
+def _contradictions(setup: Setup, tick: Tick, was: Decision) -> list[str]:
+    """What other topics say about the same tick, where it is not what the decision says."""
+    found = []
+    for topic, is_so in (
+        (SECTORS, _intensities_agree),
+        (VECTOR, _vector_agrees),
+        (STEP, _step_agrees),
+        (TWIST, _twist_agrees),
+    ):
+        if topic in tick.said and not is_so(tick.said[topic], was):
+            found.append(f"stamp {tick.stamp_ns} ns: {topic} is not what the decision says")
+    if {OBSTACLES, ODOM} <= tick.said.keys() and not _is_sensed(setup, tick, was):
+        found.append(f"stamp {tick.stamp_ns} ns: {SECTORS} is not what the sensor measures")
+    return found
+
+
+def _intensities_agree(sectors: Any, was: Decision) -> bool:
+    return not was.ranges_m or tuple(sectors.intensities) == sensory_vector(was.ranges_m)
+
+
+def _vector_agrees(vector: Any, was: Decision) -> bool:
+    return tuple(vector.data) == was.vs
+
+
+def _step_agrees(step: Any, was: Decision) -> bool:
+    return (step.pose.position.x, step.pose.position.y) == was.waypoint
+
+
+def _twist_agrees(twist: Any, was: Decision) -> bool:
+    said = velocity(getattr(twist, "twist", twist))
+    return said == (*rotated(was.velocity, -was.pose.yaw), 0.0)
+
+
+def _is_sensed(setup: Setup, tick: Tick, was: Decision) -> bool:
+    """Whether the obstacles of this tick give these sectors (source: obstacles)."""
+    try:
+        position = robot_pose(tick.said[ODOM]).position
+        centers = obstacle_centers(tick.said[OBSTACLES])
+    except InputError:
+        return not was.ranges_m  # blind, as it must be
+    radii = [o.radius_m + setup.scenario.robot_radius_m for o in setup.scenario.obstacles]
+    if len(radii) != len(centers):
+        return False
+    ranges = sense_circles(position, list(zip(centers, radii)), setup.sensor)
+    return ranges == was.ranges_m or (not was.ranges_m and any(map(math.isnan, ranges)))

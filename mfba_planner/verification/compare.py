@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two answers to the same question: where they first differ, and in what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ..core.digest import canonical
+from ..core.planner import Decision
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Divergence:
+    """The first tick at which two runs differ; a run that has ended before has None there."""
+
+    tick: int
+    left: Decision | None
+    right: Decision | None
+
+    @property
+    def differing(self) -> tuple[str, ...]:
+        """Names of the fields of Decision that differ."""
+        if self.left is None or self.right is None:
+            return ()
+        return tuple(
+            item.name
+            for item in fields(Decision)
+            if _bits(self.left, item.name) != _bits(self.right, item.name)
+        )
+
+
+def first_divergence(left: Sequence[Decision], right: Sequence[Decision]) -> Divergence | None:
+    """Where two runs of decisions first differ, in any bit of their canonical form."""
+    for tick, (a, b) in enumerate(zip(left, right)):
+        if canonical(tick, a) != canonical(tick, b):
+            return Divergence(tick=tick, left=a, right=b)
+    tick = min(len(left), len(right))
+    if len(left) == len(right):
+        return None
+    return Divergence(
+        tick=tick,
+        left=left[tick] if tick < len(left) else None,
+        right=right[tick] if tick < len(right) else None,
+    )
+
+
+def side_by_side(found: Divergence, left_name: str, right_name: str) -> list[str]:
+    """Both decisions as lines; what differs is marked with >."""
+    rows = [("", left_name, right_name)]
+    for item in fields(Decision):
+        if item.name == "candidates":
+            continue
+        mark = "> " if item.name in found.differing else "  "
+        rows.append((mark + item.name, *(_text(d, item.name) for d in (found.left, found.right))))
+    widths = [max(len(row[k]) for row in rows) for k in range(2)]
+    return [
+        f"{name:<{widths[0]}}  {left:<{widths[1]}}  {right}".rstrip() for name, left, right in rows
+    ]
+
+
+def _bits(decision: Decision, name: str) -> str:
+    return repr(getattr(decision, name))  # of floats, repr tells every bit but a NaN's payload
+
+
+def _text(decision: Decision | None, name: str) -> str:
+    if decision is None:
+        return "(ended before)"
+    value: Any = getattr(decision, name)
+    if name in ("vs", "vg"):
+        return "".join(map(str, value))
+    if name == "mode":
+        return str(value.value)
+    if isinstance(value, tuple):
+        return ", ".join(f"{x!r}" for x in value)
+    return str(value)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a bag says about each tick, joined by stamp; and what is wrong with that already."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+from ..core.errors import BagError, InputError
+from ..core.geometry import Point
+from ..messages import goal_point, sector_ranges, stamp_ns
+from ..recording.reader import BagReader
+
+ODOM, OBSTACLES, SECTORS, VECTOR = "/odom", "/obstacles", "/sectors", "/sensory_vector"
+GOAL, STEP, TWIST, DECISION = "/goal_pose", "/goal_step", "/cmd_vel", "/planner/decision"
+STAMPED = (ODOM, OBSTACLES, SECTORS, STEP, DECISION)
+
+
+@dataclass(slots=True, kw_only=True)
+class Tick:
+    """All decoded messages of one stamp; None where the bag has none."""
+
+    stamp_ns: int
+    said: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(slots=True, kw_only=True)
+class Evidence:
+    """The ticks in order of their stamps; faults speak against the bag, notes do not."""
+
+    ticks: list[Tick]
+    goals: list[Point]
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def gather(reader: BagReader, tick_ns: int | None) -> Evidence:
+    """Join a bag's messages; tick_ns is the duration of a tick, None where it is not fixed.
+
+    Raises BagError for a bag without decisions, and for one that cannot be read to its end.
+    """
+    for topic in (SECTORS, DECISION):
+        if topic not in reader.topics or not reader.topics[topic].message_count:
+            raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
+    heard: dict[str, list[Any]] = {name: [] for name in (*STAMPED, VECTOR, GOAL, TWIST)}
+    for message in reader.decoded(list(heard)):
+        heard[message.topic].append(message.message)
+    found = Evidence(ticks=[], goals=_goals(heard[GOAL]))
+    ticks: dict[int, Tick] = {}
+    for topic in STAMPED:
+        # In real time a later decision on a stamp only says that its inputs have become stale.
+        _join(found, ticks, topic, heard[topic], all_alike=bool(tick_ns) or topic != DECISION)
+    _join_by_order(found, ticks, heard, SECTORS, VECTOR, _is_seen)
+    _join_by_order(found, ticks, heard, STEP, TWIST, lambda _: True)
+    found.ticks = [ticks[stamp] for stamp in sorted(ticks)]
+    if tick_ns:
+        _look_for_gaps(found, tick_ns)
+    return found
+
+
+def _goals(messages: list[Any]) -> list[Point]:
+    goals = []
+    for message in messages:
+        try:
+            goals.append(goal_point(message))
+        except InputError:  # the planner refused it as well
+            continue
+    return goals
+
+
+def _join(
+    found: Evidence,
+    ticks: dict[int, Tick],
+    topic: str,
+    messages: list[Any],
+    *,
+    all_alike: bool = True,
+) -> None:
+    before_ns, repeated = -1, 0
+    for message in messages:
+        stamp = stamp_ns(message.header.stamp)
+        if stamp < before_ns:
+            found.faults.append(f"{topic}: stamp {stamp} ns comes after {before_ns} ns")
+        before_ns = max(before_ns, stamp)
+        said = ticks.setdefault(stamp, Tick(stamp_ns=stamp)).said
+        if topic not in said:
+            said[topic] = message
+        elif _content(topic, said[topic]) == _content(topic, message):
+            repeated += 1
+        elif all_alike:
+            found.faults.append(f"{topic}: stamp {stamp} ns is there twice, and not alike")
+    if repeated:
+        found.notes.append(f"{topic}: {repeated} messages are there once more, all alike")
+
+
+def _content(topic: str, message: Any) -> str:
+    """What must not differ between two messages of one stamp, as text."""
+    if topic == DECISION and message.status:
+        status = message.status[0]
+        told = {item.key: item.value for item in status.values if item.key != "refused_inputs"}
+        return f"{status.message} {told}"
+    return str(message)
+
+
+def _is_seen(sectors: Any) -> bool:
+    """Whether a sensory vector follows these sectors: not where the sensor was blind."""
+    try:
+        sector_ranges(sectors)
+    except InputError:
+        return False
+    return True
+
+
+def _join_by_order(
+    found: Evidence,
+    ticks: dict[int, Tick],
+    heard: dict[str, list[Any]],
+    stamped: str,
+    topic: str,
+    follows: Callable[[Any], bool],
+) -> None:
+    """Give messages without a stamp the one of the message that each of them followed."""
+    leaders = [message for message in heard[stamped] if follows(message)]
+    followers = heard[topic]
+    if not leaders or not followers:
+        return
+    if hasattr(followers[0], "header"):
+        _join(found, ticks, topic, followers)
+        return
+    if len(leaders) != len(followers):
+        found.faults.append(f"{topic}: {len(followers)} messages for {len(leaders)} on {stamped}")
+        return
+    for leader, follower in zip(leaders, followers):
+        said = ticks[stamp_ns(leader.header.stamp)].said
+        if str(said.setdefault(topic, follower)) != str(follower):
+            stamp = stamp_ns(leader.header.stamp)
+            found.faults.append(f"{topic}: stamp {stamp} ns is there twice, and not alike")
+
+
+def _look_for_gaps(found: Evidence, tick_ns: int) -> None:
+    """In lockstep each tick follows the other, and each has all its messages."""
+    first = found.ticks[0].stamp_ns
+    if first > tick_ns:
+        found.notes.append(f"the recording begins at stamp {first} ns, not at tick 0")
+    for a, b in pairwise(found.ticks):
+        missing, rest = divmod(b.stamp_ns - a.stamp_ns, tick_ns)
+        if rest:
+            found.faults.append(f"stamp {b.stamp_ns} ns: no tick of {tick_ns} ns after the last")
+        elif missing > 1:
+            found.faults.append(
+                f"{missing - 1} ticks are missing between {a.stamp_ns} and {b.stamp_ns} ns"
+            )
+    for tick in found.ticks[:-1]:  # the last one may have been cut off
+        absent = [topic for topic in (*STAMPED, TWIST) if topic not in tick.said]
+        if absent:
+            found.faults.append(f"stamp {tick.stamp_ns} ns: no {', '.join(absent)}")
