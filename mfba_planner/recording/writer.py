@@ -73,6 +73,7 @@ class BagWriter:
                 self._stream,  # type: ignore[arg-type]
                 chunk_size=1 << 62,
                 compression=compression,
+                enable_data_crcs=True,
             )
             self._writer.start(profile=Profile.ROS2, library="mfba_planner")
             self._write_record()

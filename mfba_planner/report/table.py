@@ -106,3 +106,22 @@ def print_result(
     encoding = console.encoding
     console.file.write(captured.get().encode(encoding, "replace").decode(encoding))
     console.file.flush()
+
+
+def comparison_text(left: tuple[str, Result], right: tuple[str, Result]) -> str:
+    """Two results side by side as plain text; what differs is marked with >."""
+    (left_name, a), (right_name, b) = left, right
+    rows = [
+        ("outcome", words.outcome(a), words.outcome(b)),
+        ("length", words.length(a), words.length(b)),
+        ("time", words.time(a), words.time(b)),
+        ("min clearance", words.clearance(a), words.clearance(b)),
+        ("collisions", str(a.collisions), str(b.collisions)),
+        ("mode switches", str(a.mode_switches), str(b.mode_switches)),
+        ("ticks", str(a.ticks), str(b.ticks)),
+    ]
+    width = max(len(left_name), *(len(row[1]) for row in rows))
+    lines = [f"  {'':<14}{left_name:<{width}}  {right_name}"]
+    for name, one, other in rows:
+        lines.append(f"{' ' if one == other else '>'} {name:<14}{one:<{width}}  {other}")
+    return "\n".join(lines)

@@ -17,6 +17,7 @@ from ..core.sensing import sense_circles, sensory_vector
 from ..messages import decision as read_decision
 from ..messages import obstacle_centers, robot_pose, rotated, sector_ranges, velocity
 from ..recording.episode import Setup, read_setup
+from ..recording.integrity import check_data
 from ..recording.reader import BagReader
 from .compare import Divergence, first_divergence
 from .evidence import (
@@ -62,6 +63,8 @@ class Report:
 def verify(path: str | Path) -> Report:
     """Check a bag of ours. Raises BagError for one that cannot be checked at all."""
     with BagReader(path) as reader:
+        for file in reader.file_paths:
+            check_data(file)
         try:
             setup = read_setup(reader)
             evidence = gather(reader, setup.planner.tick_ns if setup.lockstep else None)

@@ -53,7 +53,8 @@ def side_by_side(found: Divergence, left_name: str, right_name: str) -> list[str
         if item.name == "candidates":
             continue
         mark = "> " if item.name in found.differing else "  "
-        rows.append((mark + item.name, *(_text(d, item.name) for d in (found.left, found.right))))
+        left, right = (_text(decision, item.name) for decision in (found.left, found.right))
+        rows.append((mark + item.name, left, right))
     widths = [max(len(row[k]) for row in rows) for k in range(2)]
     return [
         f"{name:<{widths[0]}}  {left:<{widths[1]}}  {right}".rstrip() for name, left, right in rows

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a closed MCAP file still is, bit for bit, what was written."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from pathlib import Path
+
+from mcap.opcode import Opcode
+
+from ..core.errors import BagError
+
+_MAGIC_BYTES = 8
+_FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offset start, summary CRC
+_DATA_END = struct.Struct("<BQI")  # opcode, length, CRC of all before it (0: not given)
+_BLOCK_BYTES = 1 << 20
+_REMEDY = "copy it again from where it was recorded"
+
+
+def check_data(path: Path) -> bool:
+    """Hold the data section of a closed file against its CRC; False where it carries none.
+
+    Raises BagError where they differ. Streams: holds one block.
+    """
+    with path.open("rb") as stream:
+        size = stream.seek(0, os.SEEK_END)
+        tail_bytes = _FOOTER.size + _MAGIC_BYTES
+        stream.seek(max(0, size - tail_bytes))
+        _, _, summary_start, _, _ = _FOOTER.unpack(stream.read(_FOOTER.size))
+        end = (summary_start or size - tail_bytes) - _DATA_END.size
+        stream.seek(end)
+        opcode, _, stored = _DATA_END.unpack(stream.read(_DATA_END.size))
+        if opcode != Opcode.DATA_END:
+            raise BagError(
+                f"{path}: its data section does not end where its index says; {_REMEDY}"
+            )
+        if not stored:
+            return False
+        stream.seek(0)
+        crc, left = 0, end
+        while left:
+            block = stream.read(min(left, _BLOCK_BYTES))
+            crc, left = zlib.crc32(block, crc), left - len(block)
+    if crc != stored:
+        raise BagError(
+            f"{path}: its data section has CRC {crc:08x} and not {stored:08x}, at least one bit "
+            f"has changed since it was written; {_REMEDY}"
+        )
+    return True

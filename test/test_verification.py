@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""mfba verify: an honest bag is identical, and an edited one is caught and named."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from edited_bags import Edit, last_bit, one_changed, rewrite, set_field
+from helpers import claim_domain
+
+from mfba_planner.core import episode
+from mfba_planner.core.digest import digest
+from mfba_planner.core.errors import BagError
+from mfba_planner.ros.in_process import run_in_process
+from mfba_planner.run_config import Driver, RunConfig
+from mfba_planner.scenarios import load_scenario
+from mfba_planner.verification.check import verify
+
+DECISION = "/planner/decision"
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("verified") / "bag"
+    config = RunConfig(scenario=load_scenario("case2"), driver=Driver.IN_PROCESS, seed=4)
+    domain, lock = claim_domain()
+    with lock:
+        run_in_process(config, directory, domain_id=domain)
+    return directory
+
+
+def test_an_honest_bag_is_identical(bag: Path) -> None:
+    report = verify(bag)
+    assert report.is_identical
+    assert (report.faults, report.notes) == ([], [])
+    expected = episode.run(load_scenario("case2"), seed=4).ticks
+    assert report.decided == expected
+    assert report.digest == digest(expected)
+
+
+def flip_range(message: Any) -> None:
+    message.ranges[3] = 0.5 if math.isinf(message.ranges[3]) else math.inf
+
+
+def flip_bit(message: Any) -> None:
+    message.data[3] = 1 - message.data[3]
+
+
+def flip_intensity(message: Any) -> None:
+    message.intensities[3] = 1.0 - message.intensities[3]
+
+
+def nudge_pose(message: Any) -> None:
+    position = message.pose.position
+    position.y = math.nextafter(position.y, math.inf)
+
+
+def nudge_odom(message: Any) -> None:
+    position = message.pose.pose.position
+    position.y = math.nextafter(position.y, math.inf)
+
+
+def nudge_twist(message: Any) -> None:
+    message.linear.x = math.nextafter(message.linear.x, math.inf)
+
+
+def nudge_obstacle(message: Any) -> None:
+    for pose in message.poses:
+        pose.position.x += 5.0 if pose.position.x < 6.0 else -5.0
+
+
+def other(mode: str) -> str:
+    return "blocked" if mode != "blocked" else "idle"
+
+
+def other_bit(bits: str) -> str:
+    return bits[:5] + ("1" if bits[5] == "0" else "0") + bits[6:]
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        (one_changed("/sectors", 30, flip_range), "tick 30"),
+        (one_changed("/sectors", 30, flip_intensity), "/sectors is not what the decision says"),
+        (one_changed("/sensory_vector", 30, flip_bit), "/sensory_vector is not what"),
+        (one_changed("/odom", 30, nudge_odom), "tick 30"),
+        (one_changed("/goal_step", 30, nudge_pose), "/goal_step is not what the decision says"),
+        (one_changed("/cmd_vel", 30, nudge_twist), "/cmd_vel is not what the decision says"),
+        (one_changed(DECISION, 30, set_field("waypoint", last_bit)), "tick 30"),
+        (one_changed(DECISION, 30, set_field("velocity", last_bit)), "tick 30"),
+        (one_changed(DECISION, 30, set_field("pose", lambda p: p.replace(",0.0", ",1e-300"))), ""),
+        (one_changed(DECISION, 30, set_field("mode", other)), "tick 30"),
+        (one_changed(DECISION, 30, set_field("vs", other_bit)), "tick 30"),
+        (one_changed(DECISION, 30, set_field("vg", other_bit)), "tick 30"),
+        (one_changed(DECISION, 30, set_field("gap", lambda gap: str(int(gap) + 1))), "tick 30"),
+        (one_changed(DECISION, 30, set_field("goal", lambda _: "1.0,2.0")), "for a goal that no"),
+        (one_changed(DECISION, 30, set_field("mode", lambda _: "flying")), "garbles"),
+    ],
+    ids=str,
+)
+def test_what_was_edited_by_hand_is_named(
+    bag: Path, tmp_path: Path, edit: Edit, named: str
+) -> None:
+    report = verify(rewrite(bag, tmp_path / "edited", edit))
+    assert not report.is_identical
+    found = list(report.faults)
+    if report.divergence:
+        found.append(f"tick {report.divergence.tick}")
+    assert any(named in text for text in found), found
+
+
+def test_sectors_that_the_obstacles_do_not_make_are_named(bag: Path, tmp_path: Path) -> None:
+    everywhere = one_changed("/obstacles", 30, nudge_obstacle)
+    found = [verify(rewrite(bag, tmp_path / "edited", everywhere))]
+    assert all("is not what the sensor measures" in text for text in found[0].faults)
+
+
+def without(topic: str, *indices: int) -> Edit:
+    def edit(messages: list[Any]) -> list[Any]:
+        places = [k for k, message in enumerate(messages) if message.topic == topic]
+        gone = {places[index] for index in indices}
+        return [message for k, message in enumerate(messages) if k not in gone]
+
+    return edit
+
+
+def without_tick(index: int) -> Edit:
+    def edit(messages: list[Any]) -> list[Any]:
+        times = sorted({message.log_time_ns for message in messages})
+        return [message for message in messages if message.log_time_ns != times[index]]
+
+    return edit
+
+
+def twice(topic: str, index: int) -> Edit:
+    def edit(messages: list[Any]) -> list[Any]:
+        (place,) = [[k for k, m in enumerate(messages) if m.topic == topic][index]]
+        return [*messages[: place + 1], messages[place], *messages[place + 1 :]]
+
+    return edit
+
+
+def swapped(topic: str, index: int) -> Edit:
+    """Two messages change places: under the same log times, or a reader puts them right."""
+
+    def edit(messages: list[Any]) -> list[Any]:
+        a, b = [k for k, m in enumerate(messages) if m.topic == topic][index : index + 2]
+        first, second = messages[a], messages[b]
+        messages[a] = first._replace(data=second.data)
+        messages[b] = second._replace(data=first.data)
+        return messages
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        (without_tick(20), "1 ticks are missing between"),
+        (without("/sectors", 20), "no /sectors"),
+        (without("/odom", 20), "no /odom"),
+        (without(DECISION, 20), "no /planner/decision"),
+        (without("/cmd_vel", 20), "/cmd_vel: "),
+        (without("/sensory_vector", 20), "/sensory_vector: "),
+        (swapped("/odom", 20), "/odom: stamp "),
+        (swapped(DECISION, 20), "/planner/decision: stamp "),
+    ],
+    ids=str,
+)
+def test_missing_and_reordered_messages_are_named(
+    bag: Path, tmp_path: Path, edit: Edit, named: str
+) -> None:
+    report = verify(rewrite(bag, tmp_path / "edited", edit))
+    assert not report.is_identical
+    assert any(named in fault for fault in report.faults), report.faults
+
+
+def test_a_repeated_message_is_noted_but_is_no_contradiction(bag: Path, tmp_path: Path) -> None:
+    report = verify(rewrite(bag, tmp_path / "edited", twice("/odom", 20)))
+    assert report.is_identical
+    assert report.notes == ["/odom: 1 messages are there once more, all alike"]
+
+
+def test_a_recording_that_was_interrupted_is_checked_as_far_as_it_goes(
+    bag: Path, tmp_path: Path
+) -> None:
+    def cut(messages: list[Any]) -> list[Any]:
+        return messages[: len(messages) // 2]
+
+    report = verify(rewrite(bag, tmp_path / "edited", cut))
+    assert report.divergence is None
+    assert 20 < len(report.decided) < 40
+
+
+def test_without_configuration_it_says_so(bag: Path, tmp_path: Path) -> None:
+    plain = rewrite(bag, tmp_path / "plain", list, configuration=False)
+    with pytest.raises(BagError, match="carries no mfba_planner/configuration"):
+        verify(plain)
+
+
+def test_any_one_bit_on_the_disk_is_noticed(bag: Path, tmp_path: Path) -> None:
+    (source,) = bag.glob("*.mcap")
+    data = bytearray(source.read_bytes())
+    copy = tmp_path / source.name
+    rng = np.random.default_rng(1)
+    for place in rng.integers(len(data), size=100).tolist():
+        bit = 1 << int(rng.integers(8))
+        data[place] ^= bit
+        copy.write_bytes(data)
+        with pytest.raises(BagError):
+            verify(copy)
+        data[place] ^= bit
+    copy.write_bytes(data)
+    assert verify(copy).is_identical
+
+
+def test_the_bag_that_is_checked_is_not_touched(bag: Path) -> None:
+    before = {path: path.read_bytes() for path in bag.iterdir()}
+    verify(bag)
+    assert {path: path.read_bytes() for path in bag.iterdir()} == before
