@@ -19,6 +19,7 @@ COMMANDS = {
     "picture": "draw the run that a bag holds",
     "scenarios": "list the worlds that are shipped",
     "options": "list what --set can change",
+    "tables": "the paper's tables again, ours beside the printed, with verdicts",
 }
 
 

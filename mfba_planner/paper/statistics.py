@@ -152,7 +152,7 @@ def compare_pairs(ours: Array, other: Array) -> Comparison:
     n = len(difference)
     low, high = share_interval(round(won), n)
     p = 1.0 if not difference.any() else wilcoxon(difference, method="asymptotic").pvalue
-    return Comparison(Interval(won / n, low, high), _probability(p))
+    return Comparison(Interval(float(won / n), low, high), _probability(p))
 
 
 def share_interval(count: int, n: int) -> tuple[float, float]:

@@ -90,12 +90,13 @@ def compare_exactly(printed: Printed, reading: str, ours: Cell, why: str = "") -
 
 
 def inside(printed: Printed, ours: Sequence[Ours]) -> Entry:
-    """Reproduced when one of the readings has the printed value in its 95 % interval.
+    """Reproduced when the first reading has the printed value in its 95 % interval.
 
-    The first reading is the one that is meant to; another one's success is called by its name.
+    The first reading is the one that is meant; what another one gives is told, not counted.
     """
-    value = printed.value
-    fits = [o.reading for o in ours if isinstance(o.value, Interval) and value in o.value]
+    fits = [
+        o.reading for o in ours if isinstance(o.value, Interval) and printed.value in o.value
+    ]
     fails = [o.reading for o in ours if o.reading not in fits]
     told = []
     if fits:
@@ -107,4 +108,5 @@ def inside(printed: Printed, ours: Sequence[Ours]) -> Entry:
         return entry(
             printed, ours, Verdict.IMPOSSIBLE, f"{doubts.IMPOSSIBLE[printed.key]} ({why})"
         )
-    return entry(printed, ours, Verdict.REPRODUCED if fits else Verdict.DIFFERS, why)
+    meant = ours[0].reading in fits
+    return entry(printed, ours, Verdict.REPRODUCED if meant else Verdict.DIFFERS, why)
