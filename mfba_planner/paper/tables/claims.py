@@ -25,7 +25,7 @@ def claim_section(samples: Samples) -> Section:
     """Collision-free, shorter, safer, smoother, faster: by thousands of runs."""
     return Section(
         key="claims",
-        title="The claims of the abstract",
+        title="Claims. What the abstract claims",
         entries=(
             _collision_free(samples),
             _compared(samples, "shorter", "path length", "length_m", "m", 1.0),
@@ -74,8 +74,7 @@ def _compared(
     for reading in PLANNER_READINGS:
         for case in CASES:
             mfba, ba = (
-                better * samples[trip_sample(reading, case, law)][column]
-                for law in ("mfba", "ba")
+                better * samples[trip_sample(reading, case, law)][column] for law in ("mfba", "ba")
             )
             found.append((reading, case, mfba - ba, stats.compare_pairs(mfba, ba)))
     corrected = stats.holm([comparison.p for *_, comparison in found])

@@ -15,7 +15,7 @@ from ..functions import FUNCTIONS, STEEPNESS
 from ..published import BY_KEY, Printed
 from ..readings import PLANNERS
 from ..study.plan import DIMENSION
-from .model import Entry, Ours, Section, Verdict, compare_exactly, entry
+from .model import Cell, Entry, Ours, Section, Verdict, compare_exactly, entry
 
 TABLE_2_ROUNDING = 5e-5  # Fmin is printed with at most four decimals
 
@@ -34,9 +34,7 @@ def gap_section() -> Section:
             published.EXAMPLE, "gap_vector", vg, "the ring wraps: gap 12 is closed by sector 1"
         )
     )
-    return Section(
-        key="1", title="Table 1. Gap vector construction", entries=tuple(entries)
-    )
+    return Section(key="1", title="Table 1. Gap vector construction", entries=tuple(entries))
 
 
 def function_section() -> Section:
@@ -53,7 +51,11 @@ def function_section() -> Section:
             why = "values are tested against independent ones"
             entries.append(entry(printed, [ours], Verdict.REPRODUCED, why))
             continue
-        ours_of = {"C": function.kind, "from": function.lower, "to": function.upper}
+        ours_of: dict[str, Cell] = {
+            "C": function.kind,
+            "from": function.lower,
+            "to": function.upper,
+        }
         entries.append(compare_exactly(printed, "functions", ours_of[printed.column]))
     return Section(
         key="2",
@@ -100,7 +102,7 @@ def constant_section(scenario: Scenario) -> Section:
     """The constants that the text gives, and those that it does not."""
     return Section(
         key="constants",
-        title="Constants: what the paper states, and what it does not",
+        title="Constants. What the paper states, and what it does not",
         entries=(*_stated(scenario), *_unstated()),
     )
 
@@ -142,8 +144,7 @@ def _stated(scenario: Scenario) -> Iterator[Entry]:
 def _unstated() -> Iterator[Entry]:
     for name, value, why in _gaps():
         ours = tuple(
-            Ours(reading=reading, value=text)
-            for reading, text in zip(("section6", "fig1"), value)
+            Ours(reading=reading, value=text) for reading, text in zip(("section6", "fig1"), value)
         )
         yield Entry(
             place="not stated",
