@@ -139,6 +139,4 @@ def test_the_bounds_are_reached(n: int, share: float) -> None:
     mean = at_high / n
     assert doubts.largest_sd(n, 0.0, 1.0, mean) == pytest.approx(np.std(ends, ddof=1))
     middle = [0.0, 1.0] + [share] * (n - 2)
-    assert doubts.smallest_sd(n, 0.0, 1.0, float(np.mean(middle))) == pytest.approx(
-        np.std(middle)
-    )
+    assert doubts.smallest_sd(n, 0.0, 1.0, float(np.mean(middle))) == pytest.approx(np.std(middle))
