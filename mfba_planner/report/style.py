@@ -93,6 +93,7 @@ _RC: dict[str, Any] = {
     "legend.fontsize": SMALL,
     "figure.dpi": DPI,
     "savefig.dpi": "figure",
+    "svg.hashsalt": "mfba",  # ids by content, not by chance
 }
 
 
