@@ -129,9 +129,10 @@ def test_the_quick_form_s_numbers_are_those_stored(made: Any) -> None:
 
 def test_impossible_numbers_tell_why_with_figures(made: Any) -> None:
     found = numbers(made)
-    assert "at most 9.62e-05: printed 553 times that" in found[
-        "Table 5/MFBA/standard deviation"
-    ]["why"]
+    assert (
+        "at most 9.62e-05: printed 553 times that"
+        in found["Table 5/MFBA/standard deviation"]["why"]
+    )
     assert "at least 0.0341" in found["Table 3/F4 MFBA/sd"]["why"]
     assert "means 17.0919 m, the text says 17.0925 m" in found["Table 5/MFBA/maximum"]["why"]
     assert "computing time" in found["Section 6.2, case 2/BA/run time"]["why"]

@@ -67,6 +67,14 @@ def estimate(
     return interval(statistic(resample(sample, len(sample), rng, count)), float(found))
 
 
+def mean_difference(
+    ours: Array, other: Array, rng: np.random.Generator, count: int = 1000
+) -> Interval:
+    """Mean of ours minus mean of another, independent sample, with its bootstrap interval."""
+    drawn = [resample(sample, len(sample), rng, count).mean(1) for sample in (ours, other)]
+    return interval(drawn[0] - drawn[1], float(np.mean(ours) - np.mean(other)))
+
+
 @dataclass(frozen=True, slots=True)
 class Consistency:
     """How well a printed row fits; p is joint, outside names what no single interval holds."""

@@ -30,7 +30,7 @@ class Origin:
 
     def line(self) -> str:
         """One sentence for the head of a report."""
-        size = "quick form: few runs, so only the full form's verdicts count; " if self.quick else ""
+        size = "quick form: only the full form's verdicts count; " if self.quick else ""
         return (
             f"Made by `{self.command}` ({size}seeds from {self.seed} on) with mfba_planner "
             f"{self.version}, Python {self.python}, numpy {self.numpy}."
