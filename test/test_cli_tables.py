@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers import wait_until
-from launching import PROGRAM
+from launching import PROGRAM, Program, complete
 
 from mfba_planner import __version__, cli
 from mfba_planner.entry import guarded_main
@@ -271,6 +271,21 @@ def test_resumed_and_repeated_it_gives_the_same_bytes(tmp_path: Path) -> None:
     assert 1 <= kept <= 4
     for name in FORMS:
         assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_killed_it_leaves_no_worker_and_can_be_resumed(tmp_path: Path) -> None:
+    words = ("tables", "7", "--quick", "--workers", "2", "--out", str(tmp_path / "out"))
+    with Program("mfba", *words, cwd=tmp_path) as program:
+        wait_until(
+            lambda: any(tmp_path.glob("out/chunks/*.json")) or program.process.poll() is not None,
+            60.0,
+        )
+        assert len(program.family()) > 2
+        program.process.kill()
+        wait_until(lambda: program.family() == [], 30.0)
+    again = complete("mfba", *words, cwd=tmp_path)
+    assert (again.process.returncode, again.stderr) == (0, "")
+    assert FORMS <= set(os.listdir(tmp_path / "out"))
 
 
 def test_mistakes_cost_one_line(capsys: Said, tmp_path: Path) -> None:
