@@ -71,8 +71,6 @@ def numbers(made: Any) -> dict[str, dict[str, Any]]:
 def test_every_printed_number_is_there_with_a_verdict_and_a_reason(made: Any) -> None:
     found = numbers(made)
     for printed in published.ALL:
-        if printed.key == "Section 6.2/optimum/length":
-            continue  # geometry, below
         number = found[printed.key]
         assert number["printed"] == printed.text
         assert number["verdict"] in {verdict.value for verdict in Verdict}
@@ -285,7 +283,7 @@ def test_killed_it_leaves_no_worker_and_can_be_resumed(tmp_path: Path) -> None:
         wait_until(lambda: program.family() == [], 30.0)
     again = complete("mfba", *words, cwd=tmp_path)
     assert (again.process.returncode, again.stderr) == (0, "")
-    assert FORMS <= set(os.listdir(tmp_path / "out"))
+    assert set(os.listdir(tmp_path / "out")) >= FORMS
 
 
 def test_mistakes_cost_one_line(capsys: Said, tmp_path: Path) -> None:

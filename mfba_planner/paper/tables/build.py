@@ -57,6 +57,6 @@ def build(
         "6": lambda: obstacle_section("case2", scenarios["case2"]),
         "7": lambda: trip_section("case2", samples, seed),
         "constants": lambda: constant_section(scenarios["case1"]),
-        "claims": lambda: claim_section(samples),
+        "claims": lambda: claim_section(samples, scenarios),
     }
     return [makers[name]() for name in sections]

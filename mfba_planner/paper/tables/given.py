@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 
 from ...core.gaps import gap_vector
+from ...core.geometry import distance
 from ...core.planner import PlannerParams
 from ...core.sensing import SensorParams
 from ...core.world import Scenario
@@ -103,7 +104,8 @@ def constant_section(scenario: Scenario) -> Section:
     return Section(
         key="constants",
         title="Constants. What the paper states, and what it does not",
-        entries=(*_stated(scenario), *_unstated()),
+        entries=(*_stated(scenario), _straight(scenario), *_unstated()),
+        digits=7,
     )
 
 
@@ -138,6 +140,18 @@ def _stated(scenario: Scenario) -> Iterator[Entry]:
         [Ours(reading="section6", value=0.0)],
         Verdict.DIFFERS,
         "Tables 5 and 7 themselves do without: 1/0.058502796 = 17.0932",
+    )
+
+
+def _straight(scenario: Scenario) -> Entry:
+    printed = BY_KEY["Section 6.2/optimum/length"]
+    ours = distance(scenario.start_m, scenario.goal_m)
+    same = printed.value is not None and abs(ours - printed.value) < 1e-4
+    return entry(
+        printed,
+        [Ours(reading="section6", value=ours)],
+        Verdict.REPRODUCED if same else Verdict.DIFFERS,
+        "the straight line from start to goal",
     )
 
 
