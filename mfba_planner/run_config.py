@@ -77,7 +77,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     timeout_s = min(config.planner.input_timeout_s / min(config.speed_factor, 1.0), 3600.0)
     # In lockstep nobody watches, and markers cost more than the decisions.
     common = {"lockstep": lockstep, "wait_for": ",".join(peers)}
-    viewed = common | {"view_period_s": 2.0 if lockstep else 0.2}
+    viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
     radii = [obstacle.radius_m for obstacle in config.scenario.obstacles]
     return {
         "world_sim": viewed

@@ -10,7 +10,9 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from mfba_planner.core.episode import run
+from mfba_planner.core.planner import PlannerParams
 from mfba_planner.ros import topics
+from mfba_planner.ros.convert import pose_stamped_msg
 from mfba_planner.ros.planner import PlannerNode
 from mfba_planner.ros.recorder import Recorder
 from mfba_planner.ros.virtual_sensor import VirtualSensor
@@ -26,7 +28,7 @@ TABLE = [
     ("/sectors", "sensor_msgs/msg/LaserScan", ["virtual_sensor"], ["planner"], False),
     ("/sensory_vector", "std_msgs/msg/UInt8MultiArray", ["virtual_sensor"], [], False),
     ("/goal_pose", "geometry_msgs/msg/PoseStamped", ["world_sim"], ["planner"], True),
-    ("/goal_step", "geometry_msgs/msg/PoseStamped", ["planner"], [], False),
+    ("/goal_step", "geometry_msgs/msg/PoseStamped", ["planner"], ["world_sim"], False),
     ("/plan", "nav_msgs/msg/Path", ["planner"], [], False),
     ("/trail", "nav_msgs/msg/Path", ["world_sim"], [], False),
     ("/cmd_vel", "geometry_msgs/msg/Twist", ["planner"], ["world_sim"], False),
@@ -189,4 +191,6 @@ def test_topics_can_be_remapped(graph: Graph) -> None:
     graph.start(WorldSim, {"lockstep": True, "answer_timeout_s": 60.0}, cli_args=remaps)
     for tick in range(1, 4):
         graph.until(lambda tick=tick: len(odom) == tick)  # type: ignore[misc]
+        stamp = PlannerParams().tick_ns * tick
+        graph.writer(topics.GOAL_STEP).publish(pose_stamped_msg((0.0, 0.0), stamp, "odom"))
         cmd_vel.publish(topics.CMD_VEL.type())

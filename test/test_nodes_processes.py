@@ -129,7 +129,8 @@ def test_a_world_nobody_answers_gives_up_in_one_line(
     _, err = world.communicate()
     assert world.returncode == 1
     assert err == (
-        "world_sim: tick 0: no cmd_vel though published 3 times, 0.1 s apart; "
+        "world_sim: tick 0: no goal_step of its stamp and cmd_vel though published 3 times, "
+        "0.1 s apart; "
         "is the planner running?\n"
     )
     graph.settle()

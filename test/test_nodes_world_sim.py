@@ -21,7 +21,7 @@ from mfba_planner.core.errors import ConfigError, GraphError
 from mfba_planner.core.planner import NANO, PlannerParams
 from mfba_planner.messages import robot_pose, stamp_ns, velocity
 from mfba_planner.ros import topics
-from mfba_planner.ros.convert import pose_msg
+from mfba_planner.ros.convert import pose_msg, pose_stamped_msg, set_header
 from mfba_planner.ros.virtual_sensor import VirtualSensor
 from mfba_planner.ros.world_sim import WorldSim
 from mfba_planner.scenarios import load_scenario
@@ -49,6 +49,7 @@ class Driver:
         self.odom = graph.hear(topics.ODOM)
         self.obstacles = graph.hear(topics.OBSTACLES)
         self.outcome = graph.hear(topics.OUTCOME)
+        self.goal_step = graph.writer(topics.GOAL_STEP)
         self.cmd_vel = graph.writer(topics.CMD_VEL, kind)
         self.world = graph.start(WorldSim, parameters)
 
@@ -64,10 +65,16 @@ class Driver:
         self.graph.until(lambda: len(self.odom) >= count)
         assert len(self.odom) == count
 
+    def send(self, message: Any, stamp: int | None = None) -> None:
+        """Answer a tick, the present one if no stamp is given."""
+        stamp = self.stamps[-1] if stamp is None else stamp
+        self.goal_step.publish(pose_stamped_msg((0.0, 0.0), stamp, "odom"))
+        self.cmd_vel.publish(message)
+
     def answer(self, message: Any) -> None:
         """Answer the present tick and wait for the next one."""
         count = len(self.odom)
-        self.cmd_vel.publish(message)
+        self.send(message)
         self.wait_for_ticks(count + 1)
 
     def trigger(self, name: str) -> Any:
@@ -97,12 +104,30 @@ def test_lockstep_waits_for_each_answer(driver: Driver) -> None:
 
 def test_a_second_twist_for_one_tick_is_not_an_answer_to_the_next(driver: Driver) -> None:
     driver.pause(True)
-    driver.cmd_vel.publish(twist(0.1))
+    driver.send(twist(0.1))
     driver.graph.settle()
-    driver.cmd_vel.publish(twist(50.0))
+    driver.send(twist(50.0))
     driver.graph.settle()
     driver.trigger("step")
     driver.wait_for_ticks(2)
+    assert driver.positions[1] == (0.1 * TICK_NS * NANO, 0.0)
+
+
+def test_an_answer_to_a_tick_of_the_past_is_none_to_the_present_one(driver: Driver) -> None:
+    """As a planner's that was asked twice: it answers twice."""
+    driver.answer(twist(0.1))
+    driver.send(twist(9.0), stamp=TICK_NS)
+    driver.graph.settle()
+    assert len(driver.odom) == 2
+    driver.answer(twist(0.2))
+    assert driver.positions[2][0] == pytest.approx(0.3 * TICK_NS * NANO)
+
+
+def test_a_twist_without_a_goal_step_is_no_answer(driver: Driver) -> None:
+    driver.cmd_vel.publish(twist(9.0))
+    driver.graph.settle()
+    assert len(driver.odom) == 1
+    driver.answer(twist(0.1))
     assert driver.positions[1] == (0.1 * TICK_NS * NANO, 0.0)
 
 
@@ -148,7 +173,8 @@ def test_the_robot_stands_on_a_twist_that_is_not_finite(driver: Driver, bad: flo
 
 def test_an_unanswered_tick_is_published_again_and_then_given_up(graph: Graph) -> None:
     driver = Driver(graph, {"lockstep": True, "answer_timeout_s": 0.05, "answer_retries": 2})
-    with pytest.raises(GraphError, match=r"^tick 0: no cmd_vel though published 3 times, 0\.05 s"):
+    line = r"^tick 0: no goal_step of its stamp and cmd_vel though published 3 times, 0\.05 s"
+    with pytest.raises(GraphError, match=line):
         graph.until(lambda: len(driver.odom) > 3)
     assert driver.stamps == [TICK_NS] * 3
     assert len({str(message) for message in driver.obstacles}) == 1
@@ -157,7 +183,7 @@ def test_an_unanswered_tick_is_published_again_and_then_given_up(graph: Graph) -
 def test_a_late_answer_to_a_repeated_tick_counts_once(graph: Graph) -> None:
     driver = Driver(graph, {"lockstep": True, "answer_timeout_s": 0.05, "answer_retries": 10**6})
     graph.until(lambda: len(driver.odom) >= 3)
-    driver.cmd_vel.publish(twist(0.1))
+    driver.send(twist(0.1))
     graph.until(lambda: driver.stamps[-1] > TICK_NS)
     assert driver.stamps[-1] == 2 * TICK_NS
 
@@ -177,7 +203,7 @@ def test_lockstep_begins_when_somebody_listens(graph: Graph) -> None:
 def test_pause_holds_the_world_until_it_is_lifted(driver: Driver) -> None:
     response = driver.pause(True)
     assert (response.success, response.message) == (True, "paused")
-    driver.cmd_vel.publish(twist(0.1))
+    driver.send(twist(0.1))
     driver.graph.settle()
     assert len(driver.odom) == 1
     response = driver.pause(False)
@@ -196,7 +222,7 @@ def test_step_is_one_tick(driver: Driver) -> None:
     assert not refused.success
     assert refused.message == "refused: the planner has not answered the present tick yet"
     for tick in range(1, 4):
-        driver.cmd_vel.publish(twist(0.1))
+        driver.send(twist(0.1))
         driver.graph.settle()
         response = driver.trigger("step")
         assert (response.success, response.message) == (True, f"tick {tick}")
@@ -233,7 +259,7 @@ def test_reset_puts_everything_back_but_the_stamps(graph: Graph) -> None:
 def test_an_answer_from_before_a_reset_does_not_move_the_new_run(driver: Driver) -> None:
     driver.trigger("reset")
     driver.wait_for_ticks(2)
-    driver.cmd_vel.publish(twist(9.0))  # the answer to the tick that was swept away
+    driver.send(twist(9.0), stamp=TICK_NS)  # the answer to the tick that was swept away
     driver.graph.settle()
     assert len(driver.odom) == 2
     driver.answer(twist(0.1))
@@ -270,7 +296,7 @@ def test_the_run_ends_at_the_goal(driver: Driver) -> None:
     dt = TICK_NS * NANO
     driver.answer(twist(0.5 / dt))
     driver.answer(twist(0.49 / dt))
-    driver.cmd_vel.publish(twist(1.0))
+    driver.send(twist(1.0))
     driver.graph.until(lambda: driver.world.over)
     driver.graph.settle()
     assert len(driver.odom) == 3
@@ -289,7 +315,7 @@ def test_the_run_ends_at_the_time_limit(graph: Graph) -> None:
     driver.wait_for_ticks(1)
     for _ in range(3):
         driver.answer(twist())
-    driver.cmd_vel.publish(twist())
+    driver.send(twist())
     graph.until(lambda: driver.world.over)
     graph.settle()
     assert len(driver.odom) == 4
@@ -350,7 +376,11 @@ def test_a_stamped_twist_is_taken_where_it_is_asked_for(graph: Graph) -> None:
     parameters = {"enable_stamped_cmd_vel": True, "scenario": scenario(), **LOCKSTEP}
     driver = Driver(graph, parameters, TwistStamped)
     driver.wait_for_ticks(1)
-    driver.answer(TwistStamped(twist=twist(0.2)))
+    for stamp, vx in ((TICK_NS - 1, 9.0), (TICK_NS, 0.2)):
+        message = TwistStamped(twist=twist(vx))
+        set_header(message.header, stamp, "base_link")
+        driver.cmd_vel.publish(message)
+    driver.wait_for_ticks(2)
     assert driver.positions[1] == (0.2 * TICK_NS * NANO, 0.0)
 
 

@@ -22,7 +22,7 @@ from ..report.tables import data, html, markdown
 from ..report.tables.text import Origin
 from ..scenarios import load_scenario
 
-_DESCRIPTION = """Run what Tables 1 to 7 need, and hold each printed number against ours: verdict and why.
+_DESCRIPTION = """Run what Tables 1 to 7 need and hold each printed number against ours.
 
 Everything goes into a directory: Markdown, CSV, JSON, one HTML page, and the finished parts of
 the runs, so that an interrupted command goes on where it was when called again with --out."""

@@ -161,13 +161,13 @@ def _rows(place: str, text: str, columns: tuple[str, ...], names: int) -> tuple[
 
 BENCHMARK = _rows("Table 3", _BENCHMARK, (*BENCHMARK_COLUMNS, "significant"), 2)
 TRIPS = {place: _rows(place, text, TRIP_COLUMNS, 1) for place, text in _TRIPS.items()}
-OBSTACLES = {
-    place: _rows(place, text, OBSTACLE_COLUMNS, 1) for place, text in _OBSTACLES.items()
-}
+OBSTACLES = {place: _rows(place, text, OBSTACLE_COLUMNS, 1) for place, text in _OBSTACLES.items()}
 TEXT = _named(_TEXT)
 CONSTANTS = _named(_CONSTANTS)
 GAPS = tuple(
-    Printed(place="Table 1", row=f"Vs(i), Vs(i+1) = {vs}", column="Vg(i)", text=vg, value=float(vg))
+    Printed(
+        place="Table 1", row=f"Vs(i), Vs(i+1) = {vs}", column="Vg(i)", text=vg, value=float(vg)
+    )
     for vs, vg in (line.split(" | ") for line in GAP_BITS)
 )
 EXAMPLE = Printed(
@@ -203,7 +203,5 @@ BY_KEY = {printed.key: printed for printed in ALL}
 def values(place: str, row: str) -> dict[str, float]:
     """The numbers of one row of a table: {column: value}."""
     return {
-        p.column: p.value
-        for p in ALL
-        if p.place == place and p.row == row and p.value is not None
+        p.column: p.value for p in ALL if p.place == place and p.row == row and p.value is not None
     }

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 LEVEL = 0.95
 RESAMPLES = 10_000
+RIDGE = 1e-6
 
 
 def generator(*key: int) -> np.random.Generator:
@@ -49,9 +50,7 @@ def resample(sample: Array, size: int, rng: np.random.Generator, count: int = RE
 
 def four(draws: Array) -> Array:
     """(best, worst, mean, sd) of each row of draws, sd over n - 1: (count, 4)."""
-    return np.stack(
-        [draws.min(1), draws.max(1), draws.mean(1), draws.std(1, ddof=1)], axis=1
-    )
+    return np.stack([draws.min(1), draws.max(1), draws.mean(1), draws.std(1, ddof=1)], axis=1)
 
 
 def estimate(
@@ -66,6 +65,14 @@ def estimate(
     """
     found = statistic(np.asarray(sample)[None, :])[0]
     return interval(statistic(resample(sample, len(sample), rng, count)), float(found))
+
+
+def mean_difference(
+    ours: Array, other: Array, rng: np.random.Generator, count: int = 1000
+) -> Interval:
+    """Mean of ours minus mean of another, independent sample, with its bootstrap interval."""
+    drawn = [resample(sample, len(sample), rng, count).mean(1) for sample in (ours, other)]
+    return interval(drawn[0] - drawn[1], float(np.mean(ours) - np.mean(other)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +106,9 @@ def consistency(draws: Array, printed: Sequence[float], names: Sequence[str]) ->
             below = np.searchsorted(column, x, "left")
             not_above = np.searchsorted(column, x, "right")
             scores[rows, j] = ndtri((0.5 * (below + not_above) + 0.5) / (count + 1))
-    spread = np.cov(scores[:count].T)
-    squared = np.einsum("ij,jk,ik->i", scores, np.linalg.pinv(spread), scores)
+    # Without the ridge a column that never varies would forgive any printed value.
+    spread = np.cov(scores[:count].T) + RIDGE * np.eye(k)
+    squared = np.einsum("ij,jk,ik->i", scores, np.linalg.inv(spread), scores)
     p = (1 + np.count_nonzero(squared[:count] >= squared[count])) / (count + 1)
     outside = [
         name
@@ -128,8 +136,9 @@ def compare(ours: Array, other: Array) -> Comparison:
     n, m = len(ours), len(other)
     test = mannwhitneyu(other, ours, alternative="two-sided", method="asymptotic")
     share = float(test.statistic) / (n * m)
-    deviation = np.sqrt(_placements(ours, other).var(ddof=1) / n
-                        + _placements(other, ours).var(ddof=1) / m)
+    deviation = np.sqrt(
+        _placements(ours, other).var(ddof=1) / n + _placements(other, ours).var(ddof=1) / m
+    )
     return Comparison(_normal(share, float(deviation)), _probability(test.pvalue))
 
 

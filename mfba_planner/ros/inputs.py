@@ -23,11 +23,11 @@ class Ready(NamedTuple):
 
 
 class Lockstep:
-    """Each stamp once, when both its odom and its sectors are there."""
+    """Each stamp when both its odom and its sectors are there; the last one also once more."""
 
     def __init__(self) -> None:
         """Start with nothing."""
-        self._pairs: StampPairs[Pose2D | Refused, Ranges | Refused] = StampPairs()
+        self._pairs: StampPairs[Pose2D | Refused, Ranges | Refused] = StampPairs(again=True)
 
     def odom(self, stamp_ns: int, pose: Pose2D | Refused, _now_s: float) -> Ready | None:
         """Take odom; InputError for a stamp that was answered before."""

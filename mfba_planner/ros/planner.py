@@ -7,7 +7,6 @@ import time
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
-from rclpy.clock import Clock, ClockType
 
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
@@ -31,6 +30,7 @@ class PlannerNode(GraphNode):
         self._refusals = Refusals(self)
         self._goal: Point | None = None
         self._pose = Pose2D(0.0, 0.0)  # the last that could be used
+        self._last: Decision | None = None
         self._goal_step = self.advertise(topics.GOAL_STEP)
         self._plan = self.advertise(topics.PLAN)
         self._decision = self.advertise(topics.DECISION)
@@ -46,7 +46,7 @@ class PlannerNode(GraphNode):
         self.on_time_set_back(self._start_afresh)
         if not s.lockstep:
             period_s = min(max(0.25 * self.brain.params.input_timeout_s, 0.02), 0.25)
-            self.create_timer(period_s, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            self.every(period_s, self._watch)
 
     def missing(self) -> str:
         """Besides the subscribers: the goal, when peers are waited for."""
@@ -58,6 +58,7 @@ class PlannerNode(GraphNode):
     def _start_afresh(self) -> None:
         self.get_logger().warning("time was set back: starting afresh")
         self.brain.reset()
+        self._last = None
         self._inputs = type(self._inputs)()
 
     def _on_goal(self, message: Any) -> None:
@@ -100,6 +101,9 @@ class PlannerNode(GraphNode):
         if ready is None:
             return
         stamp, pose, ranges, age_s = ready
+        if self.settings.lockstep and self._last and self._last.stamp_ns == stamp:
+            self._move(self._last)  # asked again: that answer got lost, or is on its way
+            return
         refused = next((x for x in (pose, ranges) if isinstance(x, str)), "")
         if not isinstance(pose, str):
             self._pose = pose
@@ -115,21 +119,24 @@ class PlannerNode(GraphNode):
         )
         if decision.mode is Mode.STOPPED:
             self.get_logger().warning(decision.reason, throttle_duration_sec=1.0)
+        self._last = decision
         self._publish(decision)
 
     def _publish(self, decision: Decision) -> None:
-        """Everything about the decision first, cmd_vel last: it is what the world waits for."""
+        """Everything about the decision first, what the world waits for last."""
         s, stamp = self.settings, decision.stamp_ns
-        algorithm = self.brain.params.bat.algorithm.value
-        self._goal_step.publish(convert.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame))
+        who, algorithm = self.get_fully_qualified_name(), self.brain.params.bat.algorithm.value
         self._plan.publish(convert.plan_msg(decision, s.odom_frame))
-        self._decision.publish(
-            convert.decision_msg(
-                decision, algorithm, self._refusals.count, self.get_fully_qualified_name()
-            )
-        )
+        reason = convert.decision_msg(decision, algorithm, self._refusals.count, who)
+        self._decision.publish(reason)
         if self._view.due(stamp):
             self._markers.publish(markers.decision_markers(decision, s.odom_frame))
+        self._move(decision)
+
+    def _move(self, decision: Decision) -> None:
+        """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
+        s, stamp = self.settings, decision.stamp_ns
+        self._goal_step.publish(convert.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame))
         if s.enable_stamped_cmd_vel:
             self._cmd_vel.publish(convert.twist_stamped_msg(decision, s.base_frame))
         else:

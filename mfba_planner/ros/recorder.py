@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
-from rclpy.clock import Clock, ClockType
 from rclpy.executors import Executor
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMsg
@@ -25,10 +23,13 @@ from ..recording.schemas import definition_of
 from ..recording.writer import BagWriter
 from . import params, topics
 from .drain import drain
+from .letterboxes import Deliver, Letter, Letterboxes
 from .qos import offered
 from .runtime import GraphNode, spin_node
 from .settings import RecorderSettings, names
 from .survey import Found, ParameterSurvey
+
+EMPTY_PERIOD_S = 0.02  # far below what a crash may cost, and a hundred times a message's cost
 
 
 class Recorder(GraphNode):
@@ -45,10 +46,11 @@ class Recorder(GraphNode):
         self._types: dict[str, tuple[str, OfferedQos]] = {}
         self.directory = Path(s.output) if s.output else new_run_directory()
         self.writer = BagWriter(self.directory)
+        self._letterboxes = Letterboxes()
         for topic in topics.GRAPH:
             self._record(topic)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(0.25, self._flush, clock=steady)
+        self.every(EMPTY_PERIOD_S, self._letterboxes.empty)
+        self.every(0.25, self._flush)
         self._survey = ParameterSurvey(self, names(s.nodes), self.explain)
         self.offer_ready(names(s.wait_for))
         self.get_logger().info(f"recording to {self.directory}")
@@ -59,28 +61,28 @@ class Recorder(GraphNode):
         name = self.resolve_topic_name(topic.name)
         self._types[name] = (_type_name(kind), offered(topic.qos))
         definition_of(_type_name(kind))  # found now, so that no first message waits for it
-        callback: Callable[[bytes], None] = partial(self._on_message, name)
+        deliver: Deliver = partial(self._on_message, name)
         if topic is topics.CLOCK and self.settings.sim_time:
-            callback = self._on_clock
+            deliver = self._on_clock
         # In simulated time world_sim writes what every tick brings, and nobody else.
         from_anyone = not (topic.every_tick and self.settings.sim_time)
         profiles = topics.recording_qos(topic, from_anyone=from_anyone)
-        self.subscribe(kind, topic.name, callback, profiles, raw=True)
+        self.open_boxes(self._letterboxes, kind, topic.name, deliver, profiles)
 
-    def _on_clock(self, data: bytes) -> None:
-        self._log_time_ns = stamp_ns(deserialize_message(data, ClockMsg).clock)
+    def _on_clock(self, letter: Letter) -> None:
+        self._log_time_ns = stamp_ns(deserialize_message(letter.data, ClockMsg).clock)
         for name, held in self._held:
             self._write(name, held)
         self._held.clear()
-        self._write("/clock", data)
+        self._write("/clock", letter.data)
 
-    def _on_message(self, name: str, data: bytes) -> None:
+    def _on_message(self, name: str, letter: Letter) -> None:
         if not self.settings.sim_time:
-            self._log_time_ns = time.time_ns()
+            self._log_time_ns = letter.received_ns or time.time_ns()  # not all middleware says
         elif not self._log_time_ns:
-            self._held.append((name, data))  # latched before the first tick
+            self._held.append((name, letter.data))  # latched before the first tick
             return
-        self._write(name, data)
+        self._write(name, letter.data)
 
     def _write(self, name: str, data: bytes) -> None:
         if name in self._types:  # its writer came late
@@ -109,10 +111,16 @@ class Recorder(GraphNode):
 
     def drain(self, executor: Executor) -> None:
         """Record what is under way."""
-        drain(executor, lambda: self.writer.message_count)
+        drain(executor, self._count)
+
+    def _count(self) -> int:
+        self._letterboxes.empty()
+        return self.writer.message_count
 
     def close(self) -> None:
-        """Write what is held and finish the bag."""
+        """Write what has come or is held and finish the bag."""
+        for _ in range(2):  # what was sent during the first round waits for the second
+            self._letterboxes.empty()
         for name, held in self._held:
             self._log_time_ns = self._log_time_ns or time.time_ns()
             self._write(name, held)

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import signal
-from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from rclpy.clock import JumpHandle, JumpThreshold
+from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import Executor, SingleThreadedExecutor
@@ -17,13 +16,14 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from . import params
+from .letterboxes import Deliver, Letterboxes, Once
 from .topics import Topic, expected_readers, reading_qos
 
 SPIN_S = 0.1  # longest time until a signal is noticed
-ONCE_LIMIT = 2000  # messages by which two subscriptions to one topic may be apart
 
 
 class StopFlag:
@@ -96,7 +96,7 @@ class GraphNode(Node):
     def listen(
         self,
         topic: Topic,
-        callback: Callable[[Any], None],
+        callback: Callable[..., None],
         kind: Any = None,
         *,
         from_anyone: bool = True,
@@ -109,18 +109,53 @@ class GraphNode(Node):
         self,
         kind: Any,
         name: str,
-        callback: Callable[[Any], None],
+        callback: Callable[..., None],
         profiles: list[QoSProfile],
-        *,
-        raw: bool = False,
     ) -> None:
-        """Subscribe with each QoS profile; a message that fits more than one comes once."""
+        """Subscribe with each QoS profile; a message that fits more than one comes once.
+
+        With one profile, a callback of two arguments is given rclpy's MessageInfo as well.
+        """
         several = len(profiles) > 1
         # With several, a writer that does not fit the one fits the other: no warning then.
-        events = SubscriptionEventCallbacks(use_default_callbacks=not (raw or several))
-        call: Any = Once(callback) if several else callback
+        events = SubscriptionEventCallbacks(use_default_callbacks=not several)
+        once = Once()
+
+        def call_once(message: Any, info: Any) -> None:
+            if once.is_new(info):
+                callback(message)
+
+        call: Any = call_once if several else callback
         for qos in profiles:
-            self.create_subscription(kind, name, call, qos, event_callbacks=events, raw=raw)
+            self.create_subscription(kind, name, call, qos, event_callbacks=events)
+
+    def open_boxes(
+        self,
+        letterboxes: Letterboxes,
+        kind: Any,
+        name: str,
+        deliver: Deliver,
+        profiles: list[QoSProfile],
+    ) -> None:
+        """Subscribe with each QoS profile to serialized messages, which no executor waits for."""
+        silent = SubscriptionEventCallbacks(use_default_callbacks=False)
+        boxes = [
+            self.create_subscription(
+                kind,
+                name,
+                lambda _: None,
+                qos,
+                callback_group=letterboxes.group,
+                event_callbacks=silent,
+                raw=True,
+            )
+            for qos in profiles
+        ]
+        letterboxes.add(boxes, deliver)
+
+    def every(self, period_s: float, callback: Callable[[], None]) -> Timer:
+        """Call back every period_s of real time, whatever the node's clock does."""
+        return self.create_timer(period_s, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def on_time_set_back(self, callback: Callable[[], None]) -> None:
         """Call back whenever the node's clock (with use_sim_time: /clock) is set back."""
@@ -174,24 +209,6 @@ class GraphNode(Node):
         while self._jumps:
             self._jumps.pop().unregister()
         super().destroy_node()
-
-
-class Once:
-    """Hands each message on once, though two subscriptions bring it."""
-
-    def __init__(self, callback: Callable[[Any], None]) -> None:
-        """Start with nothing seen."""
-        self._callback = callback
-        self._seen: OrderedDict[tuple[int, int], None] = OrderedDict()
-
-    def __call__(self, message: Any, info: Any) -> None:
-        """Take a message with rclpy's MessageInfo."""
-        key = (info["source_timestamp"], info["publication_sequence_number"])
-        if key not in self._seen:
-            self._seen[key] = None
-            if len(self._seen) > ONCE_LIMIT:
-                self._seen.popitem(last=False)
-            self._callback(message)
 
 
 class Refusals:

@@ -8,12 +8,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
 from . import params
+from .runtime import GraphNode
 
 PERIOD_S = 0.05
 ASK_AGAIN_S = 1.0  # an answer can get lost while a server still looks for its client
@@ -24,7 +23,7 @@ Found = dict[str, dict[str, Any]]
 class ParameterSurvey:
     """Asks every wanted node until it answers; done(found) when all have answered."""
 
-    def __init__(self, node: Node, wanted: set[str], done: Callable[[Found], None]) -> None:
+    def __init__(self, node: GraphNode, wanted: set[str], done: Callable[[Found], None]) -> None:
         """Begin to ask, while the node spins."""
         self._node = node
         self._done = done
@@ -33,8 +32,7 @@ class ParameterSurvey:
         self.wanted = wanted
         self.found: Found = {}
         if wanted:
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self._timer = node.create_timer(PERIOD_S, self._ask, clock=steady)
+            self._timer = node.every(PERIOD_S, self._ask)
 
     @property
     def absent(self) -> list[str]:
@@ -52,7 +50,14 @@ class ParameterSurvey:
                 asker.list_parameters(callback=partial(self._on_listed, name))
         if not self.absent:
             self._node.destroy_timer(self._timer)
+            self._let_go()
             self._done(self.found)
+
+    def _let_go(self) -> None:
+        """Destroy the clients, six per node: each is one more thing to wait for at every turn."""
+        for client in list(self._node.clients):
+            self._node.destroy_client(client)
+        self._askers.clear()
 
     def _on_listed(self, name: str, future: Any) -> None:
         listed = list(future.result().result.names)

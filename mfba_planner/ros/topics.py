@@ -106,7 +106,12 @@ GOAL_POSE = Topic(
     least_qos=VIEW_QOS,  # RViz
 )
 GOAL_STEP = Topic(
-    name="goal_step", type=PoseStamped, writers=(PLANNER,), qos=TICK_QOS, every_tick=True
+    name="goal_step",
+    type=PoseStamped,
+    writers=(PLANNER,),
+    readers=(WORLD_SIM,),  # its stamp says which tick the cmd_vel after it answers
+    qos=TICK_QOS,
+    every_tick=True,
 )
 PLAN = Topic(name="plan", type=Path, writers=(PLANNER,), qos=TICK_QOS, every_tick=True)
 TRAIL = Topic(name="trail", type=Path, writers=(WORLD_SIM,), qos=VIEW_QOS)

@@ -6,17 +6,16 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped
-from rclpy.clock import Clock, ClockType
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from std_srvs.srv import SetBool, Trigger
 
 from ..core.episode import World
 from ..core.errors import InputError
-from ..core.geometry import Point
 from ..core.planner import NANO
 from ..messages import pose2d, rotated, velocity
 from ..scenarios import load_scenario, scenario_to_json
 from . import params, topics
+from .answer_topics import AnswerTopics
 from .pace import Pace
 from .runtime import GraphNode, Refusals, spin_node
 from .settings import WorldSimSettings, names
@@ -37,8 +36,7 @@ class WorldSim(GraphNode):
         self.pace = Pace(s)
         self._refusals = Refusals(self)
         self._out = WorldTopics(self, s)
-        stamped = TwistStamped if s.enable_stamped_cmd_vel else None
-        self.listen(topics.CMD_VEL, self._on_cmd_vel, stamped)
+        self._answers = AnswerTopics(self, s, self._obey, self._look_for_answer)
         self.listen(topics.INITIALPOSE, self._on_initialpose)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
@@ -47,7 +45,7 @@ class WorldSim(GraphNode):
         period_s, on_timer = s.tick_ns * NANO / s.speed_factor, self._on_timer
         if s.lockstep:
             period_s, on_timer = min(s.answer_timeout_s / 4, 0.25), self._watch
-        self.create_timer(period_s, on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.every(period_s, on_timer)
         self._begin()
 
     @property
@@ -63,10 +61,9 @@ class WorldSim(GraphNode):
                 self._move_on()
 
     def _begin(self) -> None:
-        s = self.settings
-        self.world = World(self.scenario, s.tick_ns, s.goal_tolerance_m)
+        self.world = World(self.scenario, self.settings.tick_ns, self.settings.goal_tolerance_m)
         self.over, self._published = False, False
-        self._velocity: Point = (0.0, 0.0)
+        self._velocity = (0.0, 0.0)
         self._out.begin(self.scenario.goal_m, self.stamp_ns)
 
     def _move_on(self) -> None:
@@ -94,6 +91,7 @@ class WorldSim(GraphNode):
 
     def _watch(self) -> None:
         """Lockstep: begin when somebody is there; publish an unanswered tick again."""
+        self._look_for_answer()  # its goal_step may have come after its Twist
         if not self._published:
             if self.pace.may_move_on() and self._out.are_heard:
                 self._publish_tick()
@@ -101,17 +99,20 @@ class WorldSim(GraphNode):
             self.get_logger().warning(f"tick {self.world.tick} unanswered: published again")
             self._out.tick(self.world, self._velocity, self.stamp_ns)
 
-    def _on_cmd_vel(self, message: Any) -> None:
-        if not self.pace.take_answer():
-            return
+    def _look_for_answer(self) -> None:
+        message = self._answers.take(self.stamp_ns) if self.pace.is_open else None
+        if message is not None:
+            self.pace.answered()
+            self._obey(message)
+            if self.pace.may_move_on():
+                self._move_on()
+
+    def _obey(self, message: Any) -> None:
+        self._velocity = (0.0, 0.0)
         try:
-            vx, vy, _ = velocity(message)
-            self._velocity = rotated((vx, vy), self.world.pose.yaw)
+            self._velocity = rotated(velocity(message)[:2], self.world.pose.yaw)
         except InputError as error:
             self._refusals.add(error)
-            self._velocity = (0.0, 0.0)
-        if self.pace.may_move_on():
-            self._move_on()
 
     def _on_initialpose(self, message: PoseWithCovarianceStamped) -> None:
         try:
@@ -128,8 +129,7 @@ class WorldSim(GraphNode):
         return response
 
     def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        over = "refused: the run is over; reset first" if self.over else ""
-        refusal = over or self.pace.cannot_step()
+        refusal = "refused: the run is over; reset first" if self.over else self.pace.cannot_step()
         if not refusal:
             self._move_on()
         response.success, response.message = not refusal, refusal or f"tick {self.world.tick}"
@@ -137,7 +137,7 @@ class WorldSim(GraphNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._ticks_before_reset += self.world.tick + 1
-        self.pace.reset()
+        self.pace.answered()
         self._begin()
         if self.pace.may_move_on():
             self._publish_tick()

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -71,7 +73,7 @@ def _compute(plan: Sequence[Chunk], workers: int) -> Iterator[tuple[Chunk, Colum
     executor = ProcessPoolExecutor(
         min(workers, len(plan)),
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=_leave_signals_to_the_parent,
+        initializer=_belong_to_the_parent,
     )
     try:
         running = {executor.submit(chunk.run): chunk for chunk in plan}
@@ -86,6 +88,15 @@ def _compute(plan: Sequence[Chunk], workers: int) -> Iterator[tuple[Chunk, Colum
         executor.shutdown(wait=True, cancel_futures=True)
 
 
-def _leave_signals_to_the_parent() -> None:
-    """Ctrl-C reaches all processes of a terminal; one of them says so, the others just end."""
+def _belong_to_the_parent() -> None:
+    """Leave Ctrl-C, which reaches all processes of a terminal, to the parent; end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+
+
+def _end_with_the_parent() -> None:
+    """Idle workers of a parent that was killed would wait for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from ...core.errors import ConfigError
 from ...core.options import did_you_mean
@@ -18,7 +18,6 @@ from .model import Section
 from .trips import trip_section
 
 SECTIONS = ("1", "2", "3", "4", "5", "6", "7", "constants", "claims")
-_CASE_OF = {"4": "case1", "5": "case1", "6": "case2", "7": "case2"}
 # Which sections need episodes of which cases.
 _TRIPS = {"5": ("case1",), "7": ("case2",), "claims": ("case1", "case2")}
 
@@ -49,16 +48,15 @@ def build(
     seed: int,
 ) -> list[Section]:
     """The sections, from samples that were run by plan()."""
-    makers = {
+    makers: dict[str, Callable[[], Section]] = {
         "1": gap_section,
         "2": function_section,
         "3": lambda: benchmark_section(samples, seed),
+        "4": lambda: obstacle_section("case1", scenarios["case1"]),
         "5": lambda: trip_section("case1", samples, seed),
+        "6": lambda: obstacle_section("case2", scenarios["case2"]),
         "7": lambda: trip_section("case2", samples, seed),
         "constants": lambda: constant_section(scenarios["case1"]),
-        "claims": lambda: claim_section(samples),
+        "claims": lambda: claim_section(samples, scenarios),
     }
-    for name in ("4", "6"):
-        case = _CASE_OF[name]
-        makers[name] = lambda case=case: obstacle_section(case, scenarios[case])
     return [makers[name]() for name in sections]

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 
 from ...core.gaps import gap_vector
+from ...core.geometry import distance
 from ...core.planner import PlannerParams
 from ...core.sensing import SensorParams
 from ...core.world import Scenario
@@ -15,7 +16,7 @@ from ..functions import FUNCTIONS, STEEPNESS
 from ..published import BY_KEY, Printed
 from ..readings import PLANNERS
 from ..study.plan import DIMENSION
-from .model import Entry, Ours, Section, Verdict, compare_exactly, entry
+from .model import Cell, Entry, Ours, Section, Verdict, compare_exactly, entry
 
 TABLE_2_ROUNDING = 5e-5  # Fmin is printed with at most four decimals
 
@@ -34,9 +35,7 @@ def gap_section() -> Section:
             published.EXAMPLE, "gap_vector", vg, "the ring wraps: gap 12 is closed by sector 1"
         )
     )
-    return Section(
-        key="1", title="Table 1. Gap vector construction", entries=tuple(entries)
-    )
+    return Section(key="1", title="Table 1. Gap vector construction", entries=tuple(entries))
 
 
 def function_section() -> Section:
@@ -53,7 +52,11 @@ def function_section() -> Section:
             why = "values are tested against independent ones"
             entries.append(entry(printed, [ours], Verdict.REPRODUCED, why))
             continue
-        ours_of = {"C": function.kind, "from": function.lower, "to": function.upper}
+        ours_of: dict[str, Cell] = {
+            "C": function.kind,
+            "from": function.lower,
+            "to": function.upper,
+        }
         entries.append(compare_exactly(printed, "functions", ours_of[printed.column]))
     return Section(
         key="2",
@@ -100,8 +103,9 @@ def constant_section(scenario: Scenario) -> Section:
     """The constants that the text gives, and those that it does not."""
     return Section(
         key="constants",
-        title="Constants: what the paper states, and what it does not",
-        entries=(*_stated(scenario), *_unstated()),
+        title="Constants. What the paper states, and what it does not",
+        entries=(*_stated(scenario), _straight(scenario), *_unstated()),
+        digits=7,
     )
 
 
@@ -139,11 +143,22 @@ def _stated(scenario: Scenario) -> Iterator[Entry]:
     )
 
 
+def _straight(scenario: Scenario) -> Entry:
+    printed = BY_KEY["Section 6.2/optimum/length"]
+    ours = distance(scenario.start_m, scenario.goal_m)
+    same = printed.value is not None and abs(ours - printed.value) < 1e-4
+    return entry(
+        printed,
+        [Ours(reading="section6", value=ours)],
+        Verdict.REPRODUCED if same else Verdict.DIFFERS,
+        "the straight line from start to goal",
+    )
+
+
 def _unstated() -> Iterator[Entry]:
     for name, value, why in _gaps():
         ours = tuple(
-            Ours(reading=reading, value=text)
-            for reading, text in zip(("section6", "fig1"), value)
+            Ours(reading=reading, value=text) for reading, text in zip(("section6", "fig1"), value)
         )
         yield Entry(
             place="not stated",

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -94,9 +95,8 @@ def inside(printed: Printed, ours: Sequence[Ours]) -> Entry:
 
     The first reading is the one that is meant; what another one gives is told, not counted.
     """
-    fits = [
-        o.reading for o in ours if isinstance(o.value, Interval) and printed.value in o.value
-    ]
+    value = math.nan if printed.value is None else printed.value
+    fits = [o.reading for o in ours if isinstance(o.value, Interval) and value in o.value]
     fails = [o.reading for o in ours if o.reading not in fits]
     told = []
     if fits:

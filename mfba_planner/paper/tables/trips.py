@@ -193,9 +193,7 @@ def _as_should_be(case: str, samples: Samples) -> Grid:
                     reading,
                     law.upper(),
                     n,
-                    stats.estimate(
-                        sample["length_m"], lambda x: x.mean(1), stats.generator(7)
-                    ),
+                    stats.estimate(sample["length_m"], lambda x: x.mean(1), stats.generator(7)),
                     *compared,
                     n - int(sample["reached"].sum()),
                     touched,

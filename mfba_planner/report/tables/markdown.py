@@ -34,8 +34,8 @@ def fill(page_text: str, generated: Mapping[str, str]) -> str:
         pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
         if not pattern.search(page_text):
             raise InputError(f"no place for {name!r}: put the lines {begin} and {end} there")
-        replacement = f"{begin}\n{content}\n{end}"
-        page_text = pattern.sub(lambda _, whole=replacement: whole, page_text)
+        whole = f"{begin}\n{content}\n{end}".replace("\\", r"\\")
+        page_text = pattern.sub(whole, page_text)
     return page_text
 
 

@@ -30,7 +30,7 @@ class Origin:
 
     def line(self) -> str:
         """One sentence for the head of a report."""
-        size = "quick form: few runs, wide intervals; " if self.quick else ""
+        size = "quick form: only the full form's verdicts count; " if self.quick else ""
         return (
             f"Made by `{self.command}` ({size}seeds from {self.seed} on) with mfba_planner "
             f"{self.version}, Python {self.python}, numpy {self.numpy}."
@@ -38,20 +38,20 @@ class Origin:
 
 
 def cell(value: Cell, digits: int) -> str:
-    """A cell; an interval as middle [low, high]."""
+    """A cell with so many significant digits; an interval as middle [low, high]."""
     if value is None:
         return ""
     if isinstance(value, Interval):
-        low, high = number(value.low, digits), number(value.high, digits)
-        return f"{number(value.middle, digits)} [{low}, {high}]"
+        low, high = _number(value.low, digits), _number(value.high, digits)
+        return f"{_number(value.middle, digits)} [{low}, {high}]"
     if isinstance(value, float):
-        return number(value, digits)
+        return f"{value + 0.0:.{digits}g}"
     return str(value)
 
 
-def number(value: float, digits: int) -> str:
-    """So many significant digits; no minus before zero."""
-    return f"{value + 0.0:#.{digits}g}".rstrip(".") if value else "0"
+def _number(value: float, digits: int) -> str:
+    """Trailing zeros are kept where an interval has them; no minus before zero."""
+    return f"{value:#.{digits}g}".rstrip(".") if value else "0"
 
 
 def readings(section: Section) -> tuple[str, ...]:
