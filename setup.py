@@ -51,6 +51,7 @@ setup(
         "pydantic>=2,<3",
         "PyYAML>=6",
         "rich>=13",
+        "scipy>=1.11",
         "zstandard>=0.22",
     ],
     # Not tests_require: with it `colcon test` runs no test and stays green.

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where results go: a new directory each time; what is there is never overwritten."""
+"""Where results go: whole or not at all, and never over what is there."""
 
 from __future__ import annotations
 
+import os
+import secrets
 from pathlib import Path
 
 from .core.errors import OutputError
 
 
-def new_run_directory(root: Path = Path("runs")) -> Path:
+def new_run_directory(root: Path = Path("runs"), stem: str = "run") -> Path:
     """Name (not make) a directory below root that is not there yet: run-001, run-002, ..."""
-    taken = [int(p.name[4:]) for p in root.glob("run-*") if p.name[4:].isdigit()]
-    return root / f"run-{max(taken, default=0) + 1:03d}"
+    ends = [p.name[len(stem) + 1 :] for p in root.glob(f"{stem}-*")]
+    taken = [int(end) for end in ends if end.isdigit()]
+    return root / f"{stem}-{max(taken, default=0) + 1:03d}"
 
 
 def refuse_existing(path: Path) -> Path:
@@ -25,3 +28,45 @@ def bag_in(path: Path) -> Path:
     """The bag of a run directory; anything else is taken for a bag itself."""
     bag = path / "bag"
     return bag if bag.is_dir() and not any(path.glob("*.mcap")) else path
+
+
+def write_new(path: Path, data: bytes) -> None:
+    """Write a file that must not exist yet, through a temporary one beside it.
+
+    Raises OutputError when path exists or cannot be written; nothing is left behind then.
+    """
+    if os.path.lexists(path):
+        raise _exists(path)
+    temporary = path.with_name(f".mfba-{secrets.token_hex(4)}.tmp")
+    try:
+        try:
+            with open(temporary, "xb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            _publish(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except FileExistsError:
+        raise _exists(path) from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise OutputError(
+            f"{path}: cannot be written ({reason}); give a path in a writable directory"
+        ) from None
+
+
+def _publish(temporary: Path, path: Path) -> None:
+    """Give a finished file its name; a link, unlike a rename, refuses an existing one."""
+    try:
+        os.link(temporary, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without hard links
+        if os.path.lexists(path):
+            raise FileExistsError from None
+        os.rename(temporary, path)
+
+
+def _exists(path: Path) -> OutputError:
+    return OutputError(f"{path}: already exists and is not overwritten; give another path")

@@ -42,12 +42,12 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
     "messages": ({"core"}, {"numpy"}),
     "run_config": ({"core", "scenarios"}, {"numpy"}),
-    "paper": ({"core", "paper"}, {"numpy"}),
+    "paper": ({"core", "outputs", "paper"}, {"numpy", "scipy"}),
     "recording": (
         {"core", "messages", "recording", "scenarios"},
         {"mcap", "mcap_ros2", "yaml", "zstandard"},
     ),
-    "report": ({"core", "paper", "report"}, {"matplotlib", "numpy", "rich"}),
+    "report": ({"core", "outputs", "paper", "report"}, {"matplotlib", "numpy", "rich"}),
     "ros": (
         {"arguments", "core", "messages", "outputs", "recording", "ros", "run_config"}
         | {"scenarios"},

@@ -78,7 +78,7 @@ class Swarm(Enum):
 class PlannerParams:
     """The reading `section6` of Algorithm 1 and section 6.2."""
 
-    speed_mps: float = option(0.82, "robot speed", unit="m/s", minimum=0.01, maximum=100.0)
+    speed_mps: float = option(0.785, "robot speed", unit="m/s", minimum=0.01, maximum=100.0)
     step_length_m: float = option(
         0.3, "longest goal step, in both modes", unit="m", minimum=0.001, maximum=100.0
     )

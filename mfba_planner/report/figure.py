@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from .files import write_new
 from .moments import Pass, closest_passes
 from .page import Page
 from .scene import draw_scene, label_numbers
+from .sheet import to_bytes
 from .view import choose_view
 
 
@@ -30,10 +30,8 @@ def draw_run(episode: Episode, path: Path) -> None:
 
 def png_bytes(episode: Episode) -> bytes:
     """The picture of a run as PNG, without date or version inside."""
-    buffer = io.BytesIO()
     with style.context():
-        run_figure(episode).savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()
+        return to_bytes(run_figure(episode), "png")
 
 
 def run_figure(episode: Episode) -> Figure:

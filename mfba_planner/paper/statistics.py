@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What samples of runs say: intervals, comparisons, and whether a printed row can be one of them.
+
+scipy is imported where it is used: it takes longer to load than most commands take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+LEVEL = 0.95
+RESAMPLES = 10_000
+RIDGE = 1e-6
+
+
+def generator(*key: int) -> np.random.Generator:
+    """The random stream of one resampling, named by numbers: the same in every run."""
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(0, spawn_key=key)))
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """An estimate between the ends of its 95 % interval."""
+
+    middle: float
+    low: float
+    high: float
+
+    def __contains__(self, value: float) -> bool:
+        """Whether a value lies inside, ends included."""
+        return self.low <= value <= self.high
+
+
+def interval(values: Array, middle: float | None = None) -> Interval:
+    """Median (unless given another middle) and central 95 % of resampled values."""
+    tail = 50.0 * (1.0 - LEVEL)
+    low, half, high = np.percentile(values, [tail, 50.0, 100.0 - tail])
+    return Interval(float(half if middle is None else middle), float(low), float(high))
+
+
+def resample(sample: Array, size: int, rng: np.random.Generator, count: int = RESAMPLES) -> Array:
+    """Draw count times size of the sample's values, with replacement: (count, size)."""
+    return np.asarray(sample)[rng.integers(len(sample), size=(count, size))]
+
+
+def four(draws: Array) -> Array:
+    """(best, worst, mean, sd) of each row of draws, sd over n - 1: (count, 4)."""
+    return np.stack([draws.min(1), draws.max(1), draws.mean(1), draws.std(1, ddof=1)], axis=1)
+
+
+def estimate(
+    sample: Array,
+    statistic: Callable[[Array], Array],
+    rng: np.random.Generator,
+    count: int = 1000,
+) -> Interval:
+    """A statistic of the whole sample with its bootstrap interval.
+
+    statistic takes (count, n) and returns (count,).
+    """
+    found = statistic(np.asarray(sample)[None, :])[0]
+    return interval(statistic(resample(sample, len(sample), rng, count)), float(found))
+
+
+def mean_difference(
+    ours: Array, other: Array, rng: np.random.Generator, count: int = 1000
+) -> Interval:
+    """Mean of ours minus mean of another, independent sample, with its bootstrap interval."""
+    drawn = [resample(sample, len(sample), rng, count).mean(1) for sample in (ours, other)]
+    return interval(drawn[0] - drawn[1], float(np.mean(ours) - np.mean(other)))
+
+
+@dataclass(frozen=True, slots=True)
+class Consistency:
+    """How well a printed row fits; p is joint, outside names what no single interval holds."""
+
+    p: float
+    outside: tuple[str, ...]
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the row is an ordinary one, at 95 %."""
+        return self.p >= 1.0 - LEVEL
+
+
+def consistency(draws: Array, printed: Sequence[float], names: Sequence[str]) -> Consistency:
+    """Whether printed statistics, taken together, could be a row of draws (count, k).
+
+    Each statistic becomes a normal score by its rank among the draws; the distance is
+    Mahalanobis's, so that statistics which move together must do so in print as well, and p is
+    the share of draws that lie at least as far out. A value beyond all draws gets the score of
+    the outermost rank.
+    """
+    from scipy.special import ndtri
+
+    count, k = draws.shape
+    scores = np.empty((count + 1, k))
+    for j, value in enumerate(printed):
+        column = np.sort(draws[:, j])
+        for rows, x in ((slice(0, count), draws[:, j]), (slice(count, None), np.array([value]))):
+            below = np.searchsorted(column, x, "left")
+            not_above = np.searchsorted(column, x, "right")
+            scores[rows, j] = ndtri((0.5 * (below + not_above) + 0.5) / (count + 1))
+    # Without the ridge a column that never varies would forgive any printed value.
+    spread = np.cov(scores[:count].T) + RIDGE * np.eye(k)
+    squared = np.einsum("ij,jk,ik->i", scores, np.linalg.inv(spread), scores)
+    p = (1 + np.count_nonzero(squared[:count] >= squared[count])) / (count + 1)
+    outside = [
+        name
+        for j, (name, value) in enumerate(zip(names, printed))
+        if value not in interval(draws[:, j])
+    ]
+    return Consistency(float(p), tuple(outside))
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Chance that a run of one beats a run of the other (a tie counts half), and its p."""
+
+    superiority: Interval
+    p: float
+
+
+def compare(ours: Array, other: Array) -> Comparison:
+    """Mann-Whitney's U of two independent samples, lower is better; two-sided p.
+
+    The superiority is U / (n m); its interval is DeLong's, from the placements.
+    """
+    from scipy.stats import mannwhitneyu
+
+    n, m = len(ours), len(other)
+    test = mannwhitneyu(other, ours, alternative="two-sided", method="asymptotic")
+    share = float(test.statistic) / (n * m)
+    deviation = np.sqrt(
+        _placements(ours, other).var(ddof=1) / n + _placements(other, ours).var(ddof=1) / m
+    )
+    return Comparison(_normal(share, float(deviation)), _probability(test.pvalue))
+
+
+def _placements(x: Array, y: Array) -> Array:
+    """For each x the share of y above it, ties half."""
+    ordered = np.sort(y)
+    below = np.searchsorted(ordered, x, "left") + np.searchsorted(ordered, x, "right")
+    return 1.0 - 0.5 * below / len(y)
+
+
+def compare_pairs(ours: Array, other: Array) -> Comparison:
+    """Wilcoxon's signed ranks of runs with equal seeds, lower is better; two-sided p.
+
+    The superiority is the share of pairs won, a tie half, with Wilson's interval.
+    """
+    from scipy.stats import wilcoxon
+
+    difference = np.asarray(ours) - np.asarray(other)
+    won = np.count_nonzero(difference < 0.0) + 0.5 * np.count_nonzero(difference == 0.0)
+    n = len(difference)
+    low, high = share_interval(round(won), n)
+    p = 1.0 if not difference.any() else wilcoxon(difference, method="asymptotic").pvalue
+    return Comparison(Interval(float(won / n), low, high), _probability(p))
+
+
+def share_interval(count: int, n: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a share count / n."""
+    from scipy.stats import binomtest
+
+    found = binomtest(count, n).proportion_ci(LEVEL, method="wilson")
+    return float(found.low), float(found.high)
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Holm's corrected p-values, in the order given."""
+    corrected = [0.0] * len(p)
+    worst = 0.0
+    for rank, index in enumerate(sorted(range(len(p)), key=lambda i: p[i])):
+        worst = max(worst, min(1.0, (len(p) - rank) * p[index]))
+        corrected[index] = worst
+    return corrected
+
+
+def _normal(middle: float, deviation: float) -> Interval:
+    from scipy.special import ndtri
+
+    reach = float(ndtri(0.5 + 0.5 * LEVEL)) * deviation
+    return Interval(middle, max(0.0, middle - reach), min(1.0, middle + reach))
+
+
+def _probability(p: float) -> float:
+    """A p-value; NaN (two constant samples) says nothing against equality."""
+    return 1.0 if np.isnan(p) else float(p)

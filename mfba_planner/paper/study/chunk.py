@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The unit of work: some seeds of one sample, computed anywhere with the same result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ...core.bat import BatParams
+from ...core.batch import BatchResult, minimize_batch
+from ...core.episode import Episode, run
+from ...core.geometry import bearing, distance, wrap_angle
+from ...core.metrics import evaluate
+from ...core.options import Scalar, flatten
+from ...core.planner import PlannerParams
+from ...core.world import Scenario
+from ..functions import FUNCTIONS
+
+Columns = dict[str, list[float]]
+
+BENCHMARK_STREAM = 2  # spawn key of these runs' SeedSequence children, beside the planner's
+STANDSTILL_M = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Benchmark:
+    """Runs of a swarm on a function of Table 2; best value per seed."""
+
+    function: str
+    bat: BatParams
+    dimension: int = 2
+
+    def facts(self) -> dict[str, Scalar]:
+        """What decides the numbers, as plain values."""
+        return {"function": self.function, "dimension": self.dimension, **flatten(self.bat)}
+
+    def run(self, seeds: Sequence[int]) -> Columns:
+        """Best value of the run of each seed."""
+        return {"best": self.search(seeds).best_value.tolist()}
+
+    def search(self, seeds: Sequence[int]) -> BatchResult:
+        """The runs themselves; the stream of each is named by seed, function and law."""
+        function = FUNCTIONS[self.function]
+        key = (BENCHMARK_STREAM, int(self.function[1:]), _number(self.bat.algorithm.value))
+        rngs = [
+            np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
+            for seed in seeds
+        ]
+        return minimize_batch(function.batch, function.box(self.dimension), self.bat, rngs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trips:
+    """Episodes of one planner in one scenario: what `mfba sim --seed N` tells of each seed."""
+
+    scenario: Scenario
+    planner: PlannerParams
+
+    def facts(self) -> dict[str, Scalar]:
+        """What decides the numbers, as plain values."""
+        return {"scenario": repr(self.scenario), **flatten(self.planner)}
+
+    def run(self, seeds: Sequence[int]) -> Columns:
+        """Length, smallest gap, contacts, turning, whether the goal was reached, and whom it met.
+
+        encounters is a whole number with the bit 2^i set for obstacle i.
+        """
+        rows = [self._row(seed) for seed in seeds]
+        return {name: [row[name] for row in rows] for name in rows[0]}
+
+    def _row(self, seed: int) -> dict[str, float]:
+        episode = run(self.scenario, planner=self.planner, seed=seed)
+        result = evaluate(episode)
+        return {
+            "length_m": result.length_m,
+            "clearance_m": result.min_clearance_m,
+            "collisions": result.collisions,
+            "reached": int(result.outcome.value == "goal_reached"),
+            "turning_rad": turning(episode),
+            "encounters": sum(1 << number for number in result.encounters),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chunk:
+    """Seeds first .. first + count - 1 of the sample of that name."""
+
+    sample: str
+    work: Benchmark | Trips
+    first: int
+    count: int
+
+    @property
+    def name(self) -> str:
+        """Name of the chunk, fit for a file."""
+        return f"{self.sample.replace('/', '-')}-{self.first}-{self.count}"
+
+    def run(self) -> Columns:
+        """Compute it."""
+        return self.work.run(range(self.first, self.first + self.count))
+
+
+def chunks(sample: str, work: Benchmark | Trips, first: int, runs: int, size: int) -> list[Chunk]:
+    """A sample cut into chunks of that size."""
+    last = first + runs
+    return [
+        Chunk(sample=sample, work=work, first=start, count=min(size, last - start))
+        for start in range(first, last, size)
+    ]
+
+
+def turning(episode: Episode) -> float:
+    """How much the path turns in all, radians: 0 for a straight one (less is smoother)."""
+    points = [tick.pose.position for tick in episode.ticks]
+    headings = [bearing(a, b) for a, b in pairwise(points) if distance(a, b) > STANDSTILL_M]
+    return math.fsum(abs(wrap_angle(b - a)) for a, b in pairwise(headings))
+
+
+def _number(name: str) -> int:
+    """A text as a whole number, for a spawn key."""
+    return int.from_bytes(name.encode(), "big")

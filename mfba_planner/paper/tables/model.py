@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a reproduced table is made of, before anybody renders it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from .. import doubts
+from ..published import Printed
+from ..statistics import Interval
+
+Cell = str | int | float | Interval | None
+
+
+class Verdict(Enum):
+    """What a printed number is worth."""
+
+    REPRODUCED = "reproduced"
+    DIFFERS = "differs"
+    IMPOSSIBLE = "impossible as printed"
+    NOT_STATED = "not stated in the paper"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ours:
+    """What one of our readings gives for a printed number; seeds says from which runs."""
+
+    reading: str
+    value: Cell
+    seeds: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """A printed number (or a gap in the paper), ours, the verdict and the reason for it."""
+
+    place: str
+    row: str
+    column: str
+    printed: str
+    ours: tuple[Ours, ...]
+    verdict: Verdict
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """A table of our own; key is its name in the data."""
+
+    key: str
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A table of the paper, reproduced; digits is how many significant ones are shown."""
+
+    key: str
+    title: str
+    entries: tuple[Entry, ...] = ()
+    grids: tuple[Grid, ...] = ()
+    notes: tuple[str, ...] = ()
+    digits: int = 5
+
+
+def entry(printed: Printed, ours: Sequence[Ours], verdict: Verdict, why: str) -> Entry:
+    """An Entry of a printed number; what contradicts another printed number is said too."""
+    contradiction = doubts.CONTRADICTED.get(printed.key, "")
+    return Entry(
+        place=printed.place,
+        row=printed.row,
+        column=printed.column,
+        printed=printed.text,
+        ours=tuple(ours),
+        verdict=verdict,
+        why="; ".join(part for part in (why, contradiction) if part),
+    )
+
+
+def compare_exactly(printed: Printed, reading: str, ours: Cell, why: str = "") -> Entry:
+    """Reproduced when ours is the printed value itself."""
+    same = ours == (printed.text if printed.value is None else printed.value)
+    verdict = Verdict.REPRODUCED if same else Verdict.DIFFERS
+    return entry(printed, [Ours(reading=reading, value=ours)], verdict, why)
+
+
+def inside(printed: Printed, ours: Sequence[Ours]) -> Entry:
+    """Reproduced when the first reading has the printed value in its 95 % interval.
+
+    The first reading is the one that is meant; what another one gives is told, not counted.
+    """
+    value = math.nan if printed.value is None else printed.value
+    fits = [o.reading for o in ours if isinstance(o.value, Interval) and value in o.value]
+    fails = [o.reading for o in ours if o.reading not in fits]
+    told = []
+    if fits:
+        told.append(f"in the 95 % interval of {' and '.join(fits)}")
+    if fails:
+        told.append(f"outside that of {' and '.join(fails)}")
+    why = ", ".join(told)
+    if printed.key in doubts.IMPOSSIBLE:
+        return entry(
+            printed, ours, Verdict.IMPOSSIBLE, f"{doubts.IMPOSSIBLE[printed.key]} ({why})"
+        )
+    meant = ours[0].reading in fits
+    return entry(printed, ours, Verdict.REPRODUCED if meant else Verdict.DIFFERS, why)

@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables 5 and 7 and what the text says of them: ten runs, and a thousand seeds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from .. import published
+from .. import statistics as stats
+from ..published import TRIP_RUNS, TRIP_TABLES, Printed
+from ..readings import PLANNERS
+from ..statistics import Array
+from ..study.plan import LAWS, PLANNER_READINGS, trip_sample
+from ..study.run import Sample
+from .model import Cell, Entry, Grid, Ours, Section, Verdict, entry, inside
+
+Samples = Mapping[str, Sample]
+Draws = Mapping[tuple[str, str], Array]
+
+LENGTH_COLUMNS = ("best", "mean", "worst")
+SHOWN_ENCOUNTERS = 4
+# Which reading of section 6.2 is meant to give which column of the tables.
+MEANT = {"mfba": "section6", "ba": "fig1"}
+
+
+def trip_section(case: str, samples: Samples, seed: int) -> Section:
+    """Every number of Table 5 (case1) or 7 (case2) and of the text about it."""
+    place = TRIP_TABLES[case]
+    pairs = [(reading, law) for reading in PLANNER_READINGS for law in LAWS]
+    # The draws are the same for all samples: what differs between two is not the resampling.
+    lengths = {
+        pair: stats.resample(_column(samples, case, *pair, "length_m"), TRIP_RUNS,
+                             stats.generator(5))
+        for pair in pairs
+    }  # fmt: skip
+    fitness = {pair: 1.0 / drawn for pair, drawn in lengths.items()}
+    count = len(_column(samples, case, *pairs[0], "length_m"))
+    seeds = f"{seed}-{seed + count - 1}"
+    ten = _ten_runs(case, lengths)
+    return Section(
+        key=place.split()[1],
+        title=f"{place}. Comparison results for case study {case[-1]}",
+        entries=(
+            *_fitness(place, fitness, seeds),
+            *_text(case, samples, lengths, seeds),
+        ),
+        grids=(
+            ten,
+            _as_made(case, samples, seed),
+            _as_should_be(case, samples),
+            _encounters(case, samples),
+        ),
+        notes=_notes(ten),
+    )
+
+
+def _column(samples: Samples, case: str, reading: str, law: str, column: str) -> Array:
+    return samples[trip_sample(reading, case, law)][column]
+
+
+def _statistics(draws: Array) -> dict[str, Array]:
+    """The four columns of the tables, for each row of ten values; SD over n - 1 as MATLAB's."""
+    return {
+        "minimum": draws.min(1),
+        "maximum": draws.max(1),
+        "standard deviation": draws.std(1, ddof=1),
+        "mean": draws.mean(1),
+    }
+
+
+def _ours(draws: Draws, law: str, column: str, seeds: str) -> list[Ours]:
+    """The readings' intervals of a statistic of ten runs, the reading that is meant first."""
+    readings = sorted(PLANNER_READINGS, key=lambda reading: reading != MEANT[law])
+    return [
+        Ours(
+            reading=reading,
+            value=stats.interval(_statistics(draws[reading, law])[column]),
+            seeds=seeds,
+        )
+        for reading in readings
+    ]
+
+
+def _fitness(place: str, fitness: Draws, seeds: str) -> Iterator[Entry]:
+    for printed in published.TRIPS[place]:
+        yield inside(printed, _ours(fitness, printed.row.lower(), printed.column, seeds))
+
+
+def _text(case: str, samples: Samples, lengths: Draws, seeds: str) -> Iterator[Entry]:
+    place = f"Section 6.2, case {case[-1]}"
+    for printed in published.TEXT:
+        if printed.place != place:
+            continue
+        if printed.column == "length":
+            yield inside(printed, _ours(lengths, printed.row.lower(), "minimum", seeds))
+        elif printed.column == "run time":
+            yield entry(printed, [], Verdict.NOT_STATED,
+                        "MATLAB's computing time on the authors' machine: says nothing about "
+                        "the robot, whose speed is not stated")  # fmt: skip
+        else:
+            yield _experiment(printed, case, samples)
+
+
+def _experiment(printed: Printed, case: str, samples: Samples) -> Entry:
+    """Which of ten runs was the best: each is as likely."""
+    ours = [
+        Ours(
+            reading=reading,
+            value=int(
+                np.argmin(
+                    _column(samples, case, reading, printed.row.lower(), "length_m")[:TRIP_RUNS]
+                )
+            )
+            + 1,
+        )
+        for reading in PLANNER_READINGS
+    ]
+    return entry(printed, ours, Verdict.NOT_STATED, "chance: the seeds are not stated")
+
+
+def printed_lengths(case: str, law: str) -> dict[str, float]:
+    """Best, mean and worst length that the printed fitness means; the mean by 1 / mean fitness."""
+    values = published.values(TRIP_TABLES[case], law.upper())
+    return {
+        "best": 1.0 / values["maximum"],
+        "mean": 1.0 / values["mean"],
+        "worst": 1.0 / values["minimum"],
+    }
+
+
+def _ten_runs(case: str, lengths: Draws) -> Grid:
+    rows: list[tuple[Cell, ...]] = []
+    for reading in PLANNER_READINGS:
+        for law in LAWS:
+            drawn = lengths[reading, law]
+            statistics = np.stack([drawn.min(1), drawn.mean(1), drawn.max(1)], axis=1)
+            printed = printed_lengths(case, law)
+            joint = stats.consistency(statistics, list(printed.values()), LENGTH_COLUMNS)
+            for column, (name, value) in enumerate(printed.items()):
+                ours = stats.interval(statistics[:, column])
+                rows.append(
+                    (reading, law.upper(), name, value, ours, "yes" if value in ours else "no",
+                     joint.p if column == 0 else None)
+                )  # fmt: skip
+    return Grid(
+        key="ten runs",
+        title="Lengths of ten runs in metres: printed, and ours with 95 % bootstrap intervals",
+        head=("reading", "law", "of ten", "printed (1/fitness)", "ours", "inside?", "joint p"),
+        rows=tuple(rows),
+        note="joint p: best, mean and worst together.",
+    )
+
+
+def _as_made(case: str, samples: Samples, seed: int) -> Grid:
+    rows: list[tuple[Cell, ...]] = []
+    for reading in PLANNER_READINGS:
+        for law in LAWS:
+            ten = _column(samples, case, reading, law, "length_m")[:TRIP_RUNS]
+            sd = float(np.std(1.0 / ten, ddof=1))
+            best = int(np.argmin(ten))
+            rows.append(
+                (reading, law.upper(), float(ten.min()), best + 1, float(ten.mean()),
+                 float(ten.max()), sd)
+            )  # fmt: skip
+    return Grid(
+        key="as made",
+        title=f"As the paper made it: our first ten runs (seeds {seed} to {seed + TRIP_RUNS - 1})",
+        head=("reading", "law", "best m", "in run", "mean m", "worst m", "SD of fitness"),
+        rows=tuple(rows),
+    )
+
+
+def _as_should_be(case: str, samples: Samples) -> Grid:
+    rows: list[tuple[Cell, ...]] = []
+    comparisons = []
+    for reading in PLANNER_READINGS:
+        by_law = {law: samples[trip_sample(reading, case, law)] for law in LAWS}
+        difference = by_law["mfba"]["length_m"] - by_law["ba"]["length_m"]
+        comparison = stats.compare_pairs(by_law["mfba"]["length_m"], by_law["ba"]["length_m"])
+        comparisons.append(comparison)
+        for law, sample in by_law.items():
+            n = len(sample["length_m"])
+            touched = int(np.count_nonzero(sample["collisions"]))
+            compared: tuple[Cell, ...] = (None,) * 3
+            if law == "mfba":
+                mean = stats.estimate(difference, lambda x: x.mean(1), stats.generator(6))
+                compared = (mean, comparison.superiority, comparison.p)
+            rows.append(
+                (
+                    reading,
+                    law.upper(),
+                    n,
+                    stats.estimate(sample["length_m"], lambda x: x.mean(1), stats.generator(7)),
+                    *compared,
+                    n - int(sample["reached"].sum()),
+                    touched,
+                    100.0 * stats.share_interval(touched, n)[1],
+                    float(sample["clearance_m"].min()),
+                    float(sample["clearance_m"].mean()),
+                    float(np.degrees(sample["turning_rad"].mean())),
+                )
+            )
+    corrected = iter(stats.holm([c.p for c in comparisons]))
+    rows = [(*row[:6], None if row[6] is None else next(corrected), *row[7:]) for row in rows]
+    return Grid(
+        key="as should be",
+        title="As it should be made: the same seeds for both laws",
+        head=("reading", "law", "runs", "mean length m", "MFBA - BA m", "chance that MFBA is "
+              "shorter", "p (Holm)", "not arrived", "runs with contact", "at most % (95 %)",
+              "least clearance m", "mean clearance m", "mean turning deg"),
+        rows=tuple(rows),
+        note="Differences by seed, Wilcoxon's signed ranks, Holm over the readings; the share of "
+        "runs with contact has Wilson's upper end. Clearance is the smallest gap between edges, "
+        "turning the sum of all turns of a run.",
+    )  # fmt: skip
+
+
+def _encounters(case: str, samples: Samples) -> Grid:
+    rows: list[tuple[Cell, ...]] = []
+    for reading in PLANNER_READINGS:
+        for law in LAWS:
+            masks = _column(samples, case, reading, law, "encounters").astype(int).tolist()
+            counted = sorted(Counter(masks).items(), key=lambda item: (-item[1], item[0]))
+            shown = [
+                f"{_obstacles(mask)}: {100.0 * n / len(masks):.0f} %"
+                for mask, n in counted[:SHOWN_ENCOUNTERS]
+            ]
+            rows.append((reading, law.upper(), "; ".join(shown)))
+    figure = {"case1": "Fig. 7 names obstacle 1", "case2": "Fig. 8 names obstacles 1 and 2"}
+    return Grid(
+        key="encounters",
+        title=f"Obstacles that entered the sensing region ({figure[case]})",
+        head=("reading", "law", "share of the runs"),
+        rows=tuple(rows),
+    )
+
+
+def _obstacles(mask: int) -> str:
+    return " and ".join(str(i) for i in range(1, 64) if mask >> i & 1) or "none"
+
+
+def fitting_columns(ten: Grid) -> dict[str, list[str]]:
+    """{law: readings whose ten runs hold printed best, mean and worst}."""
+    fits: dict[str, list[str]] = {}
+    for law in LAWS:
+        fits[law] = [
+            reading
+            for reading in PLANNER_READINGS
+            if all(row[5] == "yes" for row in ten.rows if row[:2] == (reading, law.upper()))
+        ]
+    return fits
+
+
+def _notes(ten: Grid) -> tuple[str, ...]:
+    s, f = PLANNERS["section6"], PLANNERS["fig1"]
+    fits = fitting_columns(ten)
+    both = [reading for reading in PLANNER_READINGS if all(reading in x for x in fits.values())]
+    told = "; ".join(
+        f"{law.upper()}'s printed best, mean and worst lie inside the intervals of "
+        f"{' and '.join(readings) if readings else 'no reading'}"
+        for law, readings in fits.items()
+    )
+    return (
+        f"Fitted, not stated in the paper: section6 has speed {s.speed_mps:g} m/s, steps of "
+        f"{s.step_length_m:g} m and {s.bat.iterations} bat iterations per step; fig1 has speed "
+        f"{f.speed_mps:g} m/s, steps of {f.step_length_m:g} m and {f.bat.iterations} iteration of "
+        "one lasting swarm per step.",
+        f"{told}.",
+        f"One reading that gives both columns: {' and '.join(both) if both else 'none found'}"
+        + ("." if both else ": the two columns seem to come from different set-ups."),
+    )

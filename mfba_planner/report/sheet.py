@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A sheet of paper in inches from its lower left corner: head, texts, axes, legend, bytes."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
+from matplotlib.text import Text
+
+from . import style
+from .legend import Entry
+from .words import one_line
+
+EDGE = 0.3
+FORMATS = ("svg", "png")
+# neither date nor version: the same figure gives the same bytes
+_PLAIN: dict[str, dict[str, None]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None, "Format": None, "Type": None},
+}
+
+
+class Sheet:
+    """A figure whose parts are placed in inches; to be used and saved within style.context()."""
+
+    def __init__(self, width: float, height: float) -> None:
+        """Cut the sheet; resize() may change it until something has been placed."""
+        self.width, self.height = width, height
+        self.figure = Figure(figsize=(width, height))
+        self._canvas = FigureCanvasAgg(self.figure)
+
+    def resize(self, width: float, height: float) -> None:
+        """Cut it anew."""
+        self.width, self.height = width, height
+        self.figure.set_size_inches(width, height)
+
+    @property
+    def renderer(self) -> RendererAgg:
+        """What measures texts."""
+        return self._canvas.get_renderer()
+
+    def axes(self, left: float, bottom: float, width: float, height: float) -> Axes:
+        """Axes whose frame has this corner and size."""
+        return self.figure.add_axes(self._share(left, bottom, width, height))
+
+    def place(self, ax: Axes, left: float, bottom: float, width: float, height: float) -> None:
+        """Move axes."""
+        ax.set_position(self._share(left, bottom, width, height))
+
+    def _share(self, *box: float) -> tuple[float, float, float, float]:
+        """Left, bottom, width, height as shares of the sheet."""
+        left, bottom, width, height = box
+        return left / self.width, bottom / self.height, width / self.width, height / self.height
+
+    def text(self, x: float, y: float, text: str, **looks: Any) -> Text:
+        """Write a text; letters that the font does not have become question marks."""
+        return self.figure.text(x / self.width, y / self.height, drawable(text), **looks)
+
+    def size(self, text: Text) -> float:
+        """Width of a text in inches."""
+        return text.get_window_extent(self.renderer).width / style.DPI
+
+    def head(self, title: str, subtitle: str, left: float = EDGE) -> None:
+        """Write the title and, below it, a subtitle; each is cut where the sheet ends."""
+        room = self.width - left - EDGE
+        top = self.height - 0.3
+        for text, y, looks in (
+            (title, top, {"fontsize": style.LARGE, "fontweight": "bold"}),
+            (subtitle, top - 0.25, {"fontsize": style.NORMAL, "color": style.QUIET}),
+        ):
+            words = one_line(text, 200)
+            label = self.text(left, y, words, va="center", **looks)
+            while self.size(label) > room:
+                words = one_line(words, len(words) - 4)
+                label.set_text(drawable(words))
+
+    def legend(self, entries: Sequence[Entry], x: float, top: float, **looks: Any) -> float:
+        """Put a legend with its upper left corner there; return where it ends below."""
+        legend = self.figure.legend(
+            [handle for handle, _ in entries],
+            [label for _, label in entries],
+            loc="upper left",
+            bbox_to_anchor=(x / self.width, top / self.height),
+            **{"borderaxespad": 0.0, "borderpad": 0.0, "handlelength": 2.2, "labelspacing": 0.65,
+               **looks},
+        )  # fmt: skip
+        return float(legend.get_window_extent(self.renderer).y0 / style.DPI)
+
+
+def to_bytes(figure: Figure, form: str) -> bytes:
+    """The figure as png or svg, without date or version inside."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=form, metadata=_PLAIN[form])
+    return buffer.getvalue()
+
+
+def drawable(text: str) -> str:
+    """Text with a question mark for each letter that the house font does not have."""
+    known = get_font(findfont("DejaVu Sans")).get_charmap()
+    return "".join(letter if ord(letter) in known else "?" for letter in text)

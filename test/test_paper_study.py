@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The study's runs: the same for any number of workers, resumable, refused when not ours."""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mfba_planner.core.bat import Algorithm, BatParams, minimize
+from mfba_planner.core.episode import run
+from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
+from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.core.world import Scenario
+from mfba_planner.paper.functions import FUNCTIONS
+from mfba_planner.paper.readings import PLANNERS
+from mfba_planner.paper.study import store as storing
+from mfba_planner.paper.study.chunk import (
+    BENCHMARK_STREAM,
+    Benchmark,
+    Chunk,
+    Trips,
+    chunks,
+    turning,
+)
+from mfba_planner.paper.study.plan import FULL, QUICK, benchmark_plan, trip_plan
+from mfba_planner.paper.study.run import run_plan
+from mfba_planner.paper.study.store import Store
+
+NEAR = Scenario(name="near", start_m=(0.0, 0.0), goal_m=(1.5, 1.0))
+SWARM = BatParams(population=6, iterations=10)
+
+
+def a_plan(first: int = 3, size: int = 4) -> list[Chunk]:
+    """Two samples of a few cheap runs."""
+    return [
+        *chunks("a/F5/mfba", Benchmark(function="F5", bat=SWARM), first, 10, size),
+        *chunks("b/near/mfba", Trips(scenario=NEAR, planner=PlannerParams()), first, 5, size),
+    ]
+
+
+def plain(samples: Any) -> dict[str, dict[str, list[float]]]:
+    return {
+        name: {column: values.tolist() for column, values in sample.items()}
+        for name, sample in samples.items()
+    }
+
+
+def test_a_run_of_the_study_is_a_run_of_the_single_engine() -> None:
+    for algorithm in Algorithm:
+        params = replace(SWARM, algorithm=algorithm)
+        key = (BENCHMARK_STREAM, 4, int.from_bytes(algorithm.value.encode(), "big"))
+        rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(17, spawn_key=key)))
+        alone = minimize(FUNCTIONS["F4"], FUNCTIONS["F4"].box(2), params, rng).best_value
+        work = Benchmark(function="F4", bat=params)
+        assert work.run([16, 17])["best"][1] == alone
+
+
+def test_laws_functions_and_seeds_have_streams_of_their_own() -> None:
+    still = replace(SWARM, iterations=1, sigma=0.0, f_max=0.0)  # the best of the first bats
+    found = [
+        Benchmark(function=function, bat=replace(still, algorithm=algorithm)).run([1, 2])["best"]
+        for function in ("F1", "F5")
+        for algorithm in Algorithm
+    ]
+    assert len({value for pair in found for value in pair}) == 8
+
+
+def test_a_trip_of_the_study_is_what_sim_tells_of_its_seed() -> None:
+    found = Trips(scenario=NEAR, planner=PLANNERS["fig1"]).run([7, 8])
+    episode = run(NEAR, planner=PLANNERS["fig1"], seed=8)
+    result = evaluate(episode)
+    assert found["length_m"][1] == result.length_m
+    assert found["clearance_m"][1] == result.min_clearance_m
+    assert found["reached"] == [1, 1]
+    assert found["turning_rad"][1] == turning(episode) > 0.0
+
+
+def test_turning_is_the_sum_of_all_turns() -> None:
+    episode = run(NEAR, seed=1)
+    corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.0, 2.0)]
+    ticks = tuple(replace(episode.ticks[0], pose=Pose2D(*corner)) for corner in corners)
+    assert turning(replace(episode, ticks=ticks)) == pytest.approx(np.radians(90 + 45))
+
+
+@pytest.mark.parametrize(("workers", "size"), [(1, 3), (2, 4), (3, 100)])
+def test_samples_do_not_depend_on_workers_or_chunks(workers: int, size: int) -> None:
+    whole = plain(run_plan(a_plan(size=10)))
+    assert plain(run_plan(a_plan(size=size), workers=workers)) == whole
+    assert len(whole["a/F5/mfba"]["best"]) == 10
+
+
+def test_seeds_are_those_asked_for() -> None:
+    later = plain(run_plan(a_plan(first=5)))["a/F5/mfba"]["best"]
+    assert plain(run_plan(a_plan(first=3)))["a/F5/mfba"]["best"][2:] == later[:-2]
+
+
+@pytest.mark.parametrize("workers", [0, -1, 257])
+def test_workers_that_cannot_be_are_refused(workers: int) -> None:
+    with pytest.raises(ConfigError, match=rf"--workers={workers}: out of range; give 1 to 256"):
+        run_plan(a_plan(), workers=workers)
+
+
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the chunks that are computed from now on."""
+    names: list[str] = []
+    compute = Chunk.run
+
+    def noted(chunk: Chunk) -> Any:
+        names.append(chunk.name)
+        return compute(chunk)
+
+    monkeypatch.setattr(Chunk, "run", noted)
+    return names
+
+
+def test_an_interrupted_study_goes_on_and_gives_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = a_plan()
+    whole = plain(run_plan(plan))
+    computed = counted(monkeypatch)
+    seen: list[Chunk] = []
+
+    def interrupt(chunk: Chunk) -> None:
+        seen.append(chunk)
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_plan(plan, store=Store(tmp_path / "out", plan, {}), done=interrupt)
+    kept, computed[:] = list(computed), []
+    again = run_plan(plan, store=Store(tmp_path / "out", plan, {}))
+    assert plain(again) == whole
+    assert len(kept) == 2
+    assert sorted([*kept, *computed]) == sorted(chunk.name for chunk in plan)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text[: len(text) // 2],
+        lambda text: "",
+        lambda text: text.replace('"best": [', '"best": [1'),
+        lambda text: "[1, 2]",
+    ],
+    ids=["half-written", "empty", "altered", "something else"],
+)
+def test_a_damaged_chunk_is_computed_again(
+    damage: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = a_plan()
+    whole = plain(run_plan(plan, store=Store(tmp_path, plan, {})))
+    path = tmp_path / "chunks" / f"{plan[1].name}.json"
+    text = path.read_text()
+    path.write_text(damage(text))
+    computed = counted(monkeypatch)
+    assert plain(run_plan(plan, store=Store(tmp_path, plan, {}))) == whole
+    assert computed == [plan[1].name]
+    assert path.read_text() == text
+
+
+def refusal(directory: Path, plan: list[Chunk], facts: dict[str, Any]) -> str:
+    with pytest.raises(OutputError) as caught:
+        Store(directory, plan, facts)
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(f"{directory}: ")
+    return line
+
+
+def test_results_of_anything_else_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = a_plan()
+    out = tmp_path / "out"
+    Store(out, plan, {"seed": 3})
+    assert "(seed=3, now 4)" in refusal(out, plan, {"seed": 4})
+    assert "(what is run differs)" in refusal(out, plan[:-1], {"seed": 3})
+    other = [replace(c, work=Benchmark(function="F5", bat=replace(SWARM, rho=2.0))) for c in plan]
+    assert "(what is run differs)" in refusal(out, other, {"seed": 3})
+    with monkeypatch.context() as patch:
+        patch.setattr(storing, "__version__", "9.9.9")
+        assert "(mfba_planner='0.1.0', now '9.9.9')" in refusal(out, plan, {"seed": 3})
+    with monkeypatch.context() as patch:
+        patch.setattr(storing, "code_digest", lambda: "changed")
+        assert "(the code has changed since)" in refusal(out, plan, {"seed": 3})
+    (out / storing.MANIFEST).write_text('{"schema_version": 1, ')
+    assert "cut short or not JSON; give another --out" in refusal(out, plan, {"seed": 3})
+    (out / storing.MANIFEST).write_text("[]")
+    assert "cut short or not JSON" in refusal(out, plan, {"seed": 3})
+
+
+def test_other_people_s_directories_are_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    assert "not empty and no results of `mfba tables`" in refusal(tmp_path, a_plan(), {})
+    assert os.listdir(tmp_path) == ["mine.txt"]
+    assert "cannot be written (not a directory)" in refusal(tmp_path / "mine.txt/x", a_plan(), {})
+    assert "cannot be written (not a directory)" in refusal(tmp_path / "mine.txt", a_plan(), {})
+
+
+def test_the_manifest_says_what_was_run(tmp_path: Path) -> None:
+    Store(tmp_path / "deep/out", a_plan(), {"seed": 3})
+    found = json.loads((tmp_path / "deep/out/study.json").read_text())
+    assert found["seed"] == 3
+    assert found["numpy"] == np.__version__
+    assert found["chunks"][0] == "a-F5-mfba-3-4"
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """Work that ends its process, as the kernel does when memory is out."""
+
+    def facts(self) -> dict[str, Any]:
+        return {}
+
+    def run(self, seeds: Any) -> dict[str, list[float]]:
+        os._exit(3)
+
+
+@dataclass(frozen=True)
+class Faulty(Deadly):
+    def run(self, seeds: Any) -> dict[str, list[float]]:
+        raise ConfigError("x=1: out of range; give 2")
+
+
+def test_a_worker_that_dies_costs_one_line() -> None:
+    plan: Any = chunks("x", Deadly(), 0, 4, 1)  # type: ignore[arg-type]
+    with pytest.raises(MfbaError, match="a worker process died"):
+        run_plan(plan, workers=2)
+
+
+def test_an_error_inside_a_worker_arrives_as_it_was() -> None:
+    plan: Any = chunks("x", Faulty(), 0, 4, 1)  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match="x=1: out of range; give 2"):
+        run_plan(plan, workers=2)
+
+
+def test_the_plans_hold_what_the_tables_need() -> None:
+    for size in (QUICK, FULL):
+        by_sample: dict[str, int] = {}
+        for chunk in [*benchmark_plan(size, 0), *trip_plan("case1", NEAR, size, 0)]:
+            by_sample[chunk.sample] = by_sample.get(chunk.sample, 0) + chunk.count
+        assert len(by_sample) == 3 * 12 + 4 + 4
+        assert min(by_sample.values()) >= 10
+        assert by_sample["table3/F1/mfba"] == size.benchmarks["table3"] >= 15
+        assert by_sample["robust/F4/ba"] == size.benchmark("robust", "F4")
+        assert by_sample["section6/case1/ba"] == size.trips
+    names = [chunk.name for chunk in benchmark_plan(FULL, 0)]
+    assert len(set(names)) == len(names)
