@@ -118,7 +118,7 @@ def _what_if(recorded: Episode, settings: list[str], picture: Path | None) -> No
     else:
         print("no decision differs")
     if picture:
-        from ..report.trails import draw_trails
+        from ..report.figure import draw_what_if
 
-        draw_trails(recorded, again, change, picture)
+        draw_what_if(recorded, again, change, picture)
         print(f"wrote {picture}")

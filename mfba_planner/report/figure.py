@@ -15,7 +15,7 @@ from . import legend, style, words
 from .files import write_new
 from .moments import Pass, closest_passes
 from .page import Page
-from .scene import draw_scene, label_numbers
+from .scene import draw_scene, draw_way, label_numbers
 from .sheet import to_bytes
 from .view import choose_view
 
@@ -34,14 +34,30 @@ def png_bytes(episode: Episode) -> bytes:
         return to_bytes(run_figure(episode), "png")
 
 
-def run_figure(episode: Episode) -> Figure:
-    """Compose head, world, panel and strip; to be called and saved within style.context()."""
+def draw_what_if(recorded: Episode, episode: Episode, change: str, path: Path) -> None:
+    """Write the picture of a run with the way of the recorded one beneath, as PNG.
+
+    Raises OutputError when path exists already or cannot be written.
+    """
+    with style.context():
+        figure = run_figure(episode, recorded, f"what if {change}")
+        write_new(path, to_bytes(figure, "png"))
+
+
+def run_figure(episode: Episode, recorded: Episode | None = None, subtitle: str = "") -> Figure:
+    """Compose head, world, panel and strip; to be called and saved within style.context().
+
+    The way of `recorded`, another run of the same world, is drawn beneath.
+    """
     result, passes = evaluate(episode), closest_passes(episode)
     view, scale = choose_view(episode, passes)
     page = Page(view, scale)
+    if recorded:
+        draw_way(page.ax, recorded)
     draw_scene(page.ax, episode, view, passes, result.encounters)
     label_numbers(page.ax, episode, view, passes)
-    page.head(episode.scenario.name, episode.scenario.description or f"{episode.driver} driver")
+    about = episode.scenario.description or f"{episode.driver} driver"
+    page.head(episode.scenario.name, subtitle or about)
     page.legend(legend.entries(page.ax))
     page.rows("Closest pass, edge to edge", _pass_rows(passes, result))
     hidden = [str(p.number) for p in passes if not view.holds(p.center_m)]

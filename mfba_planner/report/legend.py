@@ -27,6 +27,7 @@ def _all() -> dict[str, Entry]:
         "goal": (Line2D([], [], **style.GOAL), "goal"),
         "end": (Line2D([], [], **style.END), "end of the run"),
         **{f"path:{mode.value}": (_path(mode), words.MODES[mode]) for mode in _MODES},
+        "way": (Line2D([], [], **style.WAY), "way of the recorded run"),
         "obstacle": (_disc(style.OBSTACLE), "obstacle, at closest pass"),
         "enlarged": (Line2D([], [], **_edge(style.ENLARGED)), "enlarged by the robot's radius"),
         "pass": (Line2D([], [], **style.PASS), "clearance at closest pass"),

@@ -142,6 +142,12 @@ def _runs(bits: Bits) -> Iterator[tuple[int, int]]:
         first += count
 
 
+def draw_way(ax: Axes, episode: Episode) -> None:
+    """The way of another run, for comparison."""
+    points = [tick.pose.position for tick in episode.ticks if is_finite(tick.pose.position)]
+    line(ax, points, "way", zorder=Z_TRACK, **style.WAY)
+
+
 def draw_path(ax: Axes, episode: Episode) -> None:
     """One line per stretch of a mode, and a mark where the robot stands in it."""
     parts = stretches(episode)

@@ -49,6 +49,7 @@ ARROW: Looks = {
     "arrowstyle": "-|>", "mutation_scale": 9.0, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 0.0,
     "color": QUIET,
 }  # fmt: skip
+WAY: Looks = {"color": INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5, 1, 1.5))}
 PASS: Looks = {
     "color": INK, "linewidth": 1.0, "marker": "o", "markersize": 4.0,
     "markerfacecolor": PAPER, "markeredgecolor": INK,
