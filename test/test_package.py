@@ -47,6 +47,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"core", "messages", "recording", "scenarios"},
         {"mcap", "mcap_ros2", "yaml", "zstandard"},
     ),
+    "verification": ({"core", "messages", "recording", "verification"}, set()),
     "report": ({"core", "outputs", "paper", "report"}, {"matplotlib", "numpy", "rich"}),
     "ros": (
         {"arguments", "core", "messages", "outputs", "recording", "ros", "run_config"}
