@@ -56,8 +56,10 @@ setup(
     ],
     # Not tests_require: with it `colcon test` runs no test and stays green.
     extras_require={
+        "parquet": ["pyarrow>=15"],
         "test": [
             "hypothesis>=6.100",
+            "pyarrow>=15",
             "pybag-sdk>=0.13",
             "pytest>=8",
             "pytest-cov>=6",

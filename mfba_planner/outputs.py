@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import os
 import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from .core.errors import OutputError
 
@@ -31,9 +34,17 @@ def bag_in(path: Path) -> Path:
 
 
 def write_new(path: Path, data: bytes) -> None:
-    """Write a file that must not exist yet, through a temporary one beside it.
+    """Write a file that must not exist yet; OutputError as new_file."""
+    with new_file(path) as file:
+        file.write(data)
 
-    Raises OutputError when path exists or cannot be written; nothing is left behind then.
+
+@contextmanager
+def new_file(path: Path) -> Iterator[BinaryIO]:
+    """Open a file that must not exist yet; it gets its name when all has been written.
+
+    Raises OutputError when path exists or cannot be written; nothing is left behind then, nor
+    after any other error.
     """
     if os.path.lexists(path):
         raise _exists(path)
@@ -41,7 +52,7 @@ def write_new(path: Path, data: bytes) -> None:
     try:
         try:
             with open(temporary, "xb") as file:
-                file.write(data)
+                yield file
                 file.flush()
                 os.fsync(file.fileno())
             _publish(temporary, path)

@@ -55,7 +55,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy"} | ROS,
     ),
     "launcher": ({"*"}, {"rich", "yaml"} | ROS),
-    "cli": ({"*"}, {"rich", "yaml"}),
+    "cli": ({"*"}, {"pyarrow", "rich", "yaml"}),
 }
 # The core is handed the time and its random generators, and lets others do the talking.
 CORE_NEVER = {"asyncio", "datetime", "logging", "multiprocessing", "random", "threading", "time"}

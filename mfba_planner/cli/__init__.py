@@ -18,6 +18,7 @@ COMMANDS = {
     "digest": "the decision digest of a bag or a result",
     "verify": "decide again on what a bag recorded, and compare bit for bit",
     "diff": "where the decisions of two bags first differ",
+    "export": "a bag's ticks and decisions as one tidy table, CSV or Parquet",
     "recover": "make an ordinary bag of one that was killed or truncated",
     "picture": "draw the run that a bag holds",
     "figures": "the paper's figures again, as SVG and PNG",

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba export`: a bag's ticks and decisions as CSV or Parquet; needs no ROS."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from itertools import chain, islice
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ..arguments import Parser
+from ..core.errors import BagError, ConfigError
+from ..outputs import bag_in, new_file
+from ..recording.reader import BagReader
+from ..recording.table import COLUMNS, Row, read_rows
+
+BATCH = 5000  # rows that are held at a time
+
+
+def main(args: list[str]) -> int:
+    """Write the table."""
+    lines = [f"  {name:<12} {meaning}" for name, (_, meaning) in COLUMNS.items()]
+    parser = Parser(
+        prog="mfba export",
+        description="Write a bag's ticks and decisions as one table, a row per decision.",
+        epilog="columns:\n" + "\n".join([*lines, "  range_1 ...  range of each sector, m"]),
+    )
+    parser.add_argument("bag", type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+    parser.add_argument("table", type=Path, metavar="FILE", help="a .csv or .parquet to create")
+    found = parser.parse(args)
+    writers = {".csv": _write_csv, ".parquet": _write_parquet}
+    write = writers.get(found.table.suffix)
+    if write is None:
+        raise ConfigError(f"{found.table}: unknown kind of table; give a name in .csv or .parquet")
+    with BagReader(bag_in(found.bag)) as reader:
+        rows = read_rows(reader)
+        first = next(rows, None)
+        if first is None:
+            raise BagError(f"{found.bag}: holds no decision to export; give another bag")
+        with new_file(found.table) as file:
+            count = write(file, list(first), chain([first], rows))
+    print(f"wrote {found.table}: {count} rows")
+    return 0
+
+
+def _write_csv(file: BinaryIO, names: list[str], rows: Iterator[Row]) -> int:
+    text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
+    writer = csv.DictWriter(text, names, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    count = 0
+    for row in rows:
+        writer.writerow(row)
+        count += 1
+    text.detach()
+    return count
+
+
+def _write_parquet(file: BinaryIO, names: list[str], rows: Iterator[Row]) -> int:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise ConfigError(
+            "parquet: pyarrow is not installed; pip install 'mfba_planner[parquet]', or give .csv"
+        ) from None
+    kinds: dict[type, Any] = {
+        int: pyarrow.int64(),
+        float: pyarrow.float64(),
+        str: pyarrow.string(),
+    }
+    schema = pyarrow.schema([(name, kinds[COLUMNS.get(name, (float,))[0]]) for name in names])
+    count = 0
+    with parquet.ParquetWriter(file, schema) as writer:
+        while batch := list(islice(rows, BATCH)):
+            columns = {name: [row.get(name) for row in batch] for name in names}
+            writer.write_table(pyarrow.table(columns, schema=schema))
+            count += len(batch)
+    return count
