@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much memory `mfba export` and `mfba info` take on a large bag, and how long.
+
+The bag is a real run's decisions and sectors over and over under rising stamps, with scans
+between them that fill the file; nothing of it compresses away.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import LaserScan
+
+from mfba_planner.core.episode import run
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.recording.configuration import attach_configuration
+from mfba_planner.recording.writer import BagWriter
+from mfba_planner.ros.convert import decision_msg, sectors_msg, set_stamp
+from mfba_planner.run_config import RunConfig, node_parameters
+from mfba_planner.scenarios import load_scenario
+
+MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
+
+
+def write_bag(path: Path, size_bytes: int) -> int:
+    """Write a bag of that size; return how many ticks it has."""
+    rng = np.random.default_rng(0)
+    config = RunConfig(scenario=load_scenario("case2"))
+    ticks = run(config.scenario).ticks
+    tick_ns = PlannerParams().tick_ns
+    beams = rng.random((16, 2500), dtype=np.float32)
+    with BagWriter(path) as writer:
+        for name, kind in (
+            ("/planner/decision", "diagnostic_msgs/msg/DiagnosticArray"),
+            ("/sectors", "sensor_msgs/msg/LaserScan"),
+            ("/scan", "sensor_msgs/msg/LaserScan"),
+        ):
+            writer.add_topic(name, kind)
+        attach_configuration(writer, {"nodes": node_parameters(config, ()), "run": {}})
+        written = count = 0
+        while written < size_bytes:
+            decision = ticks[count % len(ticks)]
+            count += 1
+            stamp = count * tick_ns
+            sectors = sectors_msg(decision.ranges_m, SensorParams(), 0.3, stamp, "odom")
+            why = decision_msg(decision, "mfba", 0, "/planner")
+            set_stamp(why.header.stamp, stamp)
+            scan = LaserScan(ranges=beams[count % 16] * rng.random(dtype=np.float32))
+            set_stamp(scan.header.stamp, stamp)
+            for topic, message in (
+                ("/scan", scan),
+                ("/sectors", sectors),
+                ("/planner/decision", why),
+            ):
+                data = serialize_message(message)
+                writer.write(topic, data, stamp, stamp)
+                written += len(data)
+    return count
+
+
+def main() -> None:
+    """Print the largest resident set of each command on the bag."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--megabytes", type=int, default=1100)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as root:
+        bag = Path(root) / "bag"
+        ticks = write_bag(bag, options.megabytes * 1_000_000)
+        size = sum(path.stat().st_size for path in bag.iterdir())
+        print(f"bag of {size / 1e9:.2f} GB, {ticks} ticks", flush=True)
+        for words in (["export", str(bag), f"{root}/run.csv"],
+                      ["export", str(bag), f"{root}/run.parquet"],
+                      ["info", str(bag)]):  # fmt: skip
+            started = time.monotonic()
+            child = subprocess.Popen(
+                [sys.executable, "-c", MFBA, *words], stdout=subprocess.DEVNULL
+            )
+            _, status, used = os.wait4(child.pid, 0)
+            took = time.monotonic() - started
+            name = f"{words[0]} {Path(words[-1]).suffix}"
+            print(
+                f"{name:<16} exit {status}, {used.ru_maxrss / 1024:.0f} MB resident at most, "
+                f"{took:.1f} s",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
