@@ -106,8 +106,8 @@ def test_what_the_bats_tried_is_not_a_decision() -> None:
 @pytest.mark.parametrize(
     ("scenario", "expected"),
     [
-        ("case1", "167eb873269d8596bb810eb46e4c941855b057ba534391e33b49137c3341789a"),
-        ("case2", "678abfa8c598a90e1db4e2d2485945e5c152bde9339b1c63b0c390a03b5446af"),
+        ("case1", "39970c339567b4b0f406f0fe79d5a35b513cbd619018e6fc3d6c128057b17d12"),
+        ("case2", "f1efb25e51056bfbb8582e42749db90a0bd23e991220deabc8986c6f81f456a9"),
     ],
 )
 def test_the_case_studies_keep_their_digests(scenario: str, expected: str) -> None:

@@ -18,7 +18,7 @@ from mfba_planner.core.episode import (
     stamp_of,
 )
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.metrics import Result, encounters, evaluate, tick_clearances
+from mfba_planner.core.metrics import Result, evaluate, tick_clearances
 from mfba_planner.core.planner import Decision, Mode, Observation, Planner, PlannerParams
 from mfba_planner.core.sensing import SensorParams, sense_circles
 from mfba_planner.core.world import Obstacle, Scenario
@@ -306,15 +306,15 @@ def test_encounters_in_order_of_time() -> None:
     # SR 0.8 from the enlarged edge: 1.6 m from a centre
     posts = (post((6.0, 1.6)), post((3.0, -1.5)), post((0.0, 1.6000001)), post((6.0, -1.0)))
     episode = trip([(0.0, 0.0), (3.0, 0.0), (6.0, 0.0), (3.0, 0.0)], obstacles=posts)
-    assert encounters(episode) == evaluate(episode).encounters == (2, 1, 4)
+    assert evaluate(episode).encounters == (2, 1, 4)
     wide = replace(episode, sensor=SensorParams(sensing_range_m=0.81))
-    assert encounters(wide) == (3, 2, 1, 4)
+    assert evaluate(wide).encounters == (3, 2, 1, 4)
 
 
 def test_encounters_follow_moving_obstacles() -> None:
     runner = Obstacle(center_m=(0.0, 4.0), radius_m=0.5, speed_mps=1.0, heading_rad=-math.pi / 2)
-    assert encounters(trip([(0.0, 0.0)] * 3, obstacles=(runner,))) == ()
-    assert encounters(trip([(0.0, 0.0)] * 4, obstacles=(runner,))) == (1,)
+    assert evaluate(trip([(0.0, 0.0)] * 3, obstacles=(runner,))).encounters == ()
+    assert evaluate(trip([(0.0, 0.0)] * 4, obstacles=(runner,))).encounters == (1,)
 
 
 def test_lengths_do_not_depend_on_how_python_sums() -> None:

@@ -173,8 +173,8 @@ def test_messages_whose_description_is_lost_are_counted(tmp_path: Path) -> None:
 def truncate_before_summary(path: Path) -> Path:
     cut = path.with_name("cut.mcap")
     data = path.read_bytes()
-    # DataEnd: opcode 15, length 4, no CRC.
-    cut.write_bytes(data[: data.rindex(b"\x0f\x04" + bytes(11))])
+    # DataEnd: opcode 15, length 4, then its CRC.
+    cut.write_bytes(data[: data.rindex(b"\x0f\x04" + bytes(7))])
     return cut
 
 

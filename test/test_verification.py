@@ -98,7 +98,6 @@ def other_bit(bits: str) -> str:
         (one_changed(DECISION, 30, set_field("goal", lambda _: "1.0,2.0")), "for a goal that no"),
         (one_changed(DECISION, 30, set_field("mode", lambda _: "flying")), "garbles"),
     ],
-    ids=str,
 )
 def test_what_was_edited_by_hand_is_named(
     bag: Path, tmp_path: Path, edit: Edit, named: str
@@ -167,7 +166,6 @@ def swapped(topic: str, index: int) -> Edit:
         (swapped("/odom", 20), "/odom: stamp "),
         (swapped(DECISION, 20), "/planner/decision: stamp "),
     ],
-    ids=str,
 )
 def test_missing_and_reordered_messages_are_named(
     bag: Path, tmp_path: Path, edit: Edit, named: str

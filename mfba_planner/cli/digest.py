@@ -6,9 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..arguments import Parser
-from ..core.digest import digest
 from ..outputs import bag_in
-from ..recording.episode import read_episode
+from ..recording.episode import summarize
 from ..report.result import read_result
 
 
@@ -30,4 +29,4 @@ def main(args: list[str]) -> int:
 def _digest(path: Path) -> str:
     if path.suffix == ".json":
         return str(read_result(path)["digest"])
-    return digest(read_episode(bag_in(path)).ticks)
+    return summarize(bag_in(path))[2]

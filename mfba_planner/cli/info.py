@@ -7,11 +7,10 @@ from pathlib import Path
 
 from ..arguments import Parser
 from ..core.errors import BagError
-from ..core.metrics import evaluate
 from ..launcher.conclusion import show
 from ..outputs import bag_in
 from ..recording.configuration import ATTACHMENT_NAME
-from ..recording.episode import read_episode
+from ..recording.episode import summarize
 from ..recording.info import describe, format_info
 
 
@@ -24,10 +23,11 @@ def main(args: list[str]) -> int:
     print(format_info(info))
     if any(name == ATTACHMENT_NAME for name, _, _ in info.attachments):
         try:
-            episode = read_episode(bag, salvage=not info.complete)
+            episode, result, digest = summarize(bag, salvage=not info.complete)
         except BagError as error:
             print(f"Run:         {error}")
         else:
             print()
-            show(episode, evaluate(episode))
+            show(episode, result)
+            print(f"digest {digest}")
     return 0

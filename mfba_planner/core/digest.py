@@ -29,12 +29,30 @@ _GAP = struct.Struct("<i")
 _NAN = struct.pack("<d", math.nan)
 
 
+class Digest:
+    """The digest of decisions that come one by one."""
+
+    def __init__(self) -> None:
+        """Start before tick 0."""
+        self._hashed = hashlib.sha256(HEAD)
+        self._tick = 0
+
+    def add(self, decision: Decision) -> None:
+        """Take the next tick."""
+        self._hashed.update(canonical(self._tick, decision))
+        self._tick += 1
+
+    def hexdigest(self) -> str:
+        """Hexadecimal SHA-256 of the decisions so far, 64 characters."""
+        return self._hashed.hexdigest()
+
+
 def digest(ticks: Iterable[Decision]) -> str:
     """Hexadecimal SHA-256 of the decisions, 64 characters."""
-    hashed = hashlib.sha256(HEAD)
-    for tick, decision in enumerate(ticks):
-        hashed.update(canonical(tick, decision))
-    return hashed.hexdigest()
+    whole = Digest()
+    for decision in ticks:
+        whole.add(decision)
+    return whole.hexdigest()
 
 
 def canonical(tick: int, decision: Decision) -> bytes:

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+from array import array
+from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -45,29 +47,71 @@ def evaluate(episode: Episode) -> Result:
     enlarged edge at some tick. mode_switches counts every change of mode, the one to ARRIVED
     included. success is: goal reached, no collision.
     """
-    clearances = tick_clearances(episode)
-    # fsum: sum() itself rounds differently before and after Python 3.12
-    length = math.fsum(
-        distance(a.pose.position, b.pose.position) for a, b in pairwise(episode.ticks)
-    )
-    modes = [tick.mode for tick in episode.ticks]
-    stamps = [tick.stamp_ns for tick in episode.ticks] or [0]
-    collisions = _contacts(clearances)
-    return Result(
-        outcome=episode.outcome,
-        success=episode.outcome is Outcome.GOAL_REACHED and collisions == 0,
-        length_m=length,
-        time_s=(stamps[-1] - stamps[0]) * NANO,
-        ticks=len(episode.ticks),
-        fitness=1.0 / length if length > 0.0 else math.inf,
-        min_clearance_m=min((min(row) for row in clearances if row), default=math.inf),
-        collisions=collisions,
-        mode_switches=sum(a is not b for a, b in pairwise(modes)),
-        avoidance_ticks=modes.count(Mode.OBSTACLE_AVOIDANCE),
-        blocked_ticks=modes.count(Mode.BLOCKED),
-        stopped_ticks=modes.count(Mode.STOPPED),
-        encounters=encounters(episode),
-    )
+    tally = Tally(episode)
+    for tick in episode.ticks:
+        tally.add(tick)
+    return tally.result(episode.outcome)
+
+
+class Tally:
+    """The figures of evaluate(), tick by tick: holds one tick, however long the run is."""
+
+    def __init__(self, run: Episode) -> None:
+        """Start before the first tick; of run, only what was run counts, not its ticks."""
+        self._run = run
+        self._first: Decision | None = None
+        self._last: Decision | None = None
+        # fsum of all at the end: sum() itself rounds differently before and after Python 3.12
+        self._steps_m = array("d")
+        self._modes: Counter[Mode] = Counter()
+        self._switches = self._collisions = 0
+        self._min_clearance_m = math.inf
+        self._touching: list[bool] = []
+        self._encounters: dict[int, None] = {}
+
+    def add(self, tick: Decision) -> None:
+        """Take the next tick."""
+        before = self._last
+        if before is None:
+            self._first = tick
+        else:
+            self._steps_m.append(distance(before.pose.position, tick.pose.position))
+            self._switches += before.mode is not tick.mode
+            self._pass(before, tick)
+        self._last = tick
+        self._modes[tick.mode] += 1
+        self._encounters.update(dict.fromkeys(within_range(self._run, tick)))
+
+    def result(self, outcome: Outcome) -> Result:
+        """The figures of the ticks so far; a single tick has the clearance of standing there."""
+        first, last = self._first, self._last
+        if first is not None and first is last:
+            self._pass(first, first)
+        length = math.fsum(self._steps_m)
+        return Result(
+            outcome=outcome,
+            success=outcome is Outcome.GOAL_REACHED and self._collisions == 0,
+            length_m=length,
+            time_s=(last.stamp_ns - first.stamp_ns) * NANO if first and last else 0.0,
+            ticks=self._modes.total(),
+            fitness=1.0 / length if length > 0.0 else math.inf,
+            min_clearance_m=self._min_clearance_m,
+            collisions=self._collisions,
+            mode_switches=self._switches,
+            avoidance_ticks=self._modes[Mode.OBSTACLE_AVOIDANCE],
+            blocked_ticks=self._modes[Mode.BLOCKED],
+            stopped_ticks=self._modes[Mode.STOPPED],
+            encounters=tuple(self._encounters),
+        )
+
+    def _pass(self, before: Decision, tick: Decision) -> None:
+        """The obstacles during one step; a contact counts when it begins."""
+        gaps = _clearances(self._run, before, tick)
+        self._min_clearance_m = min([self._min_clearance_m, *gaps])
+        touching = [gap < -CONTACT_SLACK_M for gap in gaps]
+        were = self._touching or [False] * len(gaps)
+        self._collisions += sum(now and not was for was, now in zip(were, touching))
+        self._touching = touching
 
 
 def tick_clearances(episode: Episode) -> list[list[float]]:
@@ -75,32 +119,12 @@ def tick_clearances(episode: Episode) -> list[list[float]]:
     ticks = episode.ticks
     if len(ticks) == 1:
         ticks = (ticks[0], ticks[0])
-    return [
-        step_clearances(
-            episode.scenario,
-            episode.time_s(a.stamp_ns),
-            episode.time_s(b.stamp_ns),
-            a.pose.position,
-            b.pose.position,
-        )
-        for a, b in pairwise(ticks)
-    ]
+    return [_clearances(episode, a, b) for a, b in pairwise(ticks)]
 
 
-def _contacts(clearances: list[list[float]]) -> int:
-    count = 0
-    for column in zip(*clearances):
-        touching = [gap < -CONTACT_SLACK_M for gap in column]
-        count += sum(now and not before for before, now in pairwise([False, *touching]))
-    return count
-
-
-def encounters(episode: Episode) -> tuple[int, ...]:
-    """Obstacles (from 1) whose enlarged edge came within SR, in order of first encounter."""
-    met: dict[int, None] = {}
-    for tick in episode.ticks:
-        met.update(dict.fromkeys(within_range(episode, tick)))
-    return tuple(met)
+def _clearances(run: Episode, a: Decision, b: Decision) -> list[float]:
+    times_s = run.time_s(a.stamp_ns), run.time_s(b.stamp_ns)
+    return step_clearances(run.scenario, *times_s, a.pose.position, b.pose.position)
 
 
 def within_range(episode: Episode, tick: Decision) -> tuple[int, ...]:

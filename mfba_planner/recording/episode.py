@@ -6,22 +6,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from mfba_planner.core.digest import Digest
 from mfba_planner.core.episode import Episode, Outcome, World
+from mfba_planner.core.metrics import Result, Tally
 from mfba_planner.core.options import flatten, override
 from mfba_planner.core.planner import Decision, PlannerParams
-from mfba_planner.core.sensing import Ranges, SensorParams
+from mfba_planner.core.sensing import SensorParams
 from mfba_planner.core.world import Scenario
-from mfba_planner.messages import decision, sector_ranges, stamp_ns
 from mfba_planner.scenarios import load_scenario
 
 from ..core.errors import BagError, ConfigError, InputError
 from .configuration import read_configuration
+from .decisions import stream_decisions
 from .reader import BagReader
 
 T = TypeVar("T")
-
-SECTORS, DECISION = "/sectors", "/planner/decision"
-
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
     """The Episode a bag of ours holds; `salvage` also reads one that was never closed.
@@ -38,7 +37,29 @@ def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
 
 def _read(reader: BagReader) -> Episode:
     setup = read_setup(reader)
-    return setup.episode(_decisions(reader))
+    return setup.episode(tuple(found for found, _ in stream_decisions(reader)))
+
+
+def summarize(path: str | Path, *, salvage: bool = False) -> tuple[Episode, Result, str]:
+    """Of a bag of any length: an Episode with its last tick only, the Result, the digest.
+
+    Streams; raises as read_episode does.
+    """
+    with BagReader(path, salvage=salvage) as reader:
+        try:
+            setup = read_setup(reader)
+            tally: Tally | None = None
+            hashed = Digest()
+            for found, _ in stream_decisions(reader):
+                tally = tally or Tally(setup.episode((found,)))
+                tally.add(found)
+                hashed.add(found)
+                last = found
+        except (ConfigError, InputError) as error:
+            raise BagError(f"{path}: {error}") from None
+    assert tally is not None  # stream_decisions yields one or raises
+    episode = setup.episode((last,))
+    return episode, tally.result(episode.outcome), hashed.hexdigest()
 
 
 class Setup(NamedTuple):
@@ -89,36 +110,6 @@ def read_setup(reader: BagReader) -> Setup:
 def _only(defaults: T, values: dict[str, Any]) -> T:
     """The options of one dataclass out of all parameters of a node."""
     return override(defaults, {name: values[name] for name in flatten(defaults)})
-
-
-def _decisions(reader: BagReader) -> tuple[Decision, ...]:
-    """Join each decision with the sectors of its stamp, in order of stamps."""
-    ranges: dict[int, Ranges] = {}
-    decisions: dict[int, Any] = {}
-    for topic in (SECTORS, DECISION):
-        if topic not in reader.topics or not reader.topics[topic].message_count:
-            raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
-    for message in reader.decoded([SECTORS, DECISION]):
-        stamp = stamp_ns(message.message.header.stamp)
-        if message.topic == SECTORS:
-            ranges[stamp] = _seen(message.message)
-        else:
-            # A later one on a stamp only says that its inputs have become stale.
-            decisions.setdefault(stamp, message.message)
-    try:
-        return tuple(decision(decisions[stamp], ranges[stamp]) for stamp in sorted(decisions))
-    except KeyError as error:
-        raise BagError(
-            f"{reader.path}: no sectors at stamp {error} ns; was the bag edited?"
-        ) from None
-
-
-def _seen(sectors: Any) -> Ranges:
-    """What the planner made of a sectors message: nothing, where it refused it."""
-    try:
-        return sector_ranges(sectors)
-    except InputError:
-        return ()
 
 
 def _outcome(scenario: Scenario, params: PlannerParams, ticks: tuple[Decision, ...]) -> Outcome:

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
-from ..core.errors import BagError, InputError
+from ..core.errors import InputError
 from ..core.geometry import Point
 from ..messages import goal_point, sector_ranges, stamp_ns
+from ..recording.decisions import require_decisions
 from ..recording.reader import BagReader
 
 ODOM, OBSTACLES, SECTORS, VECTOR = "/odom", "/obstacles", "/sectors", "/sensory_vector"
@@ -41,9 +42,7 @@ def gather(reader: BagReader, tick_ns: int | None) -> Evidence:
 
     Raises BagError for a bag without decisions, and for one that cannot be read to its end.
     """
-    for topic in (SECTORS, DECISION):
-        if topic not in reader.topics or not reader.topics[topic].message_count:
-            raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
+    require_decisions(reader)
     heard: dict[str, list[Any]] = {name: [] for name in (*STAMPED, VECTOR, GOAL, TWIST)}
     for message in reader.decoded(list(heard)):
         heard[message.topic].append(message.message)
