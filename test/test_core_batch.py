@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core import batch
 from mfba_planner.core.bat import (
+    Acceptance,
     Algorithm,
     BatParams,
     BatSwarm,
@@ -20,6 +21,8 @@ from mfba_planner.core.bat import (
     Epsilon,
     Initial,
     Schedule,
+    Step,
+    Update,
     Vector,
     Velocity,
     Walk,
@@ -37,6 +40,9 @@ READINGS: dict[str, Any] = {
     "epsilon": Epsilon,
     "initial": Initial,
     "walk": Walk,
+    "step": Step,
+    "acceptance": Acceptance,
+    "update": Update,
 }
 ANY_READING = st.builds(
     BatParams,
@@ -48,6 +54,7 @@ ANY_READING = st.builds(
     sigma=st.floats(0.0, 10.0),
     alpha=st.floats(0.5, 1.0),
     a0=st.floats(0.0, 2.0),
+    inertia=st.sampled_from([0.0, 0.7, 1.0]),
     r0=st.floats(0.0, 1.0),
     **{name: st.sampled_from(list(kind)) for name, kind in READINGS.items()},
 )
@@ -62,9 +69,11 @@ def generators(runs: int, seed: int = 7) -> list[np.random.Generator]:
 
 
 def bowl(x: Vector) -> float:
-    """NaN in a corner, infinite in another, two valleys."""
+    """NaN in a corner, -inf in another, inf on a side, two valleys."""
     if x[0] > 0.9 and x[-1] > 0.2:
         return math.nan
+    if x[0] > 0.9 and x[-1] < -1.5:
+        return -math.inf
     total = 0.0
     for v in x:
         total = total + (v * v - 0.3) * (v * v - 0.3) + 0.1 * v
@@ -78,6 +87,7 @@ def bowls(x: np.ndarray) -> np.ndarray:
             v = x[..., j]
             total = total + (v * v - 0.3) * (v * v - 0.3) + 0.1 * v
     total = np.where(x[..., 0] > -0.9, total, math.inf)
+    total = np.where((x[..., 0] > 0.9) & (x[..., -1] < -1.5), -math.inf, total)
     return np.where((x[..., 0] > 0.9) & (x[..., -1] > 0.2), math.nan, total)
 
 
@@ -93,6 +103,7 @@ def test_each_run_equals_the_single_engine_bit_by_bit(
             swarm.tell([bowl(x) for x in swarm.ask()])
             assert result.history[i, t] == swarm.best_value
         assert result.best_value[i] == swarm.best_value
+        assert result.failures[i] == sum(swarm.failures.counts.values())
         assert result.best_x[i].tobytes() == np.array(swarm.best_x).tobytes()
         assert ours[i].random() == rng.random(), "both took the same number of draws"
 
