@@ -74,8 +74,7 @@ def body(section: Section) -> str:
 
 
 def _grid(grid: Grid, digits: int) -> str:
-    rows = [tuple(text.cell(value, digits) for value in row) for row in grid.rows]
-    parts = [f"**{grid.title}**", _table(grid.head, rows)]
+    parts = [f"**{grid.title}**", _table(grid.head, text.rows(grid, digits))]
     return "\n\n".join([*parts, grid.note] if grid.note else parts)
 
 

@@ -75,8 +75,8 @@ def _grid(grid: Grid, digits: int) -> Table:
     table = _new(grid.title)
     for head in grid.head:
         table.add_column(head, overflow="fold")
-    for row in grid.rows:
-        table.add_row(*(Text(text.cell(value, digits)) for value in row))
+    for row in text.rows(grid, digits):
+        table.add_row(*map(Text, row))
     return table
 
 
