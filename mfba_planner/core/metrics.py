@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from .episode import Episode, Outcome
 from .geometry import distance
-from .planner import NANO, Mode
+from .planner import NANO, Decision, Mode
 from .world import step_clearances
 
 CONTACT_SLACK_M = 1e-9  # rounding of a tangential pass is not a collision
@@ -99,9 +99,15 @@ def encounters(episode: Episode) -> tuple[int, ...]:
     """Obstacles (from 1) whose enlarged edge came within SR, in order of first encounter."""
     met: dict[int, None] = {}
     for tick in episode.ticks:
-        circles = episode.scenario.enlarged(episode.time_s(tick.stamp_ns))
-        for number, (center, radius) in enumerate(circles, start=1):
-            gap = distance(tick.pose.position, center) - radius
-            if gap <= episode.sensor.sensing_range_m:
-                met.setdefault(number)
+        met.update(dict.fromkeys(within_range(episode, tick)))
     return tuple(met)
+
+
+def within_range(episode: Episode, tick: Decision) -> tuple[int, ...]:
+    """Obstacles (from 1) whose enlarged edge is within SR at a tick."""
+    circles = episode.scenario.enlarged(episode.time_s(tick.stamp_ns))
+    return tuple(
+        number
+        for number, (center, radius) in enumerate(circles, start=1)
+        if distance(tick.pose.position, center) - radius <= episode.sensor.sensing_range_m
+    )

@@ -15,9 +15,9 @@ from .scene import kinds
 Entry = tuple[Line2D | Patch, str]
 
 
-def entries(ax: Axes) -> list[Entry]:
+def entries(*axes: Axes) -> list[Entry]:
     """(handle, label) for each kind of mark that the axes hold."""
-    drawn = kinds(ax.get_children())
+    drawn = kinds([artist for ax in axes for artist in ax.get_children()])
     return [entry for kind, entry in _all().items() if kind in drawn]
 
 
@@ -35,6 +35,14 @@ def _all() -> dict[str, Entry]:
         "ring": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR at the switch"),
         "sector": (Patch(**style.SECTOR), "sectors set at the switch"),
         "sensed": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle at the switch"),
+        "particle": (Line2D([], [], **style.PARTICLE), "robot, a particle"),
+        "outline": (_disc(style.OBSTACLE), "obstacle"),
+        "robot": (_disc(style.ROBOT), "robot"),
+        "body": (_disc(style.OBSTACLE), "obstacle; the arrow: its next 4 s"),
+        "past": (Line2D([], [], **style.TRACK), "obstacle's way so far"),
+        "reach": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR"),
+        "set": (Patch(**style.SECTOR), "sectors set"),
+        "seen": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle within SR"),
         "wall": (Line2D([], [], **_edge(style.WALL)), "wall"),
     }
 

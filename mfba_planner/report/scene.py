@@ -38,7 +38,7 @@ def draw_scene(
     ax: Axes, episode: Episode, view: View, passes: Sequence[Pass], met: Collection[int]
 ) -> None:
     """Draw a run into axes; met holds the numbers of the obstacles that came within SR."""
-    _walls(ax, episode)
+    draw_walls(ax, episode)
     for moment in passes:
         obstacle = episode.scenario.obstacles[moment.number - 1]
         _track(ax, episode, view, obstacle, moment)
@@ -48,28 +48,31 @@ def draw_scene(
     for index, tick in enumerate(encounter_ticks(episode)):
         if is_finite(tick.pose.position):
             _ring(ax, episode, index, tick)
-    _path(ax, episode)
-    _ends(ax, episode)
+    draw_path(ax, episode)
+    draw_ends(ax, episode)
 
 
-def _patch(ax: Axes, patch: Circle | Wedge | Rectangle | FancyArrowPatch, gid: str) -> None:
-    patch.set_gid(gid)
-    ax.add_patch(patch)
+def patch(ax: Axes, shape: Circle | Wedge | Rectangle | FancyArrowPatch, gid: str) -> None:
+    """Add a shape that says what it is."""
+    shape.set_gid(gid)
+    ax.add_patch(shape)
 
 
-def _line(ax: Axes, points: Sequence[Point], gid: str, **looks: object) -> None:
+def line(ax: Axes, points: Sequence[Point], gid: str, **looks: object) -> None:
+    """Add a line that says what it is."""
     xs, ys = zip(*points)
-    line = Line2D(xs, ys, **looks)  # type: ignore[arg-type]
-    line.set_gid(gid)
-    ax.add_line(line)
+    drawn = Line2D(xs, ys, **looks)  # type: ignore[arg-type]
+    drawn.set_gid(gid)
+    ax.add_line(drawn)
 
 
-def _walls(ax: Axes, episode: Episode) -> None:
+def draw_walls(ax: Axes, episode: Episode) -> None:
+    """Draw the room, where there is one."""
     walls = episode.scenario.walls
     if walls:
         (left, bottom), (right, top) = walls.lower_m, walls.upper_m
         room = Rectangle((left, bottom), right - left, top - bottom, fill=False, **style.WALL)
-        _patch(ax, room, "wall")
+        patch(ax, room, "wall")
 
 
 def _track(ax: Axes, episode: Episode, view: View, obstacle: Obstacle, moment: Pass) -> None:
@@ -84,13 +87,13 @@ def _track(ax: Axes, episode: Episode, view: View, obstacle: Obstacle, moment: P
     if obstacle.speed_mps * (t1 - t0) <= 0.0:
         return
     points = track(obstacle, walls, t0, t1)
-    _line(ax, points, f"{kind}:{moment.number}", zorder=Z_TRACK, **style.TRACK)
+    line(ax, points, f"{kind}:{moment.number}", zorder=Z_TRACK, **style.TRACK)
     for t in np.linspace(t1, t0, _ARROW_TRIES, endpoint=False).tolist():
         tip = center_at(obstacle, t, walls)
         if view.holds(tip) and distance(tip, moment.center_m) > obstacle.radius_m:
             tail = center_at(obstacle, t - _ARROW_M / obstacle.speed_mps, walls)
             arrow = FancyArrowPatch(tail, tip, zorder=Z_TRACK, **style.ARROW)
-            _patch(ax, arrow, f"arrow:{moment.number}")
+            patch(ax, arrow, f"arrow:{moment.number}")
             break
 
 
@@ -98,31 +101,35 @@ def _obstacle(ax: Axes, episode: Episode, obstacle: Obstacle, moment: Pass) -> N
     enlarged = episode.scenario.enlarged_radius(obstacle)
     body = Circle(moment.center_m, obstacle.radius_m, zorder=Z_OBSTACLE, **style.OBSTACLE)
     edge = Circle(moment.center_m, enlarged, fill=False, zorder=Z_OBSTACLE, **style.ENLARGED)
-    _patch(ax, body, f"obstacle:{moment.number}")
-    _patch(ax, edge, f"enlarged:{moment.number}")
+    patch(ax, body, f"obstacle:{moment.number}")
+    patch(ax, edge, f"enlarged:{moment.number}")
 
 
 def _connect(ax: Axes, moment: Pass) -> None:
     """The gap: from the robot's centre to the enlarged edge, a mere point in contact."""
     heading = bearing(moment.robot_m, moment.center_m)
     ends = [moment.robot_m, towards(moment.robot_m, heading, max(0.0, moment.gap_m))]
-    _line(ax, ends, f"pass:{moment.number}", zorder=Z_MARK, markevery=[0], **style.PASS)
+    line(ax, ends, f"pass:{moment.number}", zorder=Z_MARK, markevery=[0], **style.PASS)
 
 
 def _ring(ax: Axes, episode: Episode, index: int, tick: Decision) -> None:
     """SR around the robot, the sectors that are set, and what set them (enlarged)."""
     position, reach = tick.pose.position, episode.sensor.sensing_range_m
-    for first, count in _runs(tick.vs):
-        start, end = (360.0 * i / len(tick.vs) for i in (first, first + count))
-        wedge = Wedge(position, reach, start, end, zorder=Z_SECTOR, **style.SECTOR)
-        _patch(ax, wedge, f"sector:{index}")
+    draw_sectors(ax, position, reach, tick.vs, f"sector:{index}")
     circles = episode.scenario.enlarged(episode.time_s(tick.stamp_ns))
     for center, radius in circles:
         if distance(position, center) - radius <= reach:
             sensed = Circle(center, radius, fill=False, zorder=Z_RING, **style.SENSED)
-            _patch(ax, sensed, f"sensed:{index}")
+            patch(ax, sensed, f"sensed:{index}")
     ring = Circle(position, reach, fill=False, zorder=Z_RING, **style.RING)
-    _patch(ax, ring, f"ring:{index}")
+    patch(ax, ring, f"ring:{index}")
+
+
+def draw_sectors(ax: Axes, center: Point, reach: float, bits: Bits, gid: str) -> None:
+    """Fill the sectors that are set, out to reach (m)."""
+    for first, count in _runs(bits):
+        start, end = (360.0 * i / len(bits) for i in (first, first + count))
+        patch(ax, Wedge(center, reach, start, end, zorder=Z_SECTOR, **style.SECTOR), gid)
 
 
 def _runs(bits: Bits) -> Iterator[tuple[int, int]]:
@@ -135,7 +142,7 @@ def _runs(bits: Bits) -> Iterator[tuple[int, int]]:
         first += count
 
 
-def _path(ax: Axes, episode: Episode) -> None:
+def draw_path(ax: Axes, episode: Episode) -> None:
     """One line per stretch of a mode, and a mark where the robot stands in it."""
     parts = stretches(episode)
     for mode in Mode:
@@ -156,15 +163,16 @@ def _path(ax: Axes, episode: Episode) -> None:
         if mode in style.STANDING:
             looks = {"color": style.MODE_COLOURS[mode], "linestyle": "none", "zorder": Z_MARK}
             places = [line[0] for line in lines]
-            _line(ax, places, f"standing:{mode.value}", **looks, **style.STANDING[mode])
+            line(ax, places, f"standing:{mode.value}", **looks, **style.STANDING[mode])
 
 
-def _ends(ax: Axes, episode: Episode) -> None:
-    _line(ax, [episode.scenario.start_m], "start", zorder=Z_MARK, **style.START)
-    _line(ax, [episode.scenario.goal_m], "goal", zorder=Z_MARK, **style.GOAL)
+def draw_ends(ax: Axes, episode: Episode) -> None:
+    """Mark start, goal, and where the run ended if that is elsewhere."""
+    line(ax, [episode.scenario.start_m], "start", zorder=Z_MARK, **style.START)
+    line(ax, [episode.scenario.goal_m], "goal", zorder=Z_MARK, **style.GOAL)
     if episode.outcome is not Outcome.GOAL_REACHED:
         last = episode.ticks[-1].pose.position
-        _line(ax, [last], "end", zorder=Z_MARK, **style.END)
+        line(ax, [last], "end", zorder=Z_MARK, **style.END)
 
 
 def label_numbers(ax: Axes, episode: Episode, view: View, passes: Sequence[Pass]) -> None:

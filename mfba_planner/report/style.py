@@ -56,6 +56,26 @@ PASS: Looks = {
 RING: Looks = {"edgecolor": ORANGE, "linewidth": 1.4}
 SENSED: Looks = {"edgecolor": ORANGE, "linewidth": 1.1, "linestyle": (0, (1, 1.8))}
 SECTOR: Looks = {"facecolor": ORANGE, "alpha": 0.25, "linewidth": 0.0}
+MOTION: Looks = {
+    "arrowstyle": "-|>", "mutation_scale": 9.0, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 1.1,
+    "color": QUIET,
+}  # fmt: skip
+ROBOT: Looks = {"facecolor": "#CCE3F0", "edgecolor": BLUE, "linewidth": 1.4}
+TANGENT: Looks = {"color": BLUE, "linewidth": 1.2}
+MEASURE: Looks = {"arrowstyle": "<|-|>", "color": INK, "linewidth": 1.0, "mutation_scale": 8.0}
+SPOKE: Looks = {"color": FAINT, "linewidth": 0.8}
+BITS: tuple[Looks, Looks] = (
+    {"fontsize": NORMAL + 2, "color": QUIET},
+    {"fontsize": NORMAL + 2, "color": VERMILLION, "fontweight": "bold"},
+)
+JOIN: Looks = {"color": QUIET, "linewidth": 0.9}
+CELL: Looks = {"facecolor": PAPER, "edgecolor": QUIET, "linewidth": 0.9}
+SET_CELL: Looks = {**CELL, "facecolor": "#F8E6BF"}
+FREE_CELL: Looks = {**CELL, "facecolor": "#BFE6DB"}
+_ARROW: Looks = {"arrowstyle": "-|>", "mutation_scale": 11.0, "shrinkA": 0.0, "shrinkB": 0.0}
+FREE_GAP: Looks = {**_ARROW, "color": GREEN, "linewidth": 1.6}
+TAKEN: Looks = {**_ARROW, "color": VERMILLION, "linewidth": 3.0}
+CLOSED_GAP: Looks = {"color": ORANGE, "linewidth": 1.4, "linestyle": (0, (1, 1.8))}
 WALL: Looks = {"edgecolor": INK, "linewidth": 1.8}
 # where the robot stands still its line has no length: a frame around the place says so
 _FRAME: Looks = {"markersize": 15.0, "markerfacecolor": "none", "markeredgewidth": 2.2}
@@ -66,6 +86,7 @@ STANDING: dict[Mode, Looks] = {
 _POINT: Looks = {"linestyle": "none", "markeredgecolor": PAPER}
 START: Looks = {**_POINT, "marker": "o", "markersize": 10.5, "color": INK}
 GOAL: Looks = {**_POINT, "marker": "*", "markersize": 17.0, "color": GREEN}
+PARTICLE: Looks = {**_POINT, "marker": "o", "markersize": 7.5, "color": BLUE}
 END: Looks = {**_POINT, "marker": "D", "markersize": 5.5, "color": INK}
 NUMBER: Looks = {"ha": "center", "va": "center", "fontsize": SMALL, "color": INK}
 HALO: Looks = {"linewidth": 2.5, "foreground": PAPER}

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...core.bat import BatParams
-from ...core.batch import minimize_batch
+from ...core.batch import BatchResult, minimize_batch
 from ...core.episode import Episode, run
 from ...core.geometry import bearing, distance, wrap_angle
 from ...core.metrics import evaluate
@@ -39,15 +39,18 @@ class Benchmark:
         return {"function": self.function, "dimension": self.dimension, **flatten(self.bat)}
 
     def run(self, seeds: Sequence[int]) -> Columns:
-        """Best value of the run of each seed; its stream is named by seed, function and law."""
+        """Best value of the run of each seed."""
+        return {"best": self.search(seeds).best_value.tolist()}
+
+    def search(self, seeds: Sequence[int]) -> BatchResult:
+        """The runs themselves; the stream of each is named by seed, function and law."""
         function = FUNCTIONS[self.function]
         key = (BENCHMARK_STREAM, int(self.function[1:]), _number(self.bat.algorithm.value))
         rngs = [
             np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
             for seed in seeds
         ]
-        found = minimize_batch(function.batch, function.box(self.dimension), self.bat, rngs)
-        return {"best": found.best_value.tolist()}
+        return minimize_batch(function.batch, function.box(self.dimension), self.bat, rngs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One moment of a run drawn to scale: the robot, what it has done, what its sensors see."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, FancyArrowPatch
+
+from mfba_planner.core.episode import Episode
+from mfba_planner.core.metrics import within_range
+from mfba_planner.core.world import bounce_times, center_at
+
+from . import style
+from .moments import span_s, track
+from .scene import (
+    Z_MARK,
+    Z_OBSTACLE,
+    Z_PATH,
+    Z_RING,
+    Z_TRACK,
+    draw_ends,
+    draw_path,
+    draw_sectors,
+    draw_walls,
+    line,
+    patch,
+)
+
+AHEAD_S = 4.0  # an arrow is this long: it shows direction and speed
+
+Z_ROBOT = 0.5 * (Z_PATH + Z_MARK)  # the goal stays to be seen
+
+
+def draw_snapshot(ax: Axes, episode: Episode, index: int) -> None:
+    """Draw tick number index (from 0) of a run, obstacles where they are at that time."""
+    tick = episode.ticks[index]
+    draw_walls(ax, episode)
+    for number in range(1, len(episode.scenario.obstacles) + 1):
+        _obstacle(ax, episode, index, number)
+    position, reach = tick.pose.position, episode.sensor.sensing_range_m
+    draw_sectors(ax, position, reach, tick.vs, "set")
+    patch(ax, Circle(position, reach, fill=False, zorder=Z_RING, **style.RING), "reach")
+    draw_path(ax, replace(episode, ticks=episode.ticks[: index + 1]))
+    draw_ends(ax, episode)
+    radius = episode.scenario.robot_radius_m
+    patch(ax, Circle(position, radius, zorder=Z_ROBOT, **style.ROBOT), "robot")
+
+
+def _obstacle(ax: Axes, episode: Episode, index: int, number: int) -> None:
+    """Body, enlarged edge, track so far and an arrow of the next seconds' motion."""
+    scenario, tick = episode.scenario, episode.ticks[index]
+    obstacle = scenario.obstacles[number - 1]
+    time_s = episode.time_s(tick.stamp_ns)
+    center = center_at(obstacle, time_s, scenario.walls)
+    sensed = number in within_range(episode, tick)
+    edge = style.SENSED if sensed else style.ENLARGED
+    enlarged = Circle(
+        center, scenario.enlarged_radius(obstacle), fill=False, zorder=Z_OBSTACLE, **edge
+    )
+    patch(ax, enlarged, f"{'seen' if sensed else 'enlarged'}:{number}")
+    if obstacle.speed_mps > 0.0:
+        begin = span_s(episode)[0]
+        if time_s > begin:
+            points = track(obstacle, scenario.walls, begin, time_s)
+            line(ax, points, f"past:{number}", zorder=Z_TRACK, **style.TRACK)
+        bounces = bounce_times(obstacle, time_s, time_s + AHEAD_S, scenario.walls)
+        tip = center_at(obstacle, min([time_s + AHEAD_S, *bounces]), scenario.walls)
+        arrow = FancyArrowPatch(center, tip, zorder=Z_OBSTACLE, **style.MOTION)
+        patch(ax, arrow, f"motion:{number}")
+    body = Circle(center, obstacle.radius_m, zorder=Z_OBSTACLE, **style.OBSTACLE)
+    patch(ax, body, f"body:{number}")
+    label = ax.text(*center, str(number), zorder=Z_MARK, clip_on=True, **style.NUMBER)
+    label.set_gid(f"number:{number}")
