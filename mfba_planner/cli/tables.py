@@ -7,6 +7,7 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from ..arguments import Parser
@@ -106,12 +107,14 @@ def _run(chunks: Sequence[Chunk], workers: int, store: Store) -> dict[str, Sampl
 
 
 def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None:
-    """Every form; what is there already must be the same."""
+    """Every form; what is there already must be the same. Figures go with the whole set."""
+    whole = len(sections) == len(SECTIONS)
+    pictures = _pictures(origin.quick) if whole else []
     forms = {
         "tables.md": markdown.page(sections, origin),
         "tables.csv": data.to_csv(sections),
         "tables.json": data.to_json(sections, origin),
-        "tables.html": html.page(sections, origin, _pictures()),
+        "tables.html": html.page(sections, origin, pictures),
     }
     for name, content in forms.items():
         path, wanted = directory / name, content.encode()
@@ -119,9 +122,14 @@ def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None
             write_new(path, wanted)
 
 
-def _pictures() -> list[html.Picture]:
-    """The figures of the page."""
-    return []
+def _pictures(quick: bool) -> list[html.Picture]:
+    """What `mfba figures` draws; the quick form does without the one that takes longest."""
+    figures = import_module(".figures", __package__)  # by name: commands do not know each other
+    return [
+        html.Picture(title=f"{name}: {what}", svg=figures.render(name, ("svg",))["svg"].decode())
+        for name, what in figures.FIGURES.items()
+        if not (quick and name == "convergence")
+    ]
 
 
 def _page(path: Path) -> str:
