@@ -56,7 +56,7 @@ def main(args: list[str]) -> int:
         raise ConfigError(f"--seed={found.seed}: out of range; give a whole number from 0 up")
     if not 1 <= found.workers <= MAX_WORKERS:
         raise ConfigError(f"--workers={found.workers}: out of range; give 1 to {MAX_WORKERS}")
-    page = None if found.update is None else _page(found.update)
+    page = None if found.update is None else _page(found.update, sections)
     directory = found.out or new_run_directory(stem="tables")
     words = ["mfba", "tables", *found.tables, *(["--quick"] if found.quick else [])]
     origin = Origin(
@@ -97,12 +97,12 @@ def _run(chunks: Sequence[Chunk], workers: int, store: Store) -> dict[str, Sampl
     with Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal
     ) as progress:
-        task = progress.add_task("running", total=sum(chunk.count for chunk in chunks))
+        task = progress.add_task("running", total=sum(chunk.cost for chunk in chunks))
         return run_plan(
             chunks,
             workers=workers,
             store=store,
-            done=lambda chunk: progress.advance(task, chunk.count),
+            done=lambda chunk: progress.advance(task, chunk.cost),
         )
 
 
@@ -132,14 +132,17 @@ def _pictures(quick: bool) -> list[html.Picture]:
     ]
 
 
-def _page(path: Path) -> str:
+def _page(path: Path, sections: Sequence[str]) -> str:
+    """A page that has a place for every block; seen to before the minutes of running."""
     try:
-        return path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise InputError(
             f"{path}: cannot be read ({reason.lower()}); give a Markdown page"
         ) from None
+    markdown.fill(text, dict.fromkeys(markdown.block_names(sections), ""))
+    return text
 
 
 def _update(path: Path, content: str) -> None:
