@@ -26,7 +26,7 @@ from mfba_planner.recording.episode import read_episode
 from mfba_planner.recording.reader import BagReader
 from mfba_planner.recording.schemas import definition_of
 from mfba_planner.ros import params, topics
-from mfba_planner.ros.convert import clock_msg, odometry_msg, pose_stamped_msg, time_msg
+from mfba_planner.ros.convert import clock_msg, odometry_msg, path_msg, pose_stamped_msg, time_msg
 from mfba_planner.ros.in_process import run_in_process
 from mfba_planner.ros.planner import PlannerNode
 from mfba_planner.ros.qos import offered
@@ -184,6 +184,24 @@ def test_what_comes_before_the_first_clock_is_held_for_it(graph: Graph, tmp_path
             ("/goal_pose", 77),
             ("/clock", 77),
         ]
+
+
+def test_what_is_said_while_the_world_moves_on_is_logged_under_its_tick(
+    graph: Graph, tmp_path: Path
+) -> None:
+    """The planner publishes its reasons after cmd_vel; other stamps are nobody's tick."""
+    recorder = record(graph, tmp_path / "bag", sim_time=True)
+    plan, clock = graph.writer(topics.PLAN), graph.writer(topics.CLOCK)
+    for stamp in (10, 20, 30):
+        clock.publish(clock_msg(stamp))
+    for stamp in (20, 30, 10, 0, 99, -5):
+        plan.publish(path_msg([], stamp, "odom"))
+    graph.settle()
+    graph.stop(recorder)
+    with BagReader(tmp_path / "bag") as reader:
+        plans = [m for m in reader.decoded() if m.topic == "/plan"]
+    logged = {stamp_ns(m.message.header.stamp): m.log_time_ns for m in plans}
+    assert logged == {20: 20, 30: 30, 10: 30, 0: 30, 99: 30, -5: 30}
 
 
 def test_what_was_held_is_not_lost_without_any_clock(graph: Graph, tmp_path: Path) -> None:

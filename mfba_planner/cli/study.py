@@ -50,12 +50,12 @@ def run_watched(chunks: Sequence[Chunk], workers: int, store: Store) -> dict[str
         with Progress(
             *columns, console=console, transient=True, disable=not console.is_terminal
         ) as progress:
-            task = progress.add_task("running", total=sum(chunk.count for chunk in chunks))
+            task = progress.add_task("running", total=sum(chunk.cost for chunk in chunks))
             return run_plan(
                 chunks,
                 workers=workers,
                 store=store,
-                done=lambda chunk: progress.advance(task, chunk.count),
+                done=lambda chunk: progress.advance(task, chunk.cost),
             )
     except (KeyboardInterrupt, SystemExit):
         print(f"interrupted; go on with --out {store.directory}", file=sys.stderr)

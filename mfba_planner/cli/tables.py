@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from ..arguments import Parser
@@ -39,7 +40,7 @@ def main(args: list[str]) -> int:
     found = parser.parse(args)
     sections = check_sections(found.tables)
     study.check(found)
-    page = None if found.update is None else _page(found.update)
+    page = None if found.update is None else _page(found.update, sections)
     directory = found.out or new_run_directory(stem="tables")
     words = ["mfba", "tables", *found.tables, *(["--quick"] if found.quick else [])]
     origin = Origin(
@@ -67,12 +68,14 @@ def _make(
 
 
 def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None:
-    """Every form; what is there already must be the same."""
+    """Every form; what is there already must be the same. Figures go with the whole set."""
+    whole = len(sections) == len(SECTIONS)
+    pictures = _pictures(origin.quick) if whole else []
     forms = {
         "tables.md": markdown.page(sections, origin),
         "tables.csv": data.to_csv(sections),
         "tables.json": data.to_json(sections, origin),
-        "tables.html": html.page(sections, origin, _pictures()),
+        "tables.html": html.page(sections, origin, pictures),
     }
     for name, content in forms.items():
         path, wanted = directory / name, content.encode()
@@ -80,19 +83,27 @@ def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None
             write_new(path, wanted)
 
 
-def _pictures() -> list[html.Picture]:
-    """The figures of the page."""
-    return []
+def _pictures(quick: bool) -> list[html.Picture]:
+    """What `mfba figures` draws; the quick form does without the one that takes longest."""
+    figures = import_module(".figures", __package__)  # by name: commands do not know each other
+    return [
+        html.Picture(title=f"{name}: {what}", svg=figures.render(name, ("svg",))["svg"].decode())
+        for name, what in figures.FIGURES.items()
+        if not (quick and name == "convergence")
+    ]
 
 
-def _page(path: Path) -> str:
+def _page(path: Path, sections: Sequence[str]) -> str:
+    """A page that has a place for every block; seen to before the minutes of running."""
     try:
-        return path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise InputError(
             f"{path}: cannot be read ({reason.lower()}); give a Markdown page"
         ) from None
+    markdown.fill(text, dict.fromkeys(markdown.block_names(sections), ""))
+    return text
 
 
 def _update(path: Path, content: str) -> None:

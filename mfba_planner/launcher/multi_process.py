@@ -23,6 +23,7 @@ from .stop import StoppedError
 READY_TIMEOUT_S = 15.0
 ANSWER_TIMEOUT_S = 5.0
 FREEZE_TIMEOUT_S = 1.0
+LAST_DECISION_TIMEOUT_S = 2.0
 TURN_S = 0.02
 
 
@@ -78,6 +79,7 @@ class _Conductor:
             self._freeze()
             raise
         self._attempt.end()
+        self._hear_the_last_decision(ticks)
         return ticks
 
     def _check(self) -> None:
@@ -128,6 +130,16 @@ class _Conductor:
             if self._attempt.screen.wants_progress() and (now := self._monitor.progress()):
                 self._attempt.show(now.stamp_ns // tick_ns - 1, now.distance_m, now.mode)
         return ticks
+
+    def _hear_the_last_decision(self, ticks: int) -> None:
+        """In real time the world does not wait for the planner: give it a moment to finish."""
+        stamp_ns = ticks * self._attempt.order.config.planner.tick_ns
+        deadline = time.monotonic() + LAST_DECISION_TIMEOUT_S
+        while time.monotonic() < deadline:
+            if (now := self._monitor.progress()) and now.stamp_ns >= stamp_ns:
+                return
+            self._check()
+            self._monitor.spin(TURN_S)
 
     def _freeze(self) -> None:
         """Let the world stand still, if it lives, so that the bag ends with a whole tick."""

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
-from rclpy.serialization import deserialize_message
 
 from ..messages import stamp_ns
 from . import topics
 from .answers import Answers
 from .letterboxes import Letter, Letterboxes
 from .runtime import GraphNode
+from .serialized import header_stamp_ns
 from .settings import WorldSimSettings
 
 
@@ -56,5 +56,4 @@ class AnswerTopics:
         self._on_heard()
 
     def _on_goal_step(self, letter: Letter) -> None:
-        message = deserialize_message(letter.data, topics.GOAL_STEP.type)
-        self._answers.goal_step(stamp_ns(message.header.stamp), letter.sent_ns)
+        self._answers.goal_step(header_stamp_ns(letter.data), letter.sent_ns)

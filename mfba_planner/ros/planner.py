@@ -123,7 +123,8 @@ class PlannerNode(GraphNode):
         self._publish(decision)
 
     def _publish(self, decision: Decision) -> None:
-        """Everything about the decision first, what the world waits for last."""
+        """What the world waits for first, everything about the decision while it moves on."""
+        self._move(decision)
         s, stamp = self.settings, decision.stamp_ns
         who, algorithm = self.get_fully_qualified_name(), self.brain.params.bat.algorithm.value
         self._plan.publish(convert.plan_msg(decision, s.odom_frame))
@@ -131,7 +132,6 @@ class PlannerNode(GraphNode):
         self._decision.publish(reason)
         if self._view.due(stamp):
             self._markers.publish(markers.decision_markers(decision, s.odom_frame))
-        self._move(decision)
 
     def _move(self, decision: Decision) -> None:
         """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""

@@ -26,6 +26,7 @@ from .drain import drain
 from .letterboxes import Deliver, Letter, Letterboxes
 from .qos import offered
 from .runtime import GraphNode, spin_node
+from .serialized import has_header, header_stamp_ns, type_name
 from .settings import RecorderSettings, names
 from .survey import Found, ParameterSurvey
 
@@ -40,7 +41,7 @@ class Recorder(GraphNode):
         super().__init__(topics.RECORDER, **kwargs)
         self.settings = s = params.declare(self, RecorderSettings(), read_only=True)
         self._facts = _facts(s.run)
-        self._log_time_ns = 0
+        self._log_time_ns = self._tick_before_ns = 0
         self._held: list[tuple[str, bytes]] = []
         self._explained = False
         self._types: dict[str, tuple[str, OfferedQos]] = {}
@@ -59,9 +60,10 @@ class Recorder(GraphNode):
         stamped = topic is topics.CMD_VEL and self.settings.enable_stamped_cmd_vel
         kind = TwistStamped if stamped else topic.type
         name = self.resolve_topic_name(topic.name)
-        self._types[name] = (_type_name(kind), offered(topic.qos))
-        definition_of(_type_name(kind))  # found now, so that no first message waits for it
-        deliver: Deliver = partial(self._on_message, name)
+        self._types[name] = (type_name(kind), offered(topic.qos))
+        definition_of(type_name(kind))  # found now, so that no first message waits for it
+        is_of_tick = topic.every_tick and has_header(kind)
+        deliver: Deliver = partial(self._on_message, name, is_of_tick)
         if topic is topics.CLOCK and self.settings.sim_time:
             deliver = self._on_clock
         # In simulated time world_sim writes what every tick brings, and nobody else.
@@ -70,24 +72,29 @@ class Recorder(GraphNode):
         self.open_boxes(self._letterboxes, kind, topic.name, deliver, profiles)
 
     def _on_clock(self, letter: Letter) -> None:
+        self._tick_before_ns = self._log_time_ns
         self._log_time_ns = stamp_ns(deserialize_message(letter.data, ClockMsg).clock)
         for name, held in self._held:
             self._write(name, held)
         self._held.clear()
         self._write("/clock", letter.data)
 
-    def _on_message(self, name: str, letter: Letter) -> None:
+    def _on_message(self, name: str, is_of_tick: bool, letter: Letter) -> None:
         if not self.settings.sim_time:
             self._log_time_ns = letter.received_ns or time.time_ns()  # not all middleware says
         elif not self._log_time_ns:
             self._held.append((name, letter.data))  # latched before the first tick
             return
+        elif is_of_tick and header_stamp_ns(letter.data) == self._tick_before_ns:
+            self._write(name, letter.data, self._tick_before_ns)  # said while the world moved on
+            return
         self._write(name, letter.data)
 
-    def _write(self, name: str, data: bytes) -> None:
+    def _write(self, name: str, data: bytes, log_time_ns: int = 0) -> None:
         if name in self._types:  # its writer came late
             self._announce(name)
-        self.writer.write(name, data, self._log_time_ns, self._log_time_ns)
+        log_time_ns = log_time_ns or self._log_time_ns
+        self.writer.write(name, data, log_time_ns, log_time_ns)
 
     def _announce(self, name: str) -> None:
         self.writer.add_topic(name, *self._types.pop(name))
@@ -136,10 +143,6 @@ def _facts(text: str) -> dict[str, Any]:
     if not isinstance(facts, dict):
         raise ConfigError(f"parameter run={text!r}: not JSON of an object; give '{{}}' or more")
     return facts
-
-
-def _type_name(kind: Any) -> str:
-    return f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
 
 
 def main(args: list[str]) -> int:

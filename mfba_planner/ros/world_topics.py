@@ -47,7 +47,7 @@ class WorldTopics:
         self._outcome.publish(convert.outcome_msg(outcome, ticks))
 
     def tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
-        """One tick under one stamp; odom last, as it is what completes the sensor's pair."""
+        """One tick under one stamp; odom completes the sensor's pair, views can wait."""
         frame = self._frame
         centers = world.scenario.centers(world.time_s)
         odom = convert.odometry_msg(world.pose, velocity, stamp_ns, frame, self._base_frame)
@@ -55,8 +55,8 @@ class WorldTopics:
         self._obstacles.publish(convert.obstacles_msg(centers, stamp_ns, frame))
         if self._tf:
             self._tf.publish(markers.tf_msg(odom))
+        self._odom.publish(odom)
         if self._view.due(stamp_ns):
             self._path.append(world.pose.position)
             self._trail.publish(convert.path_msg(list(self._path), stamp_ns, frame))
             self._markers.publish(markers.world_markers(world, stamp_ns, frame))
-        self._odom.publish(odom)
