@@ -11,7 +11,7 @@ from ..outputs import new_run_directory, write_new
 from ..paper import sensitivity
 from ..paper.study.store import Store
 from ..scenarios import load_scenario
-from . import study
+from ..watched import add_arguments, check, run_watched
 
 _DESCRIPTION = """Change what section 6.2 leaves open, one thing at a time, and see what becomes of
 the printed path lengths and of whom the robot meets: a table, a CSV file and a heat-map.
@@ -23,15 +23,15 @@ when called again with --out."""
 def main(args: list[str]) -> int:
     """Run the study and show it."""
     parser = Parser(prog="mfba sensitivity", description=_DESCRIPTION)
-    study.add_arguments(parser)
+    add_arguments(parser)
     found = parser.parse(args)
-    study.check(found)
+    check(found)
     directory = found.out or new_run_directory(stem="sensitivity")
     scenarios = {case: load_scenario(case) for case in sensitivity.CASES}
     chunks = sensitivity.plan(scenarios, found.quick, found.seed)
     facts = {"study": "sensitivity", "seed": found.seed, "quick": found.quick}
     store = Store(directory, chunks, facts)
-    rows = sensitivity.rows(study.run_watched(chunks, found.workers, store), found.quick)
+    rows = sensitivity.rows(run_watched(chunks, found.workers, store), found.quick)
     seeds = sensitivity.QUICK_SEEDS if found.quick else sensitivity.SEEDS
     names = _write(directory, rows)
     _show(rows, f"Readings of section 6.2, {seeds} seeds from {found.seed} on")

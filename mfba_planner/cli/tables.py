@@ -19,7 +19,7 @@ from ..paper.tables.model import Section
 from ..report.tables import data, html, markdown
 from ..report.tables.text import Origin
 from ..scenarios import load_scenario
-from . import study
+from ..watched import add_arguments, check, run_watched
 
 _DESCRIPTION = """Run what Tables 1 to 7 need and hold each printed number against ours.
 
@@ -33,13 +33,13 @@ def main(args: list[str]) -> int:
     parser.add_argument(
         "tables", nargs="*", metavar="TABLE", help=f"which: {', '.join(SECTIONS)} (default: all)"
     )
-    study.add_arguments(parser)
+    add_arguments(parser)
     parser.add_argument(
         "--update", type=Path, metavar="PAGE", help="fill the generated blocks of this page too"
     )
     found = parser.parse(args)
     sections = check_sections(found.tables)
-    study.check(found)
+    check(found)
     page = None if found.update is None else _page(found.update, sections)
     directory = found.out or new_run_directory(stem="tables")
     words = ["mfba", "tables", *found.tables, *(["--quick"] if found.quick else [])]
@@ -63,7 +63,7 @@ def _make(
     scenarios = {name: load_scenario(name) for name in ("case1", "case2")}
     chunks = plan(sections, scenarios, QUICK if quick else FULL, seed)
     store = Store(directory, chunks, {"sections": list(sections), "seed": seed, "quick": quick})
-    samples = study.run_watched(chunks, workers, store)
+    samples = run_watched(chunks, workers, store)
     return build(sections, scenarios, samples, seed)
 
 

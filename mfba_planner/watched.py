@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What commands that run a study have in common: arguments, workers, a progress bar."""
+"""A study at the command line: its arguments, and a progress bar where somebody watches."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..core.errors import ConfigError
-from ..paper.study.chunk import Chunk
-from ..paper.study.run import MAX_WORKERS, Sample, run_plan
-from ..paper.study.store import Store
+from .core.errors import ConfigError
+from .paper.study.chunk import Chunk
+from .paper.study.run import MAX_WORKERS, Sample, run_plan
+from .paper.study.store import Store
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
