@@ -69,12 +69,12 @@ class Letterboxes:
     def __init__(self) -> None:
         """Start without a box."""
         self.group = Unwaited()
-        self._boxes: list[tuple[Subscription, Once, Deliver]] = []
+        self._boxes: list[tuple[Subscription, Once | None, Deliver]] = []
         self._waiting: list[tuple[Letter, Deliver]] = []
 
     def add(self, boxes: list[Subscription], deliver: Deliver) -> None:
         """Take over all raw subscriptions to one topic; they must be of self.group."""
-        once = Once()
+        once = Once() if len(boxes) > 1 else None
         self._boxes += [(box, once, deliver) for box in boxes]
 
     def empty(self) -> None:
@@ -85,7 +85,7 @@ class Letterboxes:
             with box.handle:
                 while (taken := box.handle.take_message(box.msg_type, box.raw)) is not None:
                     data, info = taken
-                    if once.is_new(info):
+                    if once is None or once.is_new(info):
                         sent_ns = info["source_timestamp"]
                         letter = Letter(sent_ns, info["received_timestamp"], data)
                         on_time = letters if sent_ns <= began_ns else self._waiting
