@@ -24,7 +24,7 @@ from mfba_planner.paper.statistics import Interval
 from mfba_planner.paper.study.run import Sample
 from mfba_planner.report import style
 from mfba_planner.report.figures.sensitivity import draw
-from mfba_planner.report.sensitivity import to_csv, to_table
+from mfba_planner.report.sensitivity import to_csv, to_markdown, to_table
 from mfba_planner.report.sheet import to_bytes
 from mfba_planner.scenarios import load_scenario
 
@@ -179,12 +179,26 @@ def test_csv_table_and_picture_tell_the_same_rows() -> None:
     assert lines[0]["holds_MFBA_mean"] == "0"
     table = to_table(rows, "title")
     assert table.row_count == len(rows) / len(CASES)
+    assert len(to_table(rows, "title", 80).columns) == len(table.columns) - 1
+    marked = to_markdown(rows).splitlines()
+    assert len(marked) == 2 + table.row_count
+    assert marked[2].startswith("| preset | section6 | 17.1")
     with style.context():
         figure = draw(rows)
         assert to_bytes(figure, "svg") == to_bytes(draw(rows), "svg")
         numbers = [text.get_text() for ax in figure.axes for text in ax.texts]
     assert numbers.count("100") == table.row_count * 2  # all meet as told
     assert "preset" in numbers
+
+
+def test_the_page_has_the_readings_of_this_code() -> None:
+    page = (Path(__file__).parents[1] / "docs/sensitivity.md").read_text(encoding="utf-8")
+    lines = [line.split(" | ") for line in page.splitlines() if line.startswith("|")][2:]
+    assert [line[1].strip() for line in lines] == [r.label for r in [BASE, *OTHERS]]
+    marks = {line[1].strip(): (line[3].strip(), line[6].strip()) for line in lines}
+    assert marks["section6"] == ("● MFBA", "● MFBA")
+    assert marks["fig1, BA"] == ("● BA", "● BA")
+    assert marks["4 per step, 0.2 m, 0.83 m/s"] == ("● MFBA", "● MFBA")
 
 
 # --- the command ----------------------------------------------------------------------------
@@ -207,7 +221,7 @@ def test_the_command_goes_on_where_it_was(
     assert cli.main(args) == 0
     told = capsys.readouterr().out
     assert "turned by half a sector" in told
-    names = {"sensitivity.csv", "sensitivity.png", "sensitivity.svg"}
+    names = {"sensitivity.csv", "sensitivity.md", "sensitivity.png", "sensitivity.svg"}
     before = {name: (out / name).read_bytes() for name in names}
     (out / "sensitivity.csv").unlink()
     next((out / "chunks").iterdir()).unlink()

@@ -14,7 +14,7 @@ from ..scenarios import load_scenario
 from ..watched import add_arguments, check, run_watched
 
 _DESCRIPTION = """Change what section 6.2 leaves open, one thing at a time, and see what becomes of
-the printed path lengths and of whom the robot meets: a table, a CSV file and a heat-map.
+the printed path lengths and of whom the robot meets: a table, CSV, Markdown and a heat-map.
 
 The finished parts of the runs are kept too, so that an interrupted command goes on where it was
 when called again with --out."""
@@ -40,13 +40,16 @@ def main(args: list[str]) -> int:
 
 
 def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
-    """CSV and heat-map; what is there already must be the same."""
+    """CSV, Markdown and heat-map; what is there already must be the same."""
     from ..report import style
     from ..report.figures.sensitivity import draw
-    from ..report.sensitivity import to_csv
+    from ..report.sensitivity import to_csv, to_markdown
     from ..report.sheet import FORMATS, to_bytes
 
-    files = {"sensitivity.csv": to_csv(rows).encode()}
+    files = {
+        "sensitivity.csv": to_csv(rows).encode(),
+        "sensitivity.md": to_markdown(rows).encode(),
+    }
     with style.context():
         figure = draw(rows)
         files |= {f"sensitivity.{form}": to_bytes(figure, form) for form in FORMATS}

@@ -64,17 +64,36 @@ def to_table(rows: Sequence[Row], title: str, width: int = 120) -> Table:
         table.add_column("row", no_wrap=True)
         table.add_column("told", justify="right", no_wrap=True)
     table.add_column("contact", justify="right", no_wrap=True)
+    for cells in _lines(rows):
+        table.add_row(*(_narrowed(cells) if narrow else cells))
+    return table
+
+
+def to_markdown(rows: Sequence[Row]) -> str:
+    """The same lines as a Markdown table."""
+    head = ["", "reading"]
+    for case in CASES:
+        head += [f"case {case[-1]}: mean (m)", "row", "told"]
+    head.append("contact")
+    lines = [head, ["---"] * len(head), *_lines(rows)]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def _lines(rows: Sequence[Row]) -> Iterator[list[str]]:
+    """Group, reading, per case (mean with interval, printed rows, met as told), contacts."""
     before = ""
     for group in pairs(rows):
         reading = group[0].reading
-        cells = [] if narrow else [reading.group if reading.group != before else ""]
-        cells.append(reading.label)
+        cells = [reading.group if reading.group != before else "", reading.label]
         before = reading.group
         for row in group:
             mean = row.intervals[STATISTICS.index("mean")]
-            span = "" if narrow else f" [{mean.low:.3f}, {mean.high:.3f}]"
             marks = " ".join(f"{ROW_MARK} {law}" for law in row.reproduces)
             told = f"{row.told:.0%}{TOLD_MARK if row.as_told else ' '}"
-            cells += [f"{mean.middle:.3f}{span}", marks, told]
-        table.add_row(*cells, f"{max(row.contacts for row in group):.0%}")
-    return table
+            cells += [f"{mean.middle:.3f} [{mean.low:.3f}, {mean.high:.3f}]", marks, told]
+        yield [*cells, f"{max(row.contacts for row in group):.0%}"]
+
+
+def _narrowed(cells: Sequence[str]) -> list[str]:
+    """A line without its group and intervals."""
+    return [cell.partition(" [")[0] for cell in cells[1:]]
