@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from mfba_planner.core.gaps import gap_heading, gap_vector, nearest_free_gap
+from mfba_planner.core.gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
 from mfba_planner.core.sensing import Bits
 
 BITS = st.lists(st.integers(0, 1), min_size=3, max_size=40).map(tuple)
@@ -131,3 +131,12 @@ def test_rounding_never_decides_between_two_equal_gaps(n: int, data: st.DataObje
 
 def test_every_gap_closed() -> None:
     assert nearest_free_gap(bits("111111111111"), 0.3) is None
+
+
+def test_a_gap_may_lead_along_the_middle_of_its_first_sector() -> None:
+    assert gap_heading(1, 12, GapHeading.MIDDLE) == pytest.approx(math.radians(15.0))
+    assert gap_heading(12, 12, GapHeading.MIDDLE) == pytest.approx(math.radians(-15.0))
+    vg = (1, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0)
+    # boundaries 60, 90 and 0 degrees; middles 45, 75 and -15
+    assert nearest_free_gap(vg, math.radians(70.0)) == 2
+    assert nearest_free_gap(vg, math.radians(70.0), GapHeading.MIDDLE) == 3

@@ -69,20 +69,20 @@ def trips(**changed: Any) -> Samples:
     }
 
 
-def test_the_verdict_is_that_of_the_first_reading() -> None:
+def test_the_verdict_is_that_of_the_reading_that_is_meant() -> None:
     printed = BY_KEY["Table 3/F5 BA/best"]
     around, away = Interval(1.0, 0.0121, 2.0), Interval(1.0, 0.0122, 2.0)
-    yes = inside(printed, [Ours(reading="a", value=around), Ours(reading="b", value=away)])
+    both = [Ours(reading="a", value=around), Ours(reading="b", value=away)]
+    yes = inside(printed, both, "a")
     assert (yes.verdict, yes.why) == (
         Verdict.REPRODUCED, "in the 95 % interval of a, outside that of b",
     )  # fmt: skip
-    no = inside(printed, [Ours(reading="b", value=away), Ours(reading="a", value=around)])
-    assert no.verdict is Verdict.DIFFERS
+    assert inside(printed, both, "b").verdict is Verdict.DIFFERS
 
 
 def test_what_is_impossible_stays_so_whatever_we_get() -> None:
     printed = BY_KEY["Table 3/F6 BA/best"]
-    found = inside(printed, [Ours(reading="a", value=Interval(-1.9, -2.0, -1.8))])
+    found = inside(printed, [Ours(reading="a", value=Interval(-1.9, -2.0, -1.8))], "a")
     assert found.verdict is Verdict.IMPOSSIBLE
     assert found.why.endswith("(in the 95 % interval of a)")
 
@@ -110,7 +110,7 @@ def test_trips_that_are_the_printed_ones_are_reproduced() -> None:
         for law in ("BA", "MFBA"):
             for column in ("minimum", "maximum", "mean"):
                 assert find(section, law, column).verdict is Verdict.REPRODUCED
-        assert "One reading that gives both columns: section6 and fig1." in section.notes
+        assert "Readings that give both columns of this table: section6 and fig1." in section.notes
         assert section.title.startswith(place)
 
 

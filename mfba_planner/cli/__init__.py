@@ -22,6 +22,7 @@ COMMANDS = {
     "recover": "make an ordinary bag of one that was killed or truncated",
     "picture": "draw the run that a bag holds",
     "figures": "the paper's figures again, as SVG and PNG",
+    "sensitivity": "what hangs on what the paper does not say",
     "scenarios": "list the worlds that are shipped",
     "options": "list what --set can change",
     "tables": "the paper's tables again, ours beside the printed, with verdicts",

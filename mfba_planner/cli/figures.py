@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from ..arguments import Parser
 from ..core.episode import Episode, run
@@ -15,9 +15,6 @@ from ..core.options import did_you_mean
 from ..outputs import new_run_directory, refuse_existing, write_new
 from ..paper import readings
 from ..scenarios import load_scenario
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _DESCRIPTION = "Draw the paper's figures again; the same version draws the same bytes."
 FIGURES = {
@@ -40,6 +37,7 @@ _TITLES = {
     "fig7": "Fig. 7: case study 1",
     "fig8": "Fig. 8: case study 2",
 }
+_CHOICE = "of 1000 runs that which comes nearest to the printed length and meets as told"
 FORMATS = ("svg", "png")
 
 
@@ -88,14 +86,12 @@ def figure_run(name: str) -> Episode:
     return run(load_scenario(case), planner=readings.planner("section6"), seed=seed)
 
 
-def _draw(name: str) -> Figure:
+def _draw(name: str) -> Any:
     if name in _MODULES:
-        module = import_module(f"mfba_planner.report.figures.{_MODULES[name]}")
-        figure: Figure = module.draw()
-        return figure
+        return import_module(f"mfba_planner.report.figures.{_MODULES[name]}").draw()
     from ..report.figures import trips
 
-    return trips.draw(figure_run(name), _TITLES[name])
+    return trips.draw(figure_run(name), _TITLES[name], _CHOICE)
 
 
 def _known(kind: str, given: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:

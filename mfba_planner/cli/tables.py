@@ -5,22 +5,21 @@ from __future__ import annotations
 
 import os
 import shlex
-import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from ..arguments import Parser
-from ..core.errors import ConfigError, InputError, OutputError
+from ..core.errors import InputError, OutputError
 from ..outputs import new_run_directory, write_new
-from ..paper.study.chunk import Chunk
 from ..paper.study.plan import FULL, QUICK
-from ..paper.study.run import MAX_WORKERS, Sample, run_plan
 from ..paper.study.store import Store
 from ..paper.tables.build import SECTIONS, build, check_sections, plan
 from ..paper.tables.model import Section
 from ..report.tables import data, html, markdown
 from ..report.tables.text import Origin
 from ..scenarios import load_scenario
+from ..watched import add_arguments, check, run_watched
 
 _DESCRIPTION = """Run what Tables 1 to 7 need and hold each printed number against ours.
 
@@ -34,28 +33,14 @@ def main(args: list[str]) -> int:
     parser.add_argument(
         "tables", nargs="*", metavar="TABLE", help=f"which: {', '.join(SECTIONS)} (default: all)"
     )
-    parser.add_argument("--quick", action="store_true", help="few runs: seconds, wide intervals")
-    parser.add_argument(
-        "--workers", type=int, default=_cores(), metavar="N",
-        help="processes (default: one per core); the tables do not depend on it",
-    )  # fmt: skip
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="first seed of every sample (default: 0)"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR",
-        help="directory to create, or to go on in (default: a new one below runs/)",
-    )  # fmt: skip
+    add_arguments(parser)
     parser.add_argument(
         "--update", type=Path, metavar="PAGE", help="fill the generated blocks of this page too"
     )
     found = parser.parse(args)
     sections = check_sections(found.tables)
-    if not 0 <= found.seed < 2**62:
-        raise ConfigError(f"--seed={found.seed}: out of range; give a whole number from 0 up")
-    if not 1 <= found.workers <= MAX_WORKERS:
-        raise ConfigError(f"--workers={found.workers}: out of range; give 1 to {MAX_WORKERS}")
-    page = None if found.update is None else _page(found.update)
+    check(found)
+    page = None if found.update is None else _page(found.update, sections)
     directory = found.out or new_run_directory(stem="tables")
     words = ["mfba", "tables", *found.tables, *(["--quick"] if found.quick else [])]
     origin = Origin(
@@ -78,40 +63,19 @@ def _make(
     scenarios = {name: load_scenario(name) for name in ("case1", "case2")}
     chunks = plan(sections, scenarios, QUICK if quick else FULL, seed)
     store = Store(directory, chunks, {"sections": list(sections), "seed": seed, "quick": quick})
-    try:
-        samples = _run(chunks, workers, store)
-    except (KeyboardInterrupt, SystemExit):
-        print(f"interrupted; go on with --out {directory}", file=sys.stderr)
-        raise
+    samples = run_watched(chunks, workers, store)
     return build(sections, scenarios, samples, seed)
 
 
-def _run(chunks: Sequence[Chunk], workers: int, store: Store) -> dict[str, Sample]:
-    """Run the plan under a progress bar, where somebody watches."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
-        task = progress.add_task("running", total=sum(chunk.count for chunk in chunks))
-        return run_plan(
-            chunks,
-            workers=workers,
-            store=store,
-            done=lambda chunk: progress.advance(task, chunk.count),
-        )
-
-
 def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None:
-    """Every form; what is there already must be the same."""
+    """Every form; what is there already must be the same. Figures go with the whole set."""
+    whole = len(sections) == len(SECTIONS)
+    pictures = _pictures(origin.quick) if whole else []
     forms = {
         "tables.md": markdown.page(sections, origin),
         "tables.csv": data.to_csv(sections),
         "tables.json": data.to_json(sections, origin),
-        "tables.html": html.page(sections, origin, _pictures()),
+        "tables.html": html.page(sections, origin, pictures),
     }
     for name, content in forms.items():
         path, wanted = directory / name, content.encode()
@@ -119,19 +83,27 @@ def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None
             write_new(path, wanted)
 
 
-def _pictures() -> list[html.Picture]:
-    """The figures of the page."""
-    return []
+def _pictures(quick: bool) -> list[html.Picture]:
+    """What `mfba figures` draws; the quick form does without the one that takes longest."""
+    figures = import_module(".figures", __package__)  # by name: commands do not know each other
+    return [
+        html.Picture(title=f"{name}: {what}", svg=figures.render(name, ("svg",))["svg"].decode())
+        for name, what in figures.FIGURES.items()
+        if not (quick and name == "convergence")
+    ]
 
 
-def _page(path: Path) -> str:
+def _page(path: Path, sections: Sequence[str]) -> str:
+    """A page that has a place for every block; seen to before the minutes of running."""
     try:
-        return path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise InputError(
             f"{path}: cannot be read ({reason.lower()}); give a Markdown page"
         ) from None
+    markdown.fill(text, dict.fromkeys(markdown.block_names(sections), ""))
+    return text
 
 
 def _update(path: Path, content: str) -> None:
@@ -154,11 +126,3 @@ def _show(sections: Sequence[Section], origin: Origin) -> None:
     from ..report.tables.terminal import show
 
     show(Console(), sections, origin)
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not everywhere
-        return os.cpu_count() or 1

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from enum import Enum
 
 from .geometry import wrap_angle
 from .sensing import Bits
@@ -11,17 +12,27 @@ from .sensing import Bits
 TIE_RAD = 1e-9  # turns closer than this are equal: rounding must not choose the gap
 
 
+class GapHeading(Enum):
+    """Where gap i leads: along the boundary of sectors i and i+1, or the middle of sector i."""
+
+    BOUNDARY = "boundary"
+    MIDDLE = "middle"
+
+
 def gap_vector(vs: Bits) -> Bits:
     """Vg of Table 1: b(i) = a(i) or a(i+1); the ring wraps (Fig. 5 closes gap 12 by sector 1)."""
     return tuple([a | b for a, b in zip(vs, vs[1:] + vs[:1])])
 
 
-def gap_heading(gap: int, count: int) -> float:
-    """Heading of gap i (from 1) in radians: the boundary of sectors i and i+1 (Fig. 6)."""
-    return wrap_angle(2.0 * math.pi * gap / count)
+def gap_heading(gap: int, count: int, rule: GapHeading = GapHeading.BOUNDARY) -> float:
+    """Heading of gap i (from 1) in radians (Fig. 6)."""
+    place = gap if rule is GapHeading.BOUNDARY else gap - 0.5
+    return wrap_angle(2.0 * math.pi * place / count)
 
 
-def nearest_free_gap(vg: Bits, goal_heading_rad: float) -> int | None:
+def nearest_free_gap(
+    vg: Bits, goal_heading_rad: float, rule: GapHeading = GapHeading.BOUNDARY
+) -> int | None:
     """Number (from 1) of the free gap nearest in angle to the goal; the lower of two equals.
 
     None when every gap is closed: the robot then holds its position (the paper is silent).
@@ -30,7 +41,7 @@ def nearest_free_gap(vg: Bits, goal_heading_rad: float) -> int | None:
     best, smallest = None, math.inf
     for gap, closed in enumerate(vg, start=1):
         if not closed:
-            turn = abs(wrap_angle(gap_heading(gap, n) - goal_heading_rad))
+            turn = abs(wrap_angle(gap_heading(gap, n, rule) - goal_heading_rad))
             if turn < smallest - TIE_RAD:
                 best, smallest = gap, turn
     return best

@@ -12,7 +12,7 @@ import numpy as np
 
 from .bat import BatParams, BatSwarm, Bounds, Disc, Vector, minimize
 from .errors import ConfigError
-from .gaps import gap_heading, gap_vector, nearest_free_gap
+from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
 from .geometry import Point, Pose2D, bearing, distance, towards
 from .options import check, option
 from .sensing import Bits, Ranges, sensory_vector
@@ -88,6 +88,7 @@ class PlannerParams:
     input_timeout_s: float = option(
         1.0, "age at which odometry or sectors are stale", unit="s", minimum=0.001, maximum=3600.0
     )
+    gap_heading: GapHeading = option(GapHeading.BOUNDARY, "where a gap leads, in its two sectors")
     swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
     bat: BatParams = field(default_factory=BatParams)
 
@@ -180,7 +181,7 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
     elif mode is Mode.OBSTACLE_AVOIDANCE:
         assert obs.goal is not None
         length = min(params.step_length_m, distance(position, obs.goal))
-        waypoint = towards(position, gap_heading(gap, len(vg)), length)
+        waypoint = towards(position, gap_heading(gap, len(vg), params.gap_heading), length)
     if waypoint is not position:
         dt = params.tick_ns * NANO
         velocity = ((waypoint[0] - position[0]) / dt, (waypoint[1] - position[1]) / dt)
@@ -217,7 +218,7 @@ def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tupl
     if not any(vs):
         return Event.CLEAR, "no obstacle within SR", 0
     sensed = "+".join(str(i) for i, bit in enumerate(vs, start=1) if bit)
-    gap = nearest_free_gap(vg, bearing(position, obs.goal))
+    gap = nearest_free_gap(vg, bearing(position, obs.goal), params.gap_heading)
     if gap is None:
         return Event.NO_GAP, f"sectors {sensed} set: every gap is closed", 0
     return Event.OBSTACLE, f"sectors {sensed} set: gap {gap} is nearest to the goal", gap

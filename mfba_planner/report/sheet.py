@@ -103,4 +103,4 @@ def to_bytes(figure: Figure, form: str) -> bytes:
 def drawable(text: str) -> str:
     """Text with a question mark for each letter that the house font does not have."""
     known = get_font(findfont("DejaVu Sans")).get_charmap()
-    return "".join(letter if ord(letter) in known else "?" for letter in text)
+    return "".join(c if c == "\n" or ord(c) in known else "?" for c in text)

@@ -34,6 +34,11 @@ class Benchmark:
     bat: BatParams
     dimension: int = 2
 
+    @property
+    def cost(self) -> float:
+        """Time of a run, in about milliseconds."""
+        return 4e-4 * self.bat.population * self.bat.iterations
+
     def facts(self) -> dict[str, Scalar]:
         """What decides the numbers, as plain values."""
         return {"function": self.function, "dimension": self.dimension, **flatten(self.bat)}
@@ -59,6 +64,11 @@ class Trips:
 
     scenario: Scenario
     planner: PlannerParams
+
+    @property
+    def cost(self) -> float:
+        """Time of a run, in about milliseconds."""
+        return 25.0
 
     def facts(self) -> dict[str, Scalar]:
         """What decides the numbers, as plain values."""
@@ -98,6 +108,11 @@ class Chunk:
     def name(self) -> str:
         """Name of the chunk, fit for a file."""
         return f"{self.sample.replace('/', '-')}-{self.first}-{self.count}"
+
+    @property
+    def cost(self) -> float:
+        """Time it takes, in about milliseconds, for a progress bar."""
+        return self.count * self.work.cost
 
     def run(self) -> Columns:
         """Compute it."""

@@ -102,7 +102,7 @@ def _numbers(draws: Mapping[tuple[str, str], Array], seeds: Mapping[str, str]) -
             )
             for reading in SWARM_READINGS
         ]
-        yield inside(printed, ours)
+        yield inside(printed, ours, MEANT)
 
 
 def _joint(draws: Mapping[tuple[str, str], Array]) -> Grid:
@@ -123,6 +123,7 @@ def _joint(draws: Mapping[tuple[str, str], Array]) -> Grid:
         head=("row", *(f"p, {r}" for r in SWARM_READINGS), "consistent with",
               f"outside {MEANT}'s intervals"),
         rows=tuple(rows),
+        digits={f"p, {reading}": 2 for reading in SWARM_READINGS},
         note="p is the share of 10 000 resampled tables that lie at least as far out; "
         "consistent means p >= 0.05.",
     )  # fmt: skip
@@ -232,6 +233,7 @@ def _as_should_be(
               "median BA", "median MFBA",
               "chance that MFBA beats BA", "p (Holm)", "sign"),
         rows=tuple(rows),
+        digits={"p (Holm)": 2},
         note="Means with bootstrap, chances with DeLong 95 % intervals; p of Mann-Whitney's "
         "test, Holm-corrected within the reading. + MFBA is better, . it is worse, - neither "
         f"(p >= {SIGNIFICANT:g}). Seeds from {seed} on.",

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 
 from .. import doubts
@@ -48,13 +48,14 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """A table of our own; key is its name in the data."""
+    """A table of our own; key is its name in the data, digits those of some of its columns."""
 
     key: str
     title: str
     head: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+    digits: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,10 +91,10 @@ def compare_exactly(printed: Printed, reading: str, ours: Cell, why: str = "") -
     return entry(printed, [Ours(reading=reading, value=ours)], verdict, why)
 
 
-def inside(printed: Printed, ours: Sequence[Ours]) -> Entry:
-    """Reproduced when the first reading has the printed value in its 95 % interval.
+def inside(printed: Printed, ours: Sequence[Ours], meant: str) -> Entry:
+    """Reproduced when the reading that is meant has the printed value in its 95 % interval.
 
-    The first reading is the one that is meant; what another one gives is told, not counted.
+    What another reading gives is told, not counted.
     """
     value = math.nan if printed.value is None else printed.value
     fits = [o.reading for o in ours if isinstance(o.value, Interval) and value in o.value]
@@ -108,5 +109,4 @@ def inside(printed: Printed, ours: Sequence[Ours]) -> Entry:
         return entry(
             printed, ours, Verdict.IMPOSSIBLE, f"{doubts.IMPOSSIBLE[printed.key]} ({why})"
         )
-    meant = ours[0].reading in fits
-    return entry(printed, ours, Verdict.REPRODUCED if meant else Verdict.DIFFERS, why)
+    return entry(printed, ours, Verdict.REPRODUCED if meant in fits else Verdict.DIFFERS, why)

@@ -29,15 +29,9 @@ MEANT = {"mfba": "section6", "ba": "fig1"}
 def trip_section(case: str, samples: Samples, seed: int) -> Section:
     """Every number of Table 5 (case1) or 7 (case2) and of the text about it."""
     place = TRIP_TABLES[case]
-    pairs = [(reading, law) for reading in PLANNER_READINGS for law in LAWS]
-    # The draws are the same for all samples: what differs between two is not the resampling.
-    lengths = {
-        pair: stats.resample(_column(samples, case, *pair, "length_m"), TRIP_RUNS,
-                             stats.generator(5))
-        for pair in pairs
-    }  # fmt: skip
+    lengths = _draws(case, samples)
     fitness = {pair: 1.0 / drawn for pair, drawn in lengths.items()}
-    count = len(_column(samples, case, *pairs[0], "length_m"))
+    count = len(_column(samples, case, PLANNER_READINGS[0], LAWS[0], "length_m"))
     seeds = f"{seed}-{seed + count - 1}"
     ten = _ten_runs(case, lengths)
     return Section(
@@ -57,6 +51,25 @@ def trip_section(case: str, samples: Samples, seed: int) -> Section:
     )
 
 
+def ten_runs(case: str, samples: Samples) -> Grid:
+    """The lengths of ten runs against those printed."""
+    return _ten_runs(case, _draws(case, samples))
+
+
+def _draws(case: str, samples: Samples) -> Draws:
+    """Lengths of ten runs, many times over: {(reading, law): (count, 10)}.
+
+    The draws are the same for all: what differs between two is not the resampling.
+    """
+    return {
+        (reading, law): stats.resample(
+            _column(samples, case, reading, law, "length_m"), TRIP_RUNS, stats.generator(5)
+        )
+        for reading in PLANNER_READINGS
+        for law in LAWS
+    }
+
+
 def _column(samples: Samples, case: str, reading: str, law: str, column: str) -> Array:
     return samples[trip_sample(reading, case, law)][column]
 
@@ -72,21 +85,21 @@ def _statistics(draws: Array) -> dict[str, Array]:
 
 
 def _ours(draws: Draws, law: str, column: str, seeds: str) -> list[Ours]:
-    """The readings' intervals of a statistic of ten runs, the reading that is meant first."""
-    readings = sorted(PLANNER_READINGS, key=lambda reading: reading != MEANT[law])
+    """The readings' intervals of a statistic of ten runs."""
     return [
         Ours(
             reading=reading,
             value=stats.interval(_statistics(draws[reading, law])[column]),
             seeds=seeds,
         )
-        for reading in readings
+        for reading in PLANNER_READINGS
     ]
 
 
 def _fitness(place: str, fitness: Draws, seeds: str) -> Iterator[Entry]:
     for printed in published.TRIPS[place]:
-        yield inside(printed, _ours(fitness, printed.row.lower(), printed.column, seeds))
+        law = printed.row.lower()
+        yield inside(printed, _ours(fitness, law, printed.column, seeds), MEANT[law])
 
 
 def _text(case: str, samples: Samples, lengths: Draws, seeds: str) -> Iterator[Entry]:
@@ -95,7 +108,8 @@ def _text(case: str, samples: Samples, lengths: Draws, seeds: str) -> Iterator[E
         if printed.place != place:
             continue
         if printed.column == "length":
-            yield inside(printed, _ours(lengths, printed.row.lower(), "minimum", seeds))
+            law = printed.row.lower()
+            yield inside(printed, _ours(lengths, law, "minimum", seeds), MEANT[law])
         elif printed.column == "run time":
             yield entry(printed, [], Verdict.NOT_STATED,
                         "MATLAB's computing time on the authors' machine: says nothing about "
@@ -150,6 +164,7 @@ def _ten_runs(case: str, lengths: Draws) -> Grid:
         title="Lengths of ten runs in metres: printed, and ours with 95 % bootstrap intervals",
         head=("reading", "law", "of ten", "printed (1/fitness)", "ours", "inside?", "joint p"),
         rows=tuple(rows),
+        digits={"joint p": 2},
         note="joint p: best, mean and worst together.",
     )
 
@@ -212,6 +227,15 @@ def _as_should_be(case: str, samples: Samples) -> Grid:
               "shorter", "p (Holm)", "not arrived", "runs with contact", "at most % (95 %)",
               "least clearance m", "mean clearance m", "mean turning deg"),
         rows=tuple(rows),
+        digits={
+            "MFBA - BA m": 2,
+            "chance that MFBA is shorter": 3,
+            "p (Holm)": 2,
+            "at most % (95 %)": 2,
+            "least clearance m": 2,
+            "mean clearance m": 3,
+            "mean turning deg": 3,
+        },
         note="Differences by seed, Wilcoxon's signed ranks, Holm over the readings; the share of "
         "runs with contact has Wilson's upper end. Clearance is the smallest gap between edges, "
         "turning the sum of all turns of a run.",
@@ -225,7 +249,7 @@ def _encounters(case: str, samples: Samples) -> Grid:
             masks = _column(samples, case, reading, law, "encounters").astype(int).tolist()
             counted = sorted(Counter(masks).items(), key=lambda item: (-item[1], item[0]))
             shown = [
-                f"{_obstacles(mask)}: {100.0 * n / len(masks):.0f} %"
+                f"{_obstacles(mask)}: {_percent(n / len(masks))}"
                 for mask, n in counted[:SHOWN_ENCOUNTERS]
             ]
             rows.append((reading, law.upper(), "; ".join(shown)))
@@ -236,6 +260,10 @@ def _encounters(case: str, samples: Samples) -> Grid:
         head=("reading", "law", "share of the runs"),
         rows=tuple(rows),
     )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %" if share >= 0.005 else "below 0.5 %"
 
 
 def _obstacles(mask: int) -> str:
@@ -269,6 +297,5 @@ def _notes(ten: Grid) -> tuple[str, ...]:
         f"{f.speed_mps:g} m/s, steps of {f.step_length_m:g} m and {f.bat.iterations} iteration of "
         "one lasting swarm per step.",
         f"{told}.",
-        f"One reading that gives both columns: {' and '.join(both) if both else 'none found'}"
-        + ("." if both else ": the two columns seem to come from different set-ups."),
+        f"Readings that give both columns of this table: {' and '.join(both) or 'none found'}.",
     )

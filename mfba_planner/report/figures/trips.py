@@ -66,7 +66,7 @@ def _obstacles(numbers: Sequence[int]) -> str:
     return f"obstacle{plural} {' and '.join(map(str, numbers))}"
 
 
-def draw(episode: Episode, title: str) -> Figure:
+def draw(episode: Episode, title: str, note: str = "") -> Figure:
     """Draw the moments side by side, legend and result in the last place."""
     moments = scenes(episode)
     columns = 2 if len(moments) < 5 else 3
@@ -82,7 +82,7 @@ def draw(episode: Episode, title: str) -> Figure:
         corners.append((width, corners[0][1]))
         width += _LEGEND + EDGE
     sheet = Sheet(width, height)
-    sheet.head(title, _subtitle(episode))
+    sheet.head(title, "; ".join(filter(None, [_subtitle(episode), note])))
     view = _view(episode)
     axes = []
     for letter, moment, (left, top) in zip("abcdefgh", moments, corners):

@@ -90,7 +90,7 @@ def _entry(e: Entry, names: Sequence[str], digits: int) -> Iterable[str]:
 
 
 def _grid(grid: Grid, digits: int) -> str:
-    rows = ((escape(text.cell(value, digits)) for value in row) for row in grid.rows)
+    rows = (map(escape, row) for row in text.rows(grid, digits))
     note = f'<p class="note">{escape(grid.note)}</p>' if grid.note else ""
     return f"<h3>{escape(grid.title)}</h3>{_table(grid.head, rows)}{note}"
 

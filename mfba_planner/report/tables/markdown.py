@@ -22,9 +22,13 @@ def page(sections: Sequence[Section], origin: Origin) -> str:
 
 def blocks(sections: Sequence[Section], origin: Origin) -> dict[str, str]:
     """{name: Markdown} of what a page may hold between markers."""
-    found = {"origin": origin.line(), "summary": _table(*summary(sections))}
-    found |= {f"section {section.key}": body(section) for section in sections}
-    return found
+    content = [origin.line(), _table(*summary(sections)), *map(body, sections)]
+    return dict(zip(block_names([section.key for section in sections]), content))
+
+
+def block_names(keys: Iterable[str]) -> list[str]:
+    """Names of the blocks that the sections of these keys fill."""
+    return ["origin", "summary", *(f"section {key}" for key in keys)]
 
 
 def fill(page_text: str, generated: Mapping[str, str]) -> str:
@@ -74,8 +78,7 @@ def body(section: Section) -> str:
 
 
 def _grid(grid: Grid, digits: int) -> str:
-    rows = [tuple(text.cell(value, digits) for value in row) for row in grid.rows]
-    parts = [f"**{grid.title}**", _table(grid.head, rows)]
+    parts = [f"**{grid.title}**", _table(grid.head, text.rows(grid, digits))]
     return "\n\n".join([*parts, grid.note] if grid.note else parts)
 
 

@@ -26,6 +26,15 @@ STYLES = {
 
 def show(console: Console, sections: Sequence[Section], origin: Origin) -> None:
     """Print all sections, the summary last, where the eyes are."""
+    with console.capture() as captured:
+        _print(console, sections, origin)
+    # a terminal's encoding may lack the Greek letters of a formula
+    encoding = console.encoding
+    console.file.write(captured.get().encode(encoding, "replace").decode(encoding))
+    console.file.flush()
+
+
+def _print(console: Console, sections: Sequence[Section], origin: Origin) -> None:
     for section in sections:
         console.print()
         console.print(Text(section.title, style="bold underline"))
@@ -75,8 +84,8 @@ def _grid(grid: Grid, digits: int) -> Table:
     table = _new(grid.title)
     for head in grid.head:
         table.add_column(head, overflow="fold")
-    for row in grid.rows:
-        table.add_row(*(Text(text.cell(value, digits)) for value in row))
+    for row in text.rows(grid, digits):
+        table.add_row(*map(Text, row))
     return table
 
 

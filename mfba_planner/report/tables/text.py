@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import platform
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mfba_planner import __version__
 from mfba_planner.paper.statistics import Interval
-from mfba_planner.paper.tables.model import Cell, Entry, Section, Verdict
+from mfba_planner.paper.tables.model import Cell, Entry, Grid, Section, Verdict
 
 NOTHING = "–"
 
@@ -52,6 +52,13 @@ def cell(value: Cell, digits: int) -> str:
 def _number(value: float, digits: int) -> str:
     """Trailing zeros are kept where an interval has them; no minus before zero."""
     return f"{value:#.{digits}g}".rstrip(".") if value else "0"
+
+
+def rows(grid: Grid, digits: int) -> Iterator[list[str]]:
+    """The rows of a grid; columns without digits of their own have those of the section."""
+    shown = [grid.digits.get(name, digits) for name in grid.head]
+    for row in grid.rows:
+        yield [cell(value, count) for value, count in zip(row, shown)]
 
 
 def readings(section: Section) -> tuple[str, ...]:

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How path lengths depend on what section 6.2 does not say: readings, one change at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..core.bat import Algorithm
+from ..core.episode import Episode, run
+from ..core.geometry import Point, bearing, distance, towards
+from ..core.metrics import encounters, evaluate
+from ..core.options import Scalar, flatten, override
+from ..core.planner import PlannerParams
+from ..core.sensing import SensorParams
+from ..core.world import Obstacle, Scenario
+from . import published, readings, statistics
+from .study.chunk import Chunk, Columns, Trips, chunks
+from .study.run import Sample
+
+CASES = tuple(published.TRIP_TABLES)
+LAWS = ("MFBA", "BA")
+STATISTICS = ("best", "mean", "worst")
+SEEDS, QUICK_SEEDS, CHUNK = 200, 20, 20
+RESAMPLES = 2000
+GROUPS = (
+    "preset", "robot speed", "step", "iterations", "all three", "SR measured", "sectors",
+    "gap heading", "frequency",
+)  # fmt: skip
+TOLD = {"case1": "only obstacle 1", "case2": "obstacles 1, then 2"}  # Fig. 7 and 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """One way to read section 6.2; its difference to `section6` has a group and a label.
+
+    sectors_rad turns sector 1's beginning away from +x; a robot that is unaware of its own
+    radius does not enlarge the obstacles (contacts are counted with the radius all the same).
+    """
+
+    group: str
+    label: str
+    planner: PlannerParams = field(default_factory=PlannerParams)
+    sensor: SensorParams = field(default_factory=SensorParams)
+    sectors_rad: float = 0.0
+    enlarged: bool = True
+
+    @property
+    def name(self) -> str:
+        """Unique, and fit for a file."""
+        text = f"{self.group} {self.label}"
+        return "".join(c if c.isalnum() or c in ".-" else "_" for c in text)
+
+
+def all_readings(quick: bool = False) -> list[Reading]:
+    """`section6`, what differs from it in one thing, other sets that fit, `fig1`."""
+    base = readings.planner("section6")
+    found = [Reading(group="preset", label="section6", planner=base)]
+    for group, label, changes, brief in _changes():
+        if brief or not quick:
+            planner = override(base, changes)
+            found.append(Reading(group=group, label=label, planner=planner))
+    found += [reading for reading in _sensing() if reading.sectors_rad or not quick]
+    for algorithm in Algorithm:
+        fig1 = override(readings.planner("fig1"), {"bat.algorithm": algorithm.value})
+        label = f"fig1, {algorithm.value.upper()}"
+        found.append(Reading(group="preset", label=label, planner=fig1))
+    return sorted(found, key=lambda reading: GROUPS.index(reading.group))
+
+
+def _changes() -> Iterator[tuple[str, str, dict[str, Scalar], bool]]:
+    """(group, label, options, whether the quick form has it too)."""
+    for speed in (0.5, 0.6, 0.7, 0.75, 0.77, 0.78, 0.79, 0.8, 0.82, 0.85, 0.9, 1.0):
+        brief = speed in (0.6, 0.7, 0.82, 0.9)
+        yield "robot speed", f"{speed:g} m/s", {"speed_mps": speed}, brief
+    for step in (0.05, 0.1, 0.2, 0.25, 0.35, 0.4, 0.5):
+        yield "step", f"{step:g} m", {"step_length_m": step}, step in (0.2, 0.5)
+    for iterations in (1, 2, 3, 4, 6, 10, 20):
+        options: dict[str, Scalar] = {"bat.iterations": iterations}
+        yield "iterations", f"{iterations} per step", options, iterations in (1, 4, 10)
+    for step, speed in ((0.25, 0.81), (0.2, 0.83)):
+        options = {"bat.iterations": 4, "step_length_m": step, "speed_mps": speed}
+        yield "all three", f"4 per step, {step:g} m, {speed:g} m/s", options, speed == 0.83
+    yield "gap heading", "middle of sector i", {"gap_heading": "middle"}, True
+    yield "frequency", "raw t, as printed", {"bat.schedule": "raw"}, True
+    yield "frequency", "random (BA)", {"bat.algorithm": "ba"}, True
+
+
+def _sensing() -> Iterator[Reading]:
+    sr, radius = SensorParams().sensing_range_m, 0.3  # of robot and obstacles in both cases
+    for label, reach, enlarged in (
+        ("to the obstacle's own edge", sr - radius, True),
+        ("to the obstacle's centre", sr - 2.0 * radius, True),
+        ("own edge, not enlarged", sr, False),
+        ("centre, not enlarged", sr - radius, False),
+    ):
+        ring = SensorParams(sensing_range_m=reach)
+        yield Reading(group="SR measured", label=label, sensor=ring, enlarged=enlarged)
+    half = math.pi / SensorParams().sectors
+    yield Reading(group="sectors", label="turned by half a sector", sectors_rad=half)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variation(Trips):
+    """Episodes of a reading in one scenario."""
+
+    reading: Reading
+
+    def facts(self) -> dict[str, Scalar]:
+        """What decides the numbers, as plain values."""
+        return {
+            "scenario": repr(self.scenario),
+            **flatten(self.planner),
+            **flatten(self.reading.sensor),
+            "sectors_rad": self.reading.sectors_rad,
+            "enlarged": self.reading.enlarged,
+        }
+
+    def run(self, seeds: Sequence[int]) -> Columns:
+        """Length, contacts, whether the goal was reached, whether it met whom the paper tells."""
+        rows = [self._told(seed) for seed in seeds]
+        return {name: [row[name] for row in rows] for name in rows[0]}
+
+    def _told(self, seed: int) -> dict[str, float]:
+        seen = turned(self.scenario, -self.reading.sectors_rad)
+        if not self.reading.enlarged:
+            seen = replace(seen, robot_radius_m=0.0)
+        episode = run(seen, planner=self.planner, sensor=self.reading.sensor, seed=seed)
+        result = evaluate(_with_radius(episode, self.scenario.robot_radius_m))
+        met = encounters(episode)
+        told = met == (1,) if self.scenario.name == "case1" else met[:2] == (1, 2)
+        return {
+            "length_m": result.length_m,
+            "collisions": result.collisions,
+            "reached": int(result.outcome.value == "goal_reached"),
+            "told": int(told),
+        }
+
+
+def _with_radius(episode: Episode, radius_m: float) -> Episode:
+    return replace(episode, scenario=replace(episode.scenario, robot_radius_m=radius_m))
+
+
+def turned(scenario: Scenario, angle_rad: float) -> Scenario:
+    """The scenario turned about its start; to the robot it is the sectors that turn back."""
+    if angle_rad == 0.0:
+        return scenario
+    start = scenario.start_m
+
+    def moved(point: Point) -> Point:
+        return towards(start, bearing(start, point) + angle_rad, distance(start, point))
+
+    def obstacle(o: Obstacle) -> Obstacle:
+        return replace(o, center_m=moved(o.center_m), heading_rad=o.heading_rad + angle_rad)
+
+    obstacles = tuple(obstacle(o) for o in scenario.obstacles)
+    return replace(scenario, goal_m=moved(scenario.goal_m), obstacles=obstacles)
+
+
+def plan(scenarios: Mapping[str, Scenario], quick: bool, first: int = 0) -> list[Chunk]:
+    """What is to be run from seed first on; scenarios are those of CASES."""
+    found = []
+    seeds = QUICK_SEEDS if quick else SEEDS
+    for reading in all_readings(quick):
+        for case in CASES:
+            work = Variation(scenario=scenarios[case], planner=reading.planner, reading=reading)
+            found += chunks(f"{reading.name}/{case}", work, first, seeds, CHUNK)
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """What came of a reading in one case; lengths (m) as intervals of ten runs, best first."""
+
+    reading: Reading
+    case: str
+    intervals: tuple[statistics.Interval, ...]
+    contacts: float
+    reached: float
+    told: float
+
+    def off_m(self, law: str) -> tuple[float, ...]:
+        """Our median minus the printed length, for each of STATISTICS."""
+        printed = printed_m(self.case, law)
+        return tuple(ours.middle - theirs for ours, theirs in zip(self.intervals, printed))
+
+    def holds(self, law: str) -> tuple[bool, ...]:
+        """Whether the printed length lies within the interval, for each of STATISTICS."""
+        printed = printed_m(self.case, law)
+        return tuple(i.low <= length <= i.high for i, length in zip(self.intervals, printed))
+
+    @property
+    def reproduces(self) -> tuple[str, ...]:
+        """The laws whose printed row lies within the intervals altogether, without a contact."""
+        fit = self.contacts == 0.0 and self.reached == 1.0
+        return tuple(law for law in LAWS if fit and all(self.holds(law)))
+
+    @property
+    def as_told(self) -> bool:
+        """Whether most runs meet whom the paper's figure tells of."""
+        return self.told > 0.5
+
+
+def printed_m(case: str, law: str) -> tuple[float, ...]:
+    """Best, mean and worst length (m) of ten runs as Table 5 or 7 prints them (1 / fitness)."""
+    fitness = published.values(published.TRIP_TABLES[case], law)
+    return tuple(1.0 / fitness[name] for name in ("maximum", "mean", "minimum"))
+
+
+def rows(samples: Mapping[str, Sample], quick: bool) -> list[Row]:
+    """Judge the samples of plan(), in its order."""
+    return [
+        _row(reading, case, samples[f"{reading.name}/{case}"])
+        for reading in all_readings(quick)
+        for case in CASES
+    ]
+
+
+def _row(reading: Reading, case: str, sample: Sample) -> Row:
+    rng = statistics.generator(CASES.index(case))
+    tens = statistics.resample(sample["length_m"], published.TRIP_RUNS, rng, RESAMPLES)
+    intervals = (tens.min(1), tens.mean(1), tens.max(1))
+    return Row(
+        reading=reading,
+        case=case,
+        intervals=tuple(map(statistics.interval, intervals)),
+        contacts=float(np.mean(sample["collisions"] > 0)),
+        reached=float(np.mean(sample["reached"])),
+        told=float(np.mean(sample["told"])),
+    )

@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sensitivity study: what varies, what is judged, what the command leaves behind."""
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mfba_planner import cli
+from mfba_planner.core.episode import run
+from mfba_planner.core.errors import ConfigError, OutputError
+from mfba_planner.core.geometry import distance
+from mfba_planner.core.metrics import encounters, evaluate
+from mfba_planner.core.options import flatten
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.core.sensing import SensorParams, sense_circles, sensory_vector
+from mfba_planner.paper import sensitivity
+from mfba_planner.paper.sensitivity import CASES, Reading, Row, Variation, turned
+from mfba_planner.paper.statistics import Interval
+from mfba_planner.paper.study.run import Sample
+from mfba_planner.report import style
+from mfba_planner.report.figures.sensitivity import draw
+from mfba_planner.report.sensitivity import to_csv, to_markdown, to_table
+from mfba_planner.report.sheet import to_bytes
+from mfba_planner.scenarios import load_scenario
+
+SCENARIOS = {case: load_scenario(case) for case in CASES}
+BASE, *OTHERS = sensitivity.all_readings()
+
+
+def variation(reading: Reading, case: str = "case1") -> Variation:
+    return Variation(scenario=SCENARIOS[case], planner=reading.planner, reading=reading)
+
+
+def reading(label: str) -> Reading:
+    (found,) = (r for r in [BASE, *OTHERS] if r.label == label)
+    return found
+
+
+# --- what varies ----------------------------------------------------------------------------
+
+
+def test_the_first_reading_is_section6_and_every_other_differs_from_it() -> None:
+    assert (BASE.planner, BASE.sensor) == (PlannerParams(), SensorParams())
+    facts = [variation(r).facts() for r in [BASE, *OTHERS]]
+    assert all(f != facts[0] for f in facts[1:])
+    assert len({tuple(f.items()) for f in facts}) == len(facts)
+    assert len({r.name for r in [BASE, *OTHERS]}) == len(facts)
+
+
+def test_one_thing_is_changed_at_a_time() -> None:
+    base = flatten(PlannerParams())
+    for r in OTHERS:
+        if r.group in ("preset", "all three"):
+            continue
+        changed = sum(value != base[name] for name, value in flatten(r.planner).items())
+        changed += r.sensor != SensorParams()
+        changed += r.sectors_rad != 0.0
+        assert changed + (not r.enlarged) in ((1, 2) if r.group == "SR measured" else (1,)), r
+
+
+def test_the_quick_form_leaves_readings_out_and_changes_none() -> None:
+    quick = sensitivity.all_readings(quick=True)
+    assert quick[0] == BASE
+    assert {r.name for r in quick} < {r.name for r in [BASE, *OTHERS]}
+    assert {r.group for r in quick} >= set(sensitivity.GROUPS) - {"SR measured"}
+
+
+def test_section6_runs_as_without_the_study() -> None:
+    columns = variation(BASE, "case2").run([3, 4])
+    episodes = [run(SCENARIOS["case2"], seed=seed) for seed in (3, 4)]
+    assert columns["length_m"] == [evaluate(episode).length_m for episode in episodes]
+    assert columns["told"] == [int(encounters(episode)[:2] == (1, 2)) for episode in episodes]
+
+
+@pytest.mark.parametrize("angle", [math.pi / 12.0, -1.0])
+def test_turning_the_world_turns_the_sectors_back(angle: float) -> None:
+    world = replace(SCENARIOS["case2"], start_m=(0.5, -1.0))
+    there = turned(world, angle)
+    for t in (0.0, 7.0):
+        for a, b in zip(world.centers(t), there.centers(t)):
+            assert distance(world.start_m, a) == pytest.approx(distance(there.start_m, b))
+    assert distance(there.start_m, there.goal_m) == pytest.approx(
+        distance(world.start_m, world.goal_m)
+    )
+    width = math.pi / 6.0
+    ahead, ring = SCENARIOS["case1"], SensorParams(sensing_range_m=1.0, sectors=12)
+    circle = [((0.0, 1.2), 0.3)]
+    one = sensory_vector(sense_circles(ahead.start_m, circle, ring))
+    (moved,) = turned(
+        replace(ahead, obstacles=(replace(ahead.obstacles[0], center_m=(0.0, 1.2)),)), width
+    ).centers(0.0)
+    other = sensory_vector(sense_circles(ahead.start_m, [(moved, 0.3)], ring))
+    assert other == one[-1:] + one[:-1]
+
+
+def test_a_robot_unaware_of_its_size_touches_what_it_does_not_see() -> None:
+    blind = reading("own edge, not enlarged")
+    columns = variation(blind, "case2").run(range(6))
+    assert sum(columns["collisions"]) > 0
+    assert sum(variation(BASE, "case2").run(range(6))["collisions"]) == 0
+
+
+# --- what is judged -------------------------------------------------------------------------
+
+
+def samples(length: Mapping[str, float], told: float = 1.0, hit: float = 0.0) -> dict[str, Sample]:
+    """Made-up samples: every run of a case as long as that, give or take 5 mm."""
+    found: dict[str, Sample] = {}
+    for r in sensitivity.all_readings(quick=True):
+        for case in CASES:
+            spread = np.linspace(-0.005, 0.005, 41)
+            found[f"{r.name}/{case}"] = {
+                "length_m": length[case] + spread,
+                "collisions": np.full(41, hit),
+                "reached": np.ones(41),
+                "told": np.full(41, told),
+            }
+    return found
+
+
+def test_printed_lengths_are_the_reciprocals_of_tables_5_and_7() -> None:
+    assert sensitivity.printed_m("case1", "MFBA") == pytest.approx(
+        (17.0919, 17.1094, 17.1517), abs=1e-4
+    )
+    assert sensitivity.printed_m("case2", "BA") == pytest.approx(
+        (18.6239, 18.8968, 19.2165), abs=1e-4
+    )
+
+
+def row(
+    best: float, mean: float, worst: float, contacts: float = 0.0, reached: float = 1.0
+) -> Row:
+    middles = (best, mean, worst)
+    return Row(
+        reading=BASE,
+        case="case1",
+        intervals=tuple(Interval(m, m - 0.01, m + 0.01) for m in middles),
+        contacts=contacts,
+        reached=reached,
+        told=0.4,
+    )
+
+
+def test_a_row_is_reproduced_when_all_of_it_lies_within() -> None:
+    good = row(17.09, 17.11, 17.15)
+    assert good.reproduces == ("MFBA",)
+    assert good.holds("BA") == (True, False, False)
+    assert good.off_m("BA") == pytest.approx((-0.0032, -0.2763, -0.6528), abs=1e-4)
+    assert row(17.09, 17.11, 17.17).reproduces == ()
+    assert row(17.09, 17.11, 17.15, contacts=0.01).reproduces == ()
+    assert row(17.09, 17.11, 17.15, reached=0.99).reproduces == ()
+    assert row(17.0932, 17.3863, 17.8028).reproduces == ("BA",)
+
+
+def test_shares_and_intervals_come_from_the_samples() -> None:
+    rows = sensitivity.rows(samples({"case1": 17.0, "case2": 18.0}, told=1.0, hit=2.0), True)
+    assert [r.case for r in rows[:2]] == list(CASES)
+    for r in rows:
+        length = 17.0 if r.case == "case1" else 18.0
+        best, mean, worst = r.intervals
+        assert length - 0.005 <= best.low <= best.middle < mean.middle < worst.middle
+        assert worst.high <= length + 0.005
+        assert mean.middle == pytest.approx(length, abs=0.001)
+        assert (r.contacts, r.reached, r.told, r.as_told) == (1.0, 1.0, 1.0, True)
+
+
+def test_csv_table_and_picture_tell_the_same_rows() -> None:
+    rows = sensitivity.rows(samples({"case1": 17.1, "case2": 18.5}), True)
+    lines = list(csv.DictReader(to_csv(rows).splitlines()))
+    assert [(line["reading"], line["case"]) for line in lines] == [
+        (r.reading.label, r.case) for r in rows
+    ]
+    assert float(lines[0]["mean_median_m"]) == pytest.approx(17.1, abs=0.001)
+    assert lines[0]["holds_MFBA_mean"] == "0"
+    table = to_table(rows, "title")
+    assert table.row_count == len(rows) / len(CASES)
+    assert len(to_table(rows, "title", 80).columns) == len(table.columns) - 1
+    marked = to_markdown(rows).splitlines()
+    assert len(marked) == 2 + table.row_count
+    assert marked[2].startswith("| preset | section6 | 17.1")
+    with style.context():
+        figure = draw(rows)
+        assert to_bytes(figure, "svg") == to_bytes(draw(rows), "svg")
+        numbers = [text.get_text() for ax in figure.axes for text in ax.texts]
+    assert numbers.count("100") == table.row_count * 2  # all meet as told
+    assert "preset" in numbers
+
+
+def test_the_page_has_the_readings_of_this_code() -> None:
+    page = (Path(__file__).parents[1] / "docs/sensitivity.md").read_text(encoding="utf-8")
+    lines = [line.split(" | ") for line in page.splitlines() if line.startswith("|")][2:]
+    assert [line[1].strip() for line in lines] == [r.label for r in [BASE, *OTHERS]]
+    marks = {line[1].strip(): (line[3].strip(), line[6].strip()) for line in lines}
+    assert marks["section6"] == ("● MFBA", "● MFBA")
+    assert marks["fig1, BA"] == ("● BA", "● BA")
+    assert marks["4 per step, 0.2 m, 0.83 m/s"] == ("● MFBA", "● MFBA")
+
+
+# --- the command ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three readings and two seeds: what the command does does not depend on how many."""
+    few = [BASE, reading("0.6 m/s"), reading("turned by half a sector")]
+    monkeypatch.setattr(sensitivity, "all_readings", lambda quick=False: few)
+    monkeypatch.setattr(sensitivity, "QUICK_SEEDS", 2)
+
+
+@pytest.mark.usefixtures("small")
+def test_the_command_goes_on_where_it_was(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "s"
+    args = ["sensitivity", "--quick", "--workers", "1", "--out", str(out)]
+    assert cli.main(args) == 0
+    told = capsys.readouterr().out
+    assert "turned by half a sector" in told
+    names = {"sensitivity.csv", "sensitivity.md", "sensitivity.png", "sensitivity.svg"}
+    before = {name: (out / name).read_bytes() for name in names}
+    (out / "sensitivity.csv").unlink()
+    next((out / "chunks").iterdir()).unlink()
+    assert cli.main(args) == 0
+    assert {name: (out / name).read_bytes() for name in names} == before
+    with pytest.raises(OutputError):
+        cli.main([*args, "--seed", "5"])
+
+
+@pytest.mark.usefixtures("small")
+def test_numbers_that_cannot_be_are_refused(tmp_path: Path) -> None:
+    out = ["--out", str(tmp_path / "s")]
+    with pytest.raises(ConfigError, match="--workers=0"):
+        cli.main(["sensitivity", "--workers", "0", *out])
+    with pytest.raises(ConfigError, match="--seed=-1"):
+        cli.main(["sensitivity", "--seed", "-1", *out])
+    assert not (tmp_path / "s").exists()
