@@ -14,7 +14,7 @@ from mfba_planner import cli
 from mfba_planner.core.episode import run
 from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.metrics import encounters, evaluate
+from mfba_planner.core.metrics import evaluate
 from mfba_planner.core.options import flatten
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.core.sensing import SensorParams, sense_circles, sensory_vector
@@ -74,7 +74,9 @@ def test_section6_runs_as_without_the_study() -> None:
     columns = variation(BASE, "case2").run([3, 4])
     episodes = [run(SCENARIOS["case2"], seed=seed) for seed in (3, 4)]
     assert columns["length_m"] == [evaluate(episode).length_m for episode in episodes]
-    assert columns["told"] == [int(encounters(episode)[:2] == (1, 2)) for episode in episodes]
+    assert columns["told"] == [
+        int(evaluate(episode).encounters[:2] == (1, 2)) for episode in episodes
+    ]
 
 
 @pytest.mark.parametrize("angle", [math.pi / 12.0, -1.0])

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.bat import Algorithm
 from ..core.episode import Episode, run
 from ..core.geometry import Point, bearing, distance, towards
-from ..core.metrics import encounters, evaluate
+from ..core.metrics import evaluate
 from ..core.options import Scalar, flatten, override
 from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
@@ -130,7 +130,7 @@ class Variation(Trips):
             seen = replace(seen, robot_radius_m=0.0)
         episode = run(seen, planner=self.planner, sensor=self.reading.sensor, seed=seed)
         result = evaluate(_with_radius(episode, self.scenario.robot_radius_m))
-        met = encounters(episode)
+        met = evaluate(episode).encounters
         told = met == (1,) if self.scenario.name == "case1" else met[:2] == (1, 2)
         return {
             "length_m": result.length_m,
