@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The batched engine equals the single one run by run, to the last bit."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mfba_planner.core import batch
+from mfba_planner.core.bat import (
+    Algorithm,
+    BatParams,
+    BatSwarm,
+    Bounds,
+    Box,
+    Epsilon,
+    Initial,
+    Schedule,
+    Vector,
+    Velocity,
+    Walk,
+    minimize,
+)
+from mfba_planner.core.batch import minimize_batch
+from mfba_planner.core.errors import InputError
+
+BOX = Box((-1.0, -2.0), (3.0, 0.5))
+READINGS: dict[str, Any] = {
+    "algorithm": Algorithm,
+    "velocity": Velocity,
+    "schedule": Schedule,
+    "bounds": Bounds,
+    "epsilon": Epsilon,
+    "initial": Initial,
+    "walk": Walk,
+}
+ANY_READING = st.builds(
+    BatParams,
+    population=st.integers(2, 6),
+    iterations=st.integers(1, 12),
+    f_min=st.floats(0.0, 0.5),
+    f_max=st.floats(0.5, 1000.0),
+    rho=st.floats(0.0, 5.0),
+    sigma=st.floats(0.0, 10.0),
+    alpha=st.floats(0.5, 1.0),
+    a0=st.floats(0.0, 2.0),
+    r0=st.floats(0.0, 1.0),
+    **{name: st.sampled_from(list(kind)) for name, kind in READINGS.items()},
+)
+BOXES = st.lists(
+    st.tuples(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0)), min_size=1, max_size=4
+).map(lambda sides: Box(*zip(*map(sorted, sides))))  # type: ignore[arg-type]
+
+
+def generators(runs: int, seed: int = 7) -> list[np.random.Generator]:
+    children = np.random.SeedSequence(seed).spawn(runs)
+    return [np.random.Generator(np.random.PCG64(child)) for child in children]
+
+
+def bowl(x: Vector) -> float:
+    """NaN in a corner, infinite in another, two valleys."""
+    if x[0] > 0.9 and x[-1] > 0.2:
+        return math.nan
+    total = 0.0
+    for v in x:
+        total = total + (v * v - 0.3) * (v * v - 0.3) + 0.1 * v
+    return total if x[0] > -0.9 else math.inf
+
+
+def bowls(x: np.ndarray) -> np.ndarray:
+    total = np.zeros(x.shape[:-1])
+    with np.errstate(over="ignore", invalid="ignore"):
+        for j in range(x.shape[-1]):
+            v = x[..., j]
+            total = total + (v * v - 0.3) * (v * v - 0.3) + 0.1 * v
+    total = np.where(x[..., 0] > -0.9, total, math.inf)
+    return np.where((x[..., 0] > 0.9) & (x[..., -1] > 0.2), math.nan, total)
+
+
+@given(ANY_READING, BOXES, st.integers(0, 2**32), st.integers(1, 5))
+def test_each_run_equals_the_single_engine_bit_by_bit(
+    p: BatParams, box: Box, seed: int, runs: int
+) -> None:
+    ours, theirs = generators(runs, seed), generators(runs, seed)
+    result = minimize_batch(bowls, box, p, ours)
+    for i, rng in enumerate(theirs):
+        swarm = BatSwarm(p, box, rng)
+        for t in range(p.iterations + 1):
+            swarm.tell([bowl(x) for x in swarm.ask()])
+            assert result.history[i, t] == swarm.best_value
+        assert result.best_value[i] == swarm.best_value
+        assert result.best_x[i].tobytes() == np.array(swarm.best_x).tobytes()
+        assert ours[i].random() == rng.random(), "both took the same number of draws"
+
+
+def test_long_runs_in_pieces_are_the_same_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    p = BatParams(population=8, iterations=40, f_max=1.5)
+    whole = minimize_batch(bowls, BOX, p, generators(9))
+    monkeypatch.setattr(batch, "CACHED_BATS", 16)  # two runs at once
+    monkeypatch.setattr(batch, "DRAWN", 500)  # six iterations drawn at once
+    pieces = minimize_batch(bowls, BOX, p, generators(9))
+    for name in ("best_value", "best_x", "history", "failures"):
+        assert np.array_equal(getattr(whole, name), getattr(pieces, name)), name
+    swarm = minimize(bowl, BOX, p, generators(9)[8])
+    assert (swarm.best_value, swarm.best_x) == (whole.best_value[8], whole.best_x[8].tolist())
+
+
+def test_history_falls_to_the_best_value() -> None:
+    result = minimize_batch(bowls, BOX, BatParams(iterations=30), generators(20))
+    assert result.history.shape == (20, 31)
+    assert (np.diff(result.history, axis=1) <= 0.0).all()
+    assert np.array_equal(result.history[:, -1], result.best_value)
+    assert np.array_equal(bowls(result.best_x), result.best_value)
+
+
+def test_no_generators_no_runs() -> None:
+    result = minimize_batch(bowls, BOX, BatParams(), [])
+    assert result.best_value.shape == (0,)
+    assert result.best_x.shape == (0, 2)
+
+
+def test_failures_are_counted_per_run() -> None:
+    p = BatParams(population=3, iterations=4)
+    result = minimize_batch(lambda x: np.full(x.shape[:-1], math.nan), BOX, p, generators(2))
+    assert result.failures.tolist() == [15, 15]
+    assert result.best_value.tolist() == [math.inf, math.inf]
+    assert minimize_batch(lambda x: x[..., 0], BOX, p, generators(2)).failures.tolist() == [0, 0]
+
+
+def test_an_objective_of_the_wrong_shape_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^objective returned shape \(2, 5, 2\) for points"):
+        minimize_batch(lambda x: x, BOX, BatParams(), generators(2))
+    with pytest.raises(InputError, match=r"^objective returned shape \(\) for points"):
+        minimize_batch(lambda x: np.array(1.0), BOX, BatParams(), generators(2))
+
+
+def test_an_objective_that_raises_is_named() -> None:
+    def broken(x: np.ndarray) -> np.ndarray:
+        raise ZeroDivisionError("no luck")
+
+    with pytest.raises(InputError, match=r"^objective raised ZeroDivisionError \(no luck\) at"):
+        minimize_batch(broken, BOX, BatParams(), generators(2))
+
+
+def test_the_readings_differ_in_the_batched_engine_too() -> None:
+    best = set()
+    for changes in ({}, {"algorithm": Algorithm.BA}, {"walk": Walk.SELF}, {"sigma": 0.1}):
+        p = replace(BatParams(iterations=20), **changes)  # type: ignore[arg-type]
+        best.add(minimize_batch(bowls, BOX, p, generators(3)).best_value.tobytes())
+    assert len(best) == 4
