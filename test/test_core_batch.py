@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core import batch
 from mfba_planner.core.bat import (
+    Acceptance,
     Algorithm,
     BatParams,
     BatSwarm,
@@ -20,6 +21,8 @@ from mfba_planner.core.bat import (
     Epsilon,
     Initial,
     Schedule,
+    Step,
+    Update,
     Vector,
     Velocity,
     Walk,
@@ -37,6 +40,9 @@ READINGS: dict[str, Any] = {
     "epsilon": Epsilon,
     "initial": Initial,
     "walk": Walk,
+    "step": Step,
+    "acceptance": Acceptance,
+    "update": Update,
 }
 ANY_READING = st.builds(
     BatParams,
@@ -48,6 +54,7 @@ ANY_READING = st.builds(
     sigma=st.floats(0.0, 10.0),
     alpha=st.floats(0.5, 1.0),
     a0=st.floats(0.0, 2.0),
+    inertia=st.sampled_from([0.0, 0.7, 1.0]),
     r0=st.floats(0.0, 1.0),
     **{name: st.sampled_from(list(kind)) for name, kind in READINGS.items()},
 )

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.random import Generator
 
 from .bat import (
+    Acceptance,
     Algorithm,
     BatParams,
     Bounds,
@@ -24,8 +25,11 @@ from .bat import (
     Epsilon,
     Initial,
     Schedule,
+    Step,
+    Update,
     Velocity,
     Walk,
+    draws_per_bat,
 )
 from .errors import InputError
 
@@ -100,6 +104,7 @@ class _Swarms:
         self._average(self.row)
         values = self._value(self.x)
         self.values = _numbers(values)
+        self.stride = draws_per_bat(params, d)
         self.best_x = self.x[:, :, 0].copy()
         self.best_value = np.full(runs, math.inf)
         self._keep_best(self.x, values)
@@ -109,7 +114,7 @@ class _Swarms:
         p = self.params
         history[:, 0] = self.best_value
         done = 0
-        each = len(self.rngs) * p.population * (3 + len(self.x))
+        each = len(self.rngs) * p.population * self.stride
         while done < p.iterations:
             count = min(p.iterations - done, max(1, DRAWN // each))
             for u in self._draw(count):
@@ -121,8 +126,8 @@ class _Swarms:
                 history[:, done] = self.best_value
 
     def _draw(self, count: int) -> Array:
-        """Uniforms of so many iterations, (count, 3 + d, R, n): bat.py's order within a run."""
-        n, stride = self.params.population, 3 + len(self.x)
+        """Uniforms of so many iterations, (count, stride, R, n): bat.py's order within a run."""
+        n, stride = self.params.population, self.stride
         u = np.empty((count, stride, len(self.rngs), n))
         for i, rng in enumerate(self.rngs):
             u[:, :, i] = rng.random((count, n, stride)).transpose(0, 2, 1)
@@ -138,21 +143,32 @@ class _Swarms:
         return when * betas.reshape(u.shape)  # eq. 10
 
     def _fly(self, u: Array, t: int) -> Array:
-        """Candidates (d, R, n) of iteration t, eq. 4-7, from its uniforms (3 + d, R, n)."""
+        """Candidates (d, R, n) of iteration t, eq. 4-7, from its uniforms (stride, R, n)."""
         p = self.params
         sign = 1.0 if p.velocity is Velocity.TOWARDS_BEST else -1.0
         f = sign * (p.f_min + (p.f_max - p.f_min) * self._betas(u[0], t))  # eq. 4
         walk = u[1] > self.r
         scale = self.loudness[:, None]
+        pair = self._pairs(u[-2], u[-1]) if p.step is Step.PAIR else None
         candidates = np.empty_like(self.x)
         for j, (x, v, best) in enumerate(zip(self.x, self.v, self.best_x)):
+            v *= p.inertia
             v += (best[:, None] - x) * f  # eq. 5
             flown = x + v  # eq. 6
             epsilon = 2.0 * u[3 + (0 if p.epsilon is Epsilon.SCALAR else j)] - 1.0
+            if pair:
+                here, there = (np.take_along_axis(x, bats, axis=1) for bats in pair)
+                epsilon *= there - here
             base = best[:, None] if p.walk is Walk.BEST else flown
             candidates[j] = np.where(walk, base + scale * epsilon, flown)  # eq. 7
         self._bound(candidates)
         return candidates
+
+    def _pairs(self, ones: Array, others: Array) -> tuple[Array, Array]:
+        """For every bat, the numbers (R, n) of two different bats picked at random."""
+        n = self.params.population
+        a = (ones * n).astype(np.int64)
+        return a, (a + 1 + (others * (n - 1)).astype(np.int64)) % n
 
     def _value(self, x: Array) -> Array:
         """The objective at (d, R, n) points as (R, n) values."""
@@ -172,17 +188,23 @@ class _Swarms:
         finite = np.isfinite(values)
         if not finite.all():
             self.failures += np.count_nonzero(~finite, axis=1)
+            values[values == -math.inf] = math.nan
         return values
 
     def _accept(self, candidates: Array, values: Array, gate: Array, t: int) -> None:
-        """Take what is not worse, with probability A_i; then eq. 8 and 9."""
+        """Take what is good enough, with probability A_i; then eq. 8 and 9."""
         p = self.params
-        accepted = (values <= self.values) & (gate < self.a)
+        limit: Array | float = self.values
+        if p.acceptance is not Acceptance.OWN:
+            limit = self.best_value[:, None] if p.acceptance is Acceptance.BEST else math.inf
+        accepted = (values <= limit) & (gate < self.a)
         np.copyto(self.x, candidates, where=accepted)
         np.copyto(self.values, values, where=accepted)
-        np.multiply(self.a, p.alpha, out=self.a, where=accepted)  # eq. 8
-        self.r[accepted] = p.r0 * (1.0 - math.exp(-p.gamma * t))  # eq. 9
-        self._average(np.flatnonzero(accepted.any(axis=1)))
+        changed = accepted if p.update is Update.ACCEPTED else np.full_like(accepted, True)
+        np.multiply(self.a, p.alpha, out=self.a, where=changed)  # eq. 8
+        self.r[changed] = p.r0 * (1.0 - math.exp(-p.gamma * t))  # eq. 9
+        if p.alpha != 1.0:
+            self._average(np.flatnonzero(changed.any(axis=1)))
 
     def _average(self, rows: Array) -> None:
         """Sigma times the mean loudness, for the runs in which it has changed."""

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.bat import Box
 from ..core.errors import ConfigError
+from ..core.region import Box
 
 Point = tuple[float, ...]
 Coordinates = Sequence[Any]  # d floats, or d arrays of one shape

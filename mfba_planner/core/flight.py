@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Eq. 4-7 for one iteration of n bats: in d dimensions, and unrolled in the plane."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from .bat_params import BatParams, Bounds, Velocity, Walk
+from .region import Region, Vector
+
+Pair = tuple[Vector, Vector]
+
+
+@dataclass(slots=True)
+class Law:
+    """What stays the same from iteration to iteration; clamp is needed outside low-high only."""
+
+    f_min: float
+    f_span: float
+    sign: float
+    inertia: float
+    from_best: bool
+    low: Vector
+    high: Vector
+    clamp: Callable[[Vector], Vector]
+
+    @classmethod
+    def of(cls, params: BatParams, region: Region) -> Law:
+        """Read the options once."""
+        low, high = region.inner()
+        clamp = region.clamp
+        if params.bounds is Bounds.NONE:
+            low, high, clamp = [-math.inf] * len(low), [math.inf] * len(low), _as_it_is
+        # Eq. 5 with the sign that flies towards the best; the printed one is -f.
+        sign = 1.0 if params.velocity is Velocity.TOWARDS_BEST else -1.0
+        f_span, from_best = params.f_max - params.f_min, params.walk is Walk.BEST
+        return cls(params.f_min, f_span, sign, params.inertia, from_best, low, high, clamp)
+
+    def fly(
+        self, bats: Iterable[Any], best: Vector, scale: float, pairs: list[Pair] | None
+    ) -> list[Vector]:
+        """Candidates of the bats, whose velocities change.
+
+        A bat is its x, v, beta, the draw that decides whether it walks, r, and d draws for
+        epsilon; scale is sigma times the mean loudness; a pair makes a bat's walk as long as
+        the pair is apart.
+        """
+        if len(best) == 2:
+            return self._fly_in_the_plane(bats, best, scale, pairs)
+        return self._fly_anywhere(bats, best, scale, pairs)
+
+    def _fly_anywhere(
+        self, bats: Iterable[Any], best: Vector, scale: float, pairs: list[Pair] | None
+    ) -> list[Vector]:
+        inertia, clamp = self.inertia, self.clamp
+        points = []
+        for i, (x, v, beta, pulse, r, *draws) in enumerate(bats):
+            f = self.sign * (self.f_min + self.f_span * beta)  # eq. 4
+            point = []
+            for j, (xj, bj, draw) in enumerate(zip(x, best, draws)):
+                v[j] = vj = inertia * v[j] + (bj - xj) * f  # eq. 5
+                new = xj + vj  # eq. 6
+                if pulse > r:
+                    epsilon = 2.0 * draw - 1.0
+                    if pairs:
+                        here, there = pairs[i]
+                        epsilon *= there[j] - here[j]
+                    new = (bj if self.from_best else new) + scale * epsilon  # eq. 7
+                point.append(new)
+            points.append(clamp(point))
+        return points
+
+    def _fly_in_the_plane(
+        self, bats: Iterable[Any], best: Vector, scale: float, pairs: list[Pair] | None
+    ) -> list[Vector]:
+        """Two coordinates unrolled: the same numbers to the last bit, in half the time."""
+        f_min, f_span, sign, inertia = self.f_min, self.f_span, self.sign, self.inertia
+        clamp, from_best, (bx, by) = self.clamp, self.from_best, best
+        (left, bottom), (right, top) = self.low, self.high
+        points = []
+        i = -1
+        for (x, y), v, beta, pulse, r, ex, ey in bats:
+            i += 1
+            f = sign * (f_min + f_span * beta)
+            vx, vy = v
+            v[0] = vx = inertia * vx + (bx - x) * f
+            v[1] = vy = inertia * vy + (by - y) * f
+            if pulse > r:
+                ex = 2.0 * ex - 1.0
+                ey = 2.0 * ey - 1.0
+                if pairs:
+                    here, there = pairs[i]
+                    ex *= there[0] - here[0]
+                    ey *= there[1] - here[1]
+                if from_best:
+                    x = bx + scale * ex
+                    y = by + scale * ey
+                else:
+                    x = x + vx + scale * ex
+                    y = y + vy + scale * ey
+            else:
+                x += vx
+                y += vy
+            if left < x < right and bottom < y < top:
+                points.append([x, y])
+            else:
+                points.append(clamp([x, y]))
+        return points
+
+
+def _as_it_is(x: Vector) -> Vector:
+    return x
