@@ -64,6 +64,10 @@ setup(
             "rosbags>=0.10",
             "small-mcap>=0.10",
         ],
+        "peers": [
+            "mealpy>=3.0.2,<4",
+            "niapy>=2.7,<3",
+        ],
         "lint": [
             "mypy>=2.4,<2.5",
             "ruff>=0.17,<0.18",

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Eq. 3-10 as worked examples, every reading against a second implementation, and properties."""
 
+import functools
 import itertools
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -12,7 +14,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mfba_planner.core import bat
 from mfba_planner.core.bat import (
+    Acceptance,
     Algorithm,
     BatParams,
     BatSwarm,
@@ -23,12 +27,15 @@ from mfba_planner.core.bat import (
     Initial,
     Region,
     Schedule,
+    Step,
+    Update,
     Vector,
     Velocity,
     Walk,
     minimize,
 )
 from mfba_planner.core.errors import ConfigError, InputError
+from mfba_planner.core.flight import Law
 
 Values = list[float]
 BOX = Box((-1.0, 10.0), (3.0, 12.0))
@@ -41,8 +48,33 @@ READINGS = {
     "initial": Initial,
     "walk": Walk,
 }
+OURS = {"step": Step, "acceptance": Acceptance, "update": Update}  # not in the paper's gaps
 SILENT = {"r0": 1.0}  # rand > 1 never holds: no local walk
 WALKING = {"r0": 0.0}  # rand > 0 always holds
+
+
+ANY_READING = st.builds(
+    BatParams,
+    population=st.integers(2, 6),
+    iterations=st.integers(1, 8),
+    f_max=st.floats(0.0, 1000.0),
+    rho=st.floats(0.0, 5.0),
+    sigma=st.floats(0.0, 10.0),
+    a0=st.floats(0.0, 2.0),
+    r0=st.floats(0.0, 1.0),
+    inertia=st.sampled_from([0.0, 0.6, 1.0]),
+    **{  # type: ignore
+        name: st.sampled_from(list(kind)) for name, kind in {**READINGS, **OURS}.items()
+    },
+)
+COORDINATE = st.floats(-100.0, 100.0)
+DISCS = st.builds(Disc, st.floats(0.001, 50.0), st.tuples(COORDINATE, COORDINATE))
+BOXES = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=1, max_size=4).map(
+    lambda sides: Box(*zip(*map(sorted, sides)))  # type: ignore[arg-type]
+)
+FLAT_BOXES = st.tuples(*[st.tuples(COORDINATE, COORDINATE).map(sorted)] * 2).map(
+    lambda sides: Box(*zip(*sides))
+)
 
 
 def generator(seed: int = 7) -> np.random.Generator:
@@ -276,16 +308,19 @@ def reference(
     best_x, best_cost = x[best], cost[best]
     history: list[Any] = [list(x)]
     for t in range(1, p.iterations + 1):
-        rows = rng.random((n, 3 + d))
+        paired = p.step is Step.PAIR
+        rows = rng.random((n, 3 + d + 2 * paired))
         loudness = sum(a) / n
         tried = []
-        for i, (draw, gate, _, *epsilon) in enumerate(rows):
+        for i, (draw, gate, _, *rest) in enumerate(rows):
+            epsilon = rest[:d]
             if p.algorithm is Algorithm.BA:
                 beta = draw
             else:
                 when = t / p.iterations if p.schedule is Schedule.NORMALIZED else t
                 beta = when * math.exp(-p.rho * draw)
             f = p.f_min + (p.f_max - p.f_min) * beta
+            v[i] = v[i] * p.inertia
             if p.velocity is Velocity.TOWARDS_BEST:
                 v[i] = v[i] + f * (best_x - x[i])
             else:
@@ -294,12 +329,23 @@ def reference(
             if gate > r[i]:
                 e = np.array(epsilon if p.epsilon is Epsilon.PER_COORDINATE else epsilon[:1] * d)
                 old = best_x if p.walk is Walk.BEST else new
-                new = old + p.sigma * (2.0 * e - 1.0) * loudness
+                length: Any = 1.0
+                if paired:
+                    others = [k % n for k in range(int(rest[-2] * n) + 1, int(rest[-2] * n) + n)]
+                    length = x[others[int(rest[-1] * (n - 1))]] - x[int(rest[-2] * n)]
+                new = old + p.sigma * (2.0 * e - 1.0) * loudness * length
             tried.append(bound(new))
+        limit = {
+            Acceptance.OWN: list(cost),
+            Acceptance.BEST: [best_cost] * n,
+            Acceptance.ANY: [math.inf] * n,
+        }[p.acceptance]
         for i, new in enumerate(tried):
             new_cost = objective(new)
-            if new_cost <= cost[i] and rows[i][2] < a[i]:
+            accepted = new_cost <= limit[i] and rows[i][2] < a[i]
+            if accepted:
                 x[i], cost[i] = new, new_cost
+            if accepted or p.update is Update.ALWAYS:
                 a[i] *= p.alpha
                 r[i] = p.r0 * (1.0 - math.exp(-p.gamma * t))
             if new_cost < best_cost:
@@ -321,6 +367,132 @@ def test_every_reading_agrees_with_a_second_implementation(region: Region) -> No
                     np.array(expected), rel=1e-9, abs=1e-9
                 ), (chosen, swarm.t)
                 swarm.tell([sphere(x) for x in candidates])
+
+
+@pytest.mark.parametrize("region", [Disc(0.3), Box((-1.0, -2.0, 0.0), (3.0, 1.0, 2.0))], ids=repr)
+@pytest.mark.parametrize("inertia", [0.0, 0.6, 1.0])
+def test_our_own_options_agree_with_a_second_implementation(
+    region: Region, inertia: float
+) -> None:
+    draw = generator(3)
+    for combination in itertools.product(*OURS.values()):
+        chosen: dict[str, Any] = dict(zip(OURS, combination))
+        for name, kind in READINGS.items():
+            chosen[name] = list(kind)[int(draw.integers(2))]
+        p = BatParams(
+            population=4, iterations=6, f_max=1.5, a0=0.9, alpha=0.9, inertia=inertia, **chosen
+        )
+        swarm = BatSwarm(p, region, generator(5))
+        for expected in reference(p, region, 5, sphere):
+            candidates = swarm.ask()
+            assert np.array(candidates) == pytest.approx(np.array(expected), rel=1e-9, abs=1e-9), (
+                chosen,
+                swarm.t,
+            )
+            swarm.tell([sphere(x) for x in candidates])
+
+
+def test_a_step_of_a_pair_is_a_difference_of_two_other_places() -> None:
+    p = params(population=6, step=Step.PAIR, epsilon=Epsilon.SCALAR, f_max=0.0, **WALKING)
+    swarm, x, _ = start(p, [6.0, 5.0, 4.0, 3.0, 2.0, 1.0])
+    gaps = [b - a for a, b in itertools.permutations(x, 2)]
+    for candidate in np.array(swarm.ask()):
+        step = (candidate - x[-1]) / 0.3
+        shares = [step @ gap / (gap @ gap) for gap in gaps]
+        fits = [
+            np.allclose(step, share * gap) and abs(share) <= 1.0
+            for share, gap in zip(shares, gaps)
+        ]
+        assert any(fits)
+
+
+# --- the plane, blocks of draws, failures ---------------------------------------------------
+
+
+@given(ANY_READING, st.one_of(DISCS, FLAT_BOXES), st.integers(0, 2**32))
+def test_the_unrolled_plane_is_the_general_flight_to_the_last_bit(
+    p: BatParams, region: Region, seed: int
+) -> None:
+    fast = minimize(sphere, region, p, generator(seed))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Law, "_fly_in_the_plane", Law._fly_anywhere)
+        slow = minimize(sphere, region, p, generator(seed))
+    assert (fast.best_x, fast.best_value) == (slow.best_x, slow.best_value)
+    assert fast.candidates == slow.candidates
+
+
+@given(ANY_READING, st.integers(0, 2**32))
+def test_drawing_ahead_changes_nothing(p: BatParams, seed: int) -> None:
+    rng, other = generator(seed), generator(seed)
+    swarm = BatSwarm(p, BOX, rng)
+    for _ in range(p.iterations + 1):
+        swarm.tell([sphere(x) for x in swarm.ask()])
+    ahead = minimize(sphere, BOX, p, other)
+    assert (ahead.best_x, ahead.candidates) == (swarm.best_x, swarm.candidates)
+    assert rng.random() == other.random(), "nothing is drawn in vain"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bat, "DRAWN_AHEAD", 50)
+        assert minimize(sphere, BOX, p, generator(seed)).candidates == swarm.candidates
+
+
+FAILING: list[Any] = [
+    (math.nan, "NaN"),
+    (math.inf, "inf"),
+    (-math.inf, "-inf"),
+    (np.array([1.0, 2.0]), r"returned array of shape \(2,\)"),
+    (np.array([-1e9]), r"returned array of shape \(1,\)"),
+    (None, "returned NoneType"),
+    ("-1e9", "returned str"),
+    (1j, "returned complex"),
+    pytest.param(10**400, "returned int", id="huge"),
+    (ZeroDivisionError("x / 0"), "raised ZeroDivisionError"),
+]
+
+
+@pytest.mark.parametrize(("bad", "name"), FAILING)
+def test_a_failing_objective_is_named_and_counted_and_the_run_goes_on(bad: Any, name: str) -> None:
+    calls: list[bool] = []
+
+    def objective(x: Vector) -> Any:
+        calls.append(x[0] > 1.0)
+        if not calls[-1]:
+            return sphere(x)
+        if isinstance(bad, Exception):
+            raise bad
+        return bad
+
+    swarm = minimize(objective, BOX, BatParams(iterations=20), generator())
+    assert len(calls) == 5 * 21
+    assert 0 < sum(calls) < len(calls)
+    assert list(swarm.failures.counts.values()) == [sum(calls)]
+    assert re.match(rf"{sum(calls)} x {name}; first: {name}.* at \[", str(swarm.failures))
+    assert swarm.best_value == sphere(swarm.best_x)
+    assert swarm.best_x[0] <= 1.0
+    assert type(swarm.best_value) is float
+
+
+def test_numbers_of_other_kinds_are_numbers() -> None:
+    for kind in (int, np.float64, np.float32, np.int64, bool, np.array):
+        constant = functools.partial(lambda kind, x: kind(7), kind)
+        swarm = minimize(constant, BOX, BatParams(), generator())
+        assert not swarm.failures
+        assert swarm.best_value == float(kind(7))
+        assert str(swarm.failures) == "no failures"
+
+
+def test_an_objective_that_always_fails_is_an_error_in_one_line() -> None:
+    with pytest.raises(InputError) as error:
+        minimize(lambda x: 1.0 / 0.0, BOX, BatParams(iterations=3), generator())
+    assert str(error.value).startswith(
+        "objective failed at all 20 points (20 x raised ZeroDivisionError; first: "
+        "raised ZeroDivisionError (float division by zero) at ["
+    )
+    assert "\n" not in str(error.value)
+
+
+def test_values_whose_sum_overflows_are_still_numbers() -> None:
+    swarm = minimize(lambda x: 1e308, BOX, BatParams(), generator())
+    assert (swarm.best_value, bool(swarm.failures)) == (1e308, False)
 
 
 # --- ask and tell ---------------------------------------------------------------------------
@@ -407,23 +579,6 @@ def test_each_iteration_uses_the_same_number_of_draws_whatever_happens() -> None
 
 
 # --- properties -----------------------------------------------------------------------------
-
-ANY_READING = st.builds(
-    BatParams,
-    population=st.integers(2, 6),
-    iterations=st.integers(1, 8),
-    f_max=st.floats(0.0, 1000.0),
-    rho=st.floats(0.0, 5.0),
-    sigma=st.floats(0.0, 10.0),
-    a0=st.floats(0.0, 2.0),
-    r0=st.floats(0.0, 1.0),
-    **{name: st.sampled_from(list(kind)) for name, kind in READINGS.items()},  # type: ignore
-)
-COORDINATE = st.floats(-100.0, 100.0)
-DISCS = st.builds(Disc, st.floats(0.001, 50.0), st.tuples(COORDINATE, COORDINATE))
-BOXES = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=1, max_size=4).map(
-    lambda sides: Box(*zip(*map(sorted, sides)))  # type: ignore[arg-type]
-)
 
 
 @given(ANY_READING, st.one_of(DISCS, BOXES), st.integers(0, 2**32))

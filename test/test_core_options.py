@@ -230,6 +230,7 @@ def test_section_6_2_gives_the_defaults() -> None:
         (BatParams, "f_max", 0.0, 1000.0),
         (BatParams, "sigma", 0.0, 1e6),
         (BatParams, "rho", 0.0, 100.0),
+        (BatParams, "inertia", 0.0, 1.0),
         (PlannerParams, "speed_mps", 0.01, 100.0),
         (PlannerParams, "step_length_m", 0.001, 100.0),
         (PlannerParams, "goal_tolerance_m", 1e-6, 10.0),

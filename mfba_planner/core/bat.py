@@ -132,7 +132,7 @@ class BatSwarm:
         self._asked = False
         try:
             total = sum(values)
-        except TypeError:
+        except Exception:  # of what is no number
             total = None
         if type(total) is not float or total - total != 0.0:  # where sums overflow, look closer
             values = [self.failures.number(v, x) for v, x in zip(values, self.candidates)]
@@ -202,34 +202,27 @@ class BatSwarm:
 
     def _accept(self, values: Sequence[float]) -> None:
         """Take candidates that are good enough, with probability A_i; then eq. 8 and 9."""
-        p, own, a = self.params, self._values, self._a
+        p, own, a, u, stride = self.params, self._values, self._a, self._uniforms, self._stride
         limits = own
         if self._limit is not None:
             limit = self.best_value if self._limit is Acceptance.BEST else math.inf
             limits = [limit] * len(own)
-        gates = self._uniforms[2 :: self._stride]
-        changed: Sequence[int] = [
-            i
-            for i, (value, limit, gate) in enumerate(zip(values, limits, gates))
-            if value <= limit and gate < a[i]
-        ]
-        for i in changed:
-            self._x[i] = self.candidates[i]
-            own[i] = values[i]
-        if self._always:
-            changed = range(len(own))
-        if changed:
-            rate = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
-            for i in changed:
+        always = self._always
+        for i, value in enumerate(values):
+            accepted = value <= limits[i] and u[i * stride + 2] < a[i]
+            if accepted:
+                self._x[i] = self.candidates[i]
+                own[i] = value
+            if accepted or always:
                 a[i] *= p.alpha  # eq. 8
-                self._r[i] = rate
+                self._r[i] = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
 
     def _keep_best(self, points: list[Vector], values: Sequence[float]) -> None:
-        if values[0] != values[0]:  # min() would stop at a NaN in front
-            values = [math.inf if v != v else v for v in values]
-        least = min(values)
-        if least < self.best_value:
-            self.best_x, self.best_value = points[values.index(least)], float(least)
+        best = self.best_value
+        for x, value in zip(points, values):
+            if value < best:
+                self.best_x, self.best_value = x, value
+                best = value
 
     def _bounded(self, points: list[Vector]) -> list[Vector]:
         if self.params.bounds is Bounds.NONE:
