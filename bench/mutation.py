@@ -35,6 +35,11 @@ ROOT = Path(__file__).resolve().parent.parent
 # The tests that look at a module most closely come first.
 TESTS = {
     "bat": ["bat", "options", "planner", "episode"],
+    "bat_params": ["options", "bat"],
+    "flight": ["bat", "planner"],
+    "region": ["bat", "planner"],
+    "failures": ["bat"],
+    "batch": ["batch"],
     "sensing": ["sensing", "options", "planner", "episode"],
     "gaps": ["gaps", "planner", "episode"],
     "world": ["world", "episode"],
@@ -172,7 +177,7 @@ class _Quick:
         settings.load_profile("mutation")
 
 
-def _start(module: str, tree: ast.Module) -> int:
+def start(module: str, tree: ast.Module, *plugins: Any) -> int:
     """Start the tests against a mutant in a process of its own; return its id."""
     pid = os.fork()
     if pid:
@@ -189,7 +194,7 @@ def _start(module: str, tree: ast.Module) -> int:
     arguments = ["-x", "-q", "--assert=plain", "-p", "no:cacheprovider", "-k", SLOW]
     code = 1
     try:
-        code = int(pytest.main([*arguments, *files], plugins=[_Quick()]))
+        code = int(pytest.main([*arguments, *files], plugins=[_Quick(), *plugins]))
     finally:
         os._exit(code)
 
@@ -201,7 +206,7 @@ def _survivors(module: str, trees: Sequence[ast.Module], jobs: int) -> list[bool
     while waiting or running:
         while waiting and len(running) < jobs:
             index = waiting.pop(0)
-            running[_start(module, trees[index])] = index
+            running[start(module, trees[index])] = index
         pid, status = os.wait()
         alive[running.pop(pid)] = status == 0
     return alive

@@ -89,7 +89,10 @@ class BatSwarm:
         u = rng.random(n * d).tolist()
         self._x = self._bounded(
             [
-                [lo + sign * uj * (hi - lo) for lo, hi, uj in zip(low, high, u[k : k + d])]
+                [
+                    lo + sign * uj * (hi - lo)  # eq. 3
+                    for lo, hi, uj in zip(low, high, u[k : k + d])
+                ]
                 for k in range(0, n * d, d)
             ]
         )

@@ -84,10 +84,10 @@ class Law:
         i = -1
         for (x, y), v, beta, pulse, r, ex, ey in bats:
             i += 1
-            f = sign * (f_min + f_span * beta)
+            f = sign * (f_min + f_span * beta)  # eq. 4
             vx, vy = v
-            v[0] = vx = inertia * vx + (bx - x) * f
-            v[1] = vy = inertia * vy + (by - y) * f
+            v[0] = vx = inertia * vx + (bx - x) * f  # eq. 5
+            v[1] = vy = inertia * vy + (by - y) * f  # eq. 5
             if pulse > r:
                 ex = 2.0 * ex - 1.0
                 ey = 2.0 * ey - 1.0
@@ -96,14 +96,14 @@ class Law:
                     ex *= there[0] - here[0]
                     ey *= there[1] - here[1]
                 if from_best:
-                    x = bx + scale * ex
-                    y = by + scale * ey
+                    x = bx + scale * ex  # eq. 7
+                    y = by + scale * ey  # eq. 7
                 else:
-                    x = x + vx + scale * ex
-                    y = y + vy + scale * ey
+                    x = x + vx + scale * ex  # eq. 7
+                    y = y + vy + scale * ey  # eq. 7
             else:
-                x += vx
-                y += vy
+                x += vx  # eq. 6
+                y += vy  # eq. 6
             if left < x < right and bottom < y < top:
                 points.append([x, y])
             else:

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Break each line that is an equation of the paper, once, and name the test that notices.
+
+    .venv/bin/python bench/equations.py          # one change per line
+    .venv/bin/python bench/equations.py --all    # every change that bench/mutation.py knows
+
+The lines are those marked `# eq. N` in the core: eq. 3-10 in the swarm (the plane unrolled, and
+any dimension) and once more in the batched engine. Exit code 1 where a change goes unnoticed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from mutation import ROOT, mutants, start
+
+MODULES = ("bat", "flight", "batch")
+MARK = re.compile(r"# eq\. (\d+)$")
+
+
+class _Witness:
+    """Writes the name of each failed test into a pipe."""
+
+    def __init__(self, pipe: int) -> None:
+        self.pipe = pipe
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        """Called by pytest after each phase of a test."""
+        if report.failed:
+            os.write(self.pipe, f"{report.nodeid.partition('::')[2]}\n".encode())
+
+    def pytest_collectreport(self, report: Any) -> None:
+        """Called by pytest where a file of tests cannot even be read."""
+        if report.failed:
+            os.write(self.pipe, b"(the tests do not load)\n")
+
+
+def witness(module: str, tree: ast.Module) -> str:
+    """Name of the test that fails first, "" for none."""
+    reading, writing = os.pipe()
+    pid = start(module, tree, _Witness(writing))
+    os.close(writing)
+    with os.fdopen(reading) as lines:
+        names = lines.read().split("\n")
+    _, status = os.waitpid(pid, 0)
+    return names[0] or ("" if status == 0 else "(time or memory ran out)")
+
+
+def changes(module: str, every: bool) -> Iterator[tuple[int, int, str, ast.Module]]:
+    """Yield (equation, line, what was changed, changed tree)."""
+    text = (ROOT / "mfba_planner" / "core" / f"{module}.py").read_text()
+    marks = {
+        number: int(found[1])
+        for number, line in enumerate(text.splitlines(), start=1)
+        if (found := MARK.search(line))
+    }
+    seen: set[int] = set()
+    for line, change, tree in mutants(ast.parse(text)):
+        before, _, after = change.partition("  ->  ")
+        deleted = before == after  # of a statement with a body only the head is shown
+        if line in marks and (every or (line not in seen and not deleted)):
+            seen.add(line)
+            yield marks[line], line, "the line, deleted" if deleted else change, tree
+    for line in set(marks) - seen:
+        raise SystemExit(f"{module}.py:{line}: marked as an equation, but nothing to change")
+
+
+def main(argv: Sequence[str]) -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--all", action="store_true", help="every change of every line")
+    options = parser.parse_args(argv)
+    rows = []
+    for module in MODULES:
+        for equation, line, change, tree in changes(module, options.all):
+            rows.append((equation, f"{module}.py:{line}", change, witness(module, tree)))
+            print(".", end="", file=sys.stderr, flush=True)
+    print("", file=sys.stderr)
+    print("| eq. | line | change | first test that fails |\n|---|---|---|---|")
+    for equation, place, change, name in sorted(rows, key=lambda row: row[0]):
+        print(f"| {equation} | {place} | `{change}` | {name or '**none**'} |")
+    missed = [row for row in rows if not row[3]]
+    print(f"\n{len(rows)} changes, {len(missed)} unnoticed")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
