@@ -36,7 +36,7 @@ POPULATION, ITERATIONS, FLOOR = 40, 200, 1e-12
 BUDGET: dict[str, Any] = {"population": POPULATION, "iterations": ITERATIONS}
 ROWS = CACHED_BATS // POPULATION  # runs that fly at once
 GENERATIONS = 4  # of children, after the random settings
-FINALS = ((24, 6), (4, 30))  # settings and rounds (of 17 runs per function)
+FINAL = (12, 6)  # settings, and rounds of 17 runs per function
 
 
 @dataclass(frozen=True)
@@ -257,9 +257,10 @@ def main() -> None:
         born = [child(rng, parents) for _ in range(options.random // 2)]
         found += judged(born, 1, options.seed + k, f"children {k}")
         found.sort(key=lambda pair: pair[0])
-    for k, (count, rounds) in enumerate(FINALS, start=GENERATIONS + 1):
-        finalists = [chosen for _, chosen in found[:count]]
-        found = judged(finalists, rounds, options.seed + k, f"final of {count}")
+    unique = {tuple(chosen.items()): chosen for _, chosen in found}  # the best first
+    count, rounds = FINAL
+    finalists = list(unique.values())[:count]
+    found = judged(finalists, rounds, options.seed + GENERATIONS + 1, "final")
     rivals = {"the winner": BatParams(**BUDGET, **found[0][1])}
     rivals |= {name: replace(params, **BUDGET) for name, params in SWARMS.items()}
     compare(rivals, 200, options.seed + 100)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from numpy.random import Generator
@@ -24,7 +24,7 @@ from .bat_params import (
 )
 from .errors import InputError
 from .failures import Failures
-from .flight import Law
+from .flight import Law, Pair
 from .region import Box, Disc, Region, Vector
 
 __all__ = [
@@ -51,8 +51,8 @@ class BatSwarm:
     """
 
     __slots__ = (
-        "_a", "_ahead", "_always", "_asked", "_d", "_drawn", "_each", "_law", "_limit",
-        "_normalized", "_paired", "_r", "_random", "_rng", "_stride", "_uniforms", "_v",
+        "_a", "_ahead", "_always", "_asked", "_each", "_flight", "_gate", "_gates", "_limit",
+        "_normalized", "_paired", "_r", "_random", "_readers", "_rng", "_stride", "_v",
         "_values", "_x",
         "best_value", "best_x", "candidates", "failures", "horizon", "params", "region", "t",
     )  # fmt: skip
@@ -74,7 +74,7 @@ class BatSwarm:
         self.params = params
         self.horizon = horizon or params.iterations
         self.region = region
-        self._law = Law.of(params, region)
+        self._flight = Law.of(params, region).flight(len(region.span()[0]))
         self.t = 0
         self.best_x: Vector = []
         self.best_value = math.inf
@@ -96,7 +96,7 @@ class BatSwarm:
                 for k in range(0, n * d, d)
             ]
         )
-        self._d, self._stride = d, draws_per_bat(params, d)
+        self._stride = draws_per_bat(params, d)
         self._each = params.epsilon is Epsilon.PER_COORDINATE
         self._paired = params.step is Step.PAIR
         self._random = params.algorithm is Algorithm.BA
@@ -107,8 +107,9 @@ class BatSwarm:
         self._a = [params.a0] * n
         self._r = [params.r0] * n
         self._values = [math.inf] * n
-        self._uniforms: Vector = []  # of this iteration
-        self._drawn: list[Vector] = []  # of those to come, the next one last
+        self._gates: Vector = []  # acceptance draws of the iterations drawn already
+        self._gate = 0  # where this iteration's begin
+        self._readers: list[Iterator[float]] = []
         self.candidates = list(self._x)
 
     def ask(self) -> list[Vector]:
@@ -153,7 +154,8 @@ class BatSwarm:
         """
         if self._asked or not self.best_x:
             raise InputError("resettle before tell: tell the values of the candidates first")
-        self.region, self._law = region, Law.of(self.params, region)
+        self.region = region
+        self._flight = Law.of(self.params, region).flight(len(self.best_x))
         self._x = self._bounded(self._x)
         self._values = [objective(x) for x in self._x]
         self.best_x = self._bounded([self.best_x])[0]
@@ -162,57 +164,72 @@ class BatSwarm:
 
     def beta(self, u: float) -> float:
         """Beta of eq. 4 from a uniform draw u: u itself (BA), or eq. 10 (MFBA)."""
-        return self._betas([u])[0]
+        return self._time() * self._decays([u])[0]
 
-    def _betas(self, u: Vector) -> Vector:
-        """Beta of every bat; the normalized t stays in [0, 1] beyond iteration T as well."""
+    def _time(self) -> float:
+        """The t of eq. 10; normalized it stays in [0, 1] beyond iteration T as well."""
+        if self._random:
+            return 1.0
+        return min(1.0, self.t / self.horizon) if self._normalized else self.t
+
+    def _decays(self, u: Vector) -> Vector:
+        """What t is multiplied with to give beta."""
         if self._random:
             return u
-        t = min(1.0, self.t / self.horizon) if self._normalized else self.t
         exp, rate = math.exp, -self.params.rho
-        return [t * exp(rate * ui) for ui in u]  # eq. 10
+        return [exp(rate * ui) for ui in u]  # eq. 10
 
-    def _draw(self, size: int) -> Vector:
-        """Uniforms of one iteration.
+    def _draw(self) -> None:
+        """Draw the uniforms of the next iterations, sorted by what they are for.
 
         Every bat draws everything each time, used or not, so that one draw more or less never
-        shifts the others.
+        shifts the others. Readers take one value per bat and go on where they stopped.
         """
-        if not self._drawn:
-            count = max(1, min(self._ahead - self.t + 1, DRAWN_AHEAD // size))
-            self._drawn = self._rng.random((count, size)).tolist()[::-1]
-        return self._drawn.pop()
+        n, d, stride = self.params.population, len(self.best_x), self._stride
+        count = max(1, min(self._ahead - self.t + 1, DRAWN_AHEAD // (n * stride)))
+        u = self._rng.random(count * n * stride).tolist()
+        # An epsilon for each coordinate, or the first one for all of them.
+        epsilons = [u[3 + (j if self._each else 0) :: stride] for j in range(d)]
+        sorts = [self._decays(u[::stride]), u[1::stride], *epsilons]
+        if self._paired:
+            sorts += [u[3 + d :: stride], u[4 + d :: stride]]
+        self._readers = [iter(values) for values in sorts]
+        self._gates = u[2::stride]
+        self._gate = 0
 
     def _fly(self) -> list[Vector]:
         """Candidates of one iteration, eq. 4-7."""
         p = self.params
-        n, d, stride = p.population, self._d, self._stride
-        u = self._uniforms = self._draw(n * stride)
-        scale = p.sigma * math.fsum(self._a) / n
-        # An epsilon for each coordinate, or the first one for all of them.
-        epsilons = [u[3 + j :: stride] for j in range(d)] if self._each else [u[3::stride]] * d
-        pairs = self._pairs(u[3 + d :: stride], u[4 + d :: stride]) if self._paired else None
-        bats = zip(self._x, self._v, self._betas(u[::stride]), u[1::stride], self._r, *epsilons)
-        return self._law.fly(bats, self.best_x, scale, pairs)
+        self._gate += p.population
+        if self._gate >= len(self._gates):
+            self._draw()
+        scale = p.sigma * math.fsum(self._a) / p.population
+        decays, pulses, *others = self._readers
+        if self._paired:
+            pairs = self._pairs(*others[-2:])
+            others = others[:-2]
+        else:
+            pairs = None
+        bats = zip(self._x, self._v, self._r, decays, pulses, *others)
+        return self._flight(bats, self._time(), self.best_x, scale, pairs)
 
-    def _pairs(self, ones: Vector, others: Vector) -> list[tuple[Vector, Vector]]:
+    def _pairs(self, ones: Iterator[float], others: Iterator[float]) -> list[Pair]:
         """For every bat, where two different bats picked at random are."""
-        n, x = self.params.population, self._x
-        return [
-            (x[a], x[(a + 1 + int(other * (n - 1))) % n])
-            for a, other in zip((int(one * n) for one in ones), others)
-        ]
+        x = self._x
+        n = len(x)
+        picked = ((int(one * n), int(other * (n - 1))) for _, one, other in zip(x, ones, others))
+        return [(x[a], x[(a + 1 + b) % n]) for a, b in picked]
 
     def _accept(self, values: Sequence[float]) -> None:
         """Take candidates that are good enough, with probability A_i; then eq. 8 and 9."""
-        p, own, a, u, stride = self.params, self._values, self._a, self._uniforms, self._stride
+        p, own, a, gates, gate = self.params, self._values, self._a, self._gates, self._gate
         limits = own
         if self._limit is not None:
             limit = self.best_value if self._limit is Acceptance.BEST else math.inf
             limits = [limit] * len(own)
         always = self._always
         for i, value in enumerate(values):
-            accepted = value <= limits[i] and u[i * stride + 2] < a[i]
+            accepted = value <= limits[i] and gates[gate + i] < a[i]
             if accepted:
                 self._x[i] = self.candidates[i]
                 own[i] = value

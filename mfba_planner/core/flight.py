@@ -11,7 +11,10 @@ from typing import Any
 from .bat_params import BatParams, Bounds, Velocity, Walk
 from .region import Region, Vector
 
+Bats = Iterable[Any]
 Pair = tuple[Vector, Vector]
+Pairs = list[Pair] | None
+Flight = Callable[[Bats, float, Vector, float, Pairs], list[Vector]]
 
 
 @dataclass(slots=True)
@@ -39,26 +42,22 @@ class Law:
         f_span, from_best = params.f_max - params.f_min, params.walk is Walk.BEST
         return cls(params.f_min, f_span, sign, params.inertia, from_best, low, high, clamp)
 
-    def fly(
-        self, bats: Iterable[Any], best: Vector, scale: float, pairs: list[Pair] | None
-    ) -> list[Vector]:
-        """Candidates of the bats, whose velocities change.
+    def flight(self, d: int) -> Flight:
+        """What moves n bats in d dimensions: (bats, t, best, scale, pairs) -> candidates.
 
-        A bat is its x, v, beta, the draw that decides whether it walks, r, and d draws for
-        epsilon; scale is sigma times the mean loudness; a pair makes a bat's walk as long as
-        the pair is apart.
+        A bat is its x, its v (which changes), r, what t is multiplied with to give beta, the
+        draw that decides whether it walks, and d draws for epsilon. scale is sigma times the
+        mean loudness; a pair makes a bat's walk as long as the pair is apart.
         """
-        if len(best) == 2:
-            return self._fly_in_the_plane(bats, best, scale, pairs)
-        return self._fly_anywhere(bats, best, scale, pairs)
+        return self._fly_in_the_plane if d == 2 else self._fly_anywhere
 
     def _fly_anywhere(
-        self, bats: Iterable[Any], best: Vector, scale: float, pairs: list[Pair] | None
+        self, bats: Bats, t: float, best: Vector, scale: float, pairs: Pairs
     ) -> list[Vector]:
         inertia, clamp = self.inertia, self.clamp
         points = []
-        for i, (x, v, beta, pulse, r, *draws) in enumerate(bats):
-            f = self.sign * (self.f_min + self.f_span * beta)  # eq. 4
+        for i, (x, v, r, decay, pulse, *draws) in enumerate(bats):
+            f = self.sign * (self.f_min + self.f_span * (t * decay))  # eq. 4
             point = []
             for j, (xj, bj, draw) in enumerate(zip(x, best, draws)):
                 v[j] = vj = inertia * v[j] + (bj - xj) * f  # eq. 5
@@ -74,7 +73,7 @@ class Law:
         return points
 
     def _fly_in_the_plane(
-        self, bats: Iterable[Any], best: Vector, scale: float, pairs: list[Pair] | None
+        self, bats: Bats, t: float, best: Vector, scale: float, pairs: Pairs
     ) -> list[Vector]:
         """Two coordinates unrolled: the same numbers to the last bit, in half the time."""
         f_min, f_span, sign, inertia = self.f_min, self.f_span, self.sign, self.inertia
@@ -82,9 +81,9 @@ class Law:
         (left, bottom), (right, top) = self.low, self.high
         points = []
         i = -1
-        for (x, y), v, beta, pulse, r, ex, ey in bats:
+        for (x, y), v, r, decay, pulse, ex, ey in bats:
             i += 1
-            f = sign * (f_min + f_span * beta)  # eq. 4
+            f = sign * (f_min + f_span * (t * decay))  # eq. 4
             vx, vy = v
             v[0] = vx = inertia * vx + (bx - x) * f  # eq. 5
             v[1] = vy = inertia * vy + (by - y) * f  # eq. 5
