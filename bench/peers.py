@@ -235,6 +235,7 @@ def main() -> None:
     parser.add_argument("--peer-runs", type=int, default=100)
     parser.add_argument("--rounds", type=int, default=15, help="of the measurement of speed")
     parser.add_argument("--all", action="store_true", help="quality of mealpy's OriginalBA too")
+    parser.add_argument("--only", choices=("speed", "quality"))
     options = parser.parse_args()
     warnings.simplefilter("ignore")  # the peers' own
     versions = " ".join(
@@ -245,7 +246,10 @@ def main() -> None:
         f"d = {DIMENSION}, population {POPULATION}, {ITERATIONS} iterations, {EVALUATIONS} "
         f"evaluations; seeds 0..{options.runs - 1}, of the peers 0..{options.peer_runs - 1}"
     )
-    speed(options.rounds)
+    if options.only != "quality":
+        speed(options.rounds)
+    if options.only == "speed":
+        return
     peers = [name for name in PEERS if options.all or name != "mealpy OriginalBA"]
     quality(options.runs, options.peer_runs, peers)
 
