@@ -164,9 +164,8 @@ def quality(keys: Sequence[str], runs: int, peer_runs: int, peers: Sequence[str]
                 wins.setdefault(name, []).append(key)
     print("\n`best` has the lower mean than")
     for name in ("random search", *peers):
-        print(
-            f"  {name:18} on {len(wins.get(name, []))} of {len(keys)}: {' '.join(wins.get(name, []))}"
-        )
+        won = wins.get(name, [])
+        print(f"  {name:18} on {len(won)} of {len(keys)}: {' '.join(won)}")
 
 
 def single(params: BatParams, box: Box) -> Callable[[int], object]:
