@@ -52,8 +52,8 @@ class BatSwarm:
 
     __slots__ = (
         "_a", "_ahead", "_always", "_asked", "_each", "_flight", "_gate", "_gates", "_limit",
-        "_normalized", "_paired", "_picks", "_r", "_random", "_readers", "_rng", "_scale", "_stride",
-        "_v", "_values", "_x",
+        "_normalized", "_paired", "_picks", "_r", "_random", "_readers", "_rng", "_scale",
+        "_stride", "_v", "_values", "_x",
         "best_value", "best_x", "candidates", "failures", "horizon", "params", "region", "t",
     )  # fmt: skip
 
