@@ -21,6 +21,7 @@ from typing import Any
 from mutation import ROOT, mutants, start
 
 MODULES = ("bat", "flight", "batch")
+_DELETED = "the line, deleted"
 MARK = re.compile(r"# eq\. (\d+)$")
 
 
@@ -60,15 +61,18 @@ def changes(module: str, every: bool) -> Iterator[tuple[int, int, str, ast.Modul
         for number, line in enumerate(text.splitlines(), start=1)
         if (found := MARK.search(line))
     }
-    seen: set[int] = set()
+    chosen: dict[int, tuple[str, ast.Module]] = {}
     for line, change, tree in mutants(ast.parse(text)):
         before, _, after = change.partition("  ->  ")
         deleted = before == after  # of a statement with a body only the head is shown
-        if line in marks and (every or (line not in seen and not deleted)):
-            seen.add(line)
-            yield marks[line], line, "the line, deleted" if deleted else change, tree
-    for line in set(marks) - seen:
-        raise SystemExit(f"{module}.py:{line}: marked as an equation, but nothing to change")
+        if line not in marks:
+            continue
+        if every:
+            yield marks[line], line, _DELETED if deleted else change, tree
+        elif line not in chosen or chosen[line][0] == _DELETED:
+            chosen[line] = _DELETED if deleted else change, tree
+    for line, (change, tree) in chosen.items():
+        yield marks[line], line, change, tree
 
 
 def main(argv: Sequence[str]) -> int:

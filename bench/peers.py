@@ -141,10 +141,10 @@ def ours() -> dict[str, BatParams]:
     return found | {"best": replace(SWARMS["best"], **budget)}
 
 
-def quality(runs: int, peer_runs: int, peers: Sequence[str]) -> None:
+def quality(keys: Sequence[str], runs: int, peer_runs: int, peers: Sequence[str]) -> None:
     """Print mean, median, success and the wins of `best`."""
     wins: dict[str, list[str]] = {}
-    for key, function in FUNCTIONS.items():
+    for key, function in ((key, FUNCTIONS[key]) for key in keys):
         least = function.minimum(DIMENSION)
         print(f"\n{key} {function.title}: minimum {least:.7g}")
         print(f"{'':18}{'runs':>6}{'mean':>12}   {'95 % interval':25}{'median':>12}{'success':>9}")
@@ -164,7 +164,8 @@ def quality(runs: int, peer_runs: int, peers: Sequence[str]) -> None:
                 wins.setdefault(name, []).append(key)
     print("\n`best` has the lower mean than")
     for name in ("random search", *peers):
-        print(f"  {name:18} on {len(wins.get(name, []))} of 6: {' '.join(wins.get(name, []))}")
+        won = wins.get(name, [])
+        print(f"  {name:18} on {len(won)} of {len(keys)}: {' '.join(won)}")
 
 
 def single(params: BatParams, box: Box) -> Callable[[int], object]:
@@ -235,6 +236,8 @@ def main() -> None:
     parser.add_argument("--peer-runs", type=int, default=100)
     parser.add_argument("--rounds", type=int, default=15, help="of the measurement of speed")
     parser.add_argument("--all", action="store_true", help="quality of mealpy's OriginalBA too")
+    parser.add_argument("--functions", nargs="+", choices=FUNCTIONS, default=list(FUNCTIONS))
+    parser.add_argument("--only", choices=("speed", "quality"))
     options = parser.parse_args()
     warnings.simplefilter("ignore")  # the peers' own
     versions = " ".join(
@@ -245,9 +248,12 @@ def main() -> None:
         f"d = {DIMENSION}, population {POPULATION}, {ITERATIONS} iterations, {EVALUATIONS} "
         f"evaluations; seeds 0..{options.runs - 1}, of the peers 0..{options.peer_runs - 1}"
     )
-    speed(options.rounds)
+    if options.only != "quality":
+        speed(options.rounds)
+    if options.only == "speed":
+        return
     peers = [name for name in PEERS if options.all or name != "mealpy OriginalBA"]
-    quality(options.runs, options.peer_runs, peers)
+    quality(options.functions, options.runs, options.peer_runs, peers)
 
 
 if __name__ == "__main__":

@@ -726,6 +726,20 @@ def test_box_refuses(lower: Any, upper: Any, message: str) -> None:
         Box(lower, upper)
 
 
+def test_box_takes_lists_and_arrays_of_numbers() -> None:
+    numbers: list[Any] = [[-1, 10], np.array([-1.0, 10.0]), np.array([-1, 10])]
+    for lower in numbers:
+        box = Box(lower, (3, 12))
+        assert box == BOX
+        assert {type(v) for v in (*box.lower, *box.upper)} == {float}
+
+
+@pytest.mark.parametrize("edge", [5.0, None, ("a", "b"), ([1.0], [2.0])])
+def test_box_refuses_what_is_no_numbers(edge: Any) -> None:
+    with pytest.raises(ConfigError, match=r"^box from .*: give d numbers for each$"):
+        Box(edge, (3.0, 12.0))
+
+
 def test_disc_by_hand() -> None:
     disc = Disc(5.0, (1.0, 2.0))
     assert disc.span() == ([-4.0, -3.0], [6.0, 7.0])

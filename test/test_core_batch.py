@@ -69,9 +69,11 @@ def generators(runs: int, seed: int = 7) -> list[np.random.Generator]:
 
 
 def bowl(x: Vector) -> float:
-    """NaN in a corner, infinite in another, two valleys."""
+    """NaN in a corner, -inf in another, inf on a side, two valleys."""
     if x[0] > 0.9 and x[-1] > 0.2:
         return math.nan
+    if x[0] > 0.9 and x[-1] < -1.5:
+        return -math.inf
     total = 0.0
     for v in x:
         total = total + (v * v - 0.3) * (v * v - 0.3) + 0.1 * v
@@ -85,6 +87,7 @@ def bowls(x: np.ndarray) -> np.ndarray:
             v = x[..., j]
             total = total + (v * v - 0.3) * (v * v - 0.3) + 0.1 * v
     total = np.where(x[..., 0] > -0.9, total, math.inf)
+    total = np.where((x[..., 0] > 0.9) & (x[..., -1] < -1.5), -math.inf, total)
     return np.where((x[..., 0] > 0.9) & (x[..., -1] > 0.2), math.nan, total)
 
 
@@ -100,6 +103,7 @@ def test_each_run_equals_the_single_engine_bit_by_bit(
             swarm.tell([bowl(x) for x in swarm.ask()])
             assert result.history[i, t] == swarm.best_value
         assert result.best_value[i] == swarm.best_value
+        assert result.failures[i] == sum(swarm.failures.counts.values())
         assert result.best_x[i].tobytes() == np.array(swarm.best_x).tobytes()
         assert ours[i].random() == rng.random(), "both took the same number of draws"
 

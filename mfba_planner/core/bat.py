@@ -52,7 +52,7 @@ class BatSwarm:
 
     __slots__ = (
         "_a", "_ahead", "_always", "_asked", "_each", "_flight", "_gate", "_gates", "_limit",
-        "_normalized", "_paired", "_r", "_random", "_readers", "_rng", "_stride", "_v",
+        "_normalized", "_paired", "_r", "_random", "_readers", "_rng", "_scale", "_stride", "_v",
         "_values", "_x",
         "best_value", "best_x", "candidates", "failures", "horizon", "params", "region", "t",
     )  # fmt: skip
@@ -105,6 +105,7 @@ class BatSwarm:
         self._limit = None if params.acceptance is Acceptance.OWN else params.acceptance
         self._v = [[0.0] * d for _ in range(n)]
         self._a = [params.a0] * n
+        self._scale = params.sigma * math.fsum(self._a) / n  # of eq. 7
         self._r = [params.r0] * n
         self._values = [math.inf] * n
         self._gates: Vector = []  # acceptance draws of the iterations drawn already
@@ -138,14 +139,16 @@ class BatSwarm:
             total = sum(values)
         except Exception:  # of what is no number
             total = None
-        if type(total) is not float or total - total != 0.0:  # where sums overflow, look closer
+        finite = type(total) is float and total - total == 0.0
+        if not finite:  # or the sum has overflowed
             values = [self.failures.number(v, x) for v, x in zip(values, self.candidates)]
         if not self.best_x:
             self.best_x = self.candidates[0]
             self._values = [math.inf if v != v else v for v in values]
         else:
             self._accept(values)
-        self._keep_best(self.candidates, values)
+        if not finite or min(values) < self.best_value:
+            self._keep_best(self.candidates, values)
 
     def resettle(self, region: Region, objective: Callable[[Vector], float]) -> None:
         """Draw bats and best into another region and value them again, between tell and ask.
@@ -203,7 +206,6 @@ class BatSwarm:
         self._gate += p.population
         if self._gate >= len(self._gates):
             self._draw()
-        scale = p.sigma * math.fsum(self._a) / p.population
         decays, pulses, *others = self._readers
         if self._paired:
             pairs = self._pairs(*others[-2:])
@@ -211,7 +213,7 @@ class BatSwarm:
         else:
             pairs = None
         bats = zip(self._x, self._v, self._r, decays, pulses, *others)
-        return self._flight(bats, self._time(), self.best_x, scale, pairs)
+        return self._flight(bats, self._time(), self.best_x, self._scale, pairs)
 
     def _pairs(self, ones: Iterator[float], others: Iterator[float]) -> list[Pair]:
         """For every bat, where two different bats picked at random are."""
@@ -227,15 +229,18 @@ class BatSwarm:
         if self._limit is not None:
             limit = self.best_value if self._limit is Acceptance.BEST else math.inf
             limits = [limit] * len(own)
-        always = self._always
+        always = changed = self._always
         for i, value in enumerate(values):
             accepted = value <= limits[i] and gates[gate + i] < a[i]
             if accepted:
                 self._x[i] = self.candidates[i]
                 own[i] = value
             if accepted or always:
+                changed = True
                 a[i] *= p.alpha  # eq. 8
                 self._r[i] = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
+        if changed:
+            self._scale = p.sigma * math.fsum(a) / p.population
 
     def _keep_best(self, points: list[Vector], values: Sequence[float]) -> None:
         best = self.best_value

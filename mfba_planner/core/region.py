@@ -34,6 +34,14 @@ class Box:
 
     def __post_init__(self) -> None:
         """Refuse a box in which nothing can be searched."""
+        try:
+            for name in ("lower", "upper"):
+                edge = tuple(float(v) for v in getattr(self, name))
+                object.__setattr__(self, name, edge)
+        except (TypeError, ValueError):
+            raise ConfigError(
+                f"box from {self.lower!r} to {self.upper!r}: give d numbers for each"
+            ) from None
         if not self.lower or len(self.lower) != len(self.upper):
             raise ConfigError(
                 f"box of {len(self.lower)} lower and {len(self.upper)} upper bounds: "
