@@ -52,8 +52,8 @@ class BatSwarm:
 
     __slots__ = (
         "_a", "_ahead", "_always", "_asked", "_each", "_flight", "_gate", "_gates", "_limit",
-        "_normalized", "_paired", "_r", "_random", "_readers", "_rng", "_scale", "_stride", "_v",
-        "_values", "_x",
+        "_normalized", "_paired", "_picks", "_r", "_random", "_readers", "_rng", "_scale",
+        "_stride", "_v", "_values", "_x",
         "best_value", "best_x", "candidates", "failures", "horizon", "params", "region", "t",
     )  # fmt: skip
 
@@ -111,6 +111,7 @@ class BatSwarm:
         self._gates: Vector = []  # acceptance draws of the iterations drawn already
         self._gate = 0  # where this iteration's begin
         self._readers: list[Iterator[float]] = []
+        self._picks: list[Iterator[float]] = []
         self.candidates = list(self._x)
 
     def ask(self) -> list[Vector]:
@@ -194,9 +195,9 @@ class BatSwarm:
         # An epsilon for each coordinate, or the first one for all of them.
         epsilons = [u[3 + (j if self._each else 0) :: stride] for j in range(d)]
         sorts = [self._decays(u[::stride]), u[1::stride], *epsilons]
-        if self._paired:
-            sorts += [u[3 + d :: stride], u[4 + d :: stride]]
         self._readers = [iter(values) for values in sorts]
+        if self._paired:
+            self._picks = [iter(u[3 + d :: stride]), iter(u[4 + d :: stride])]
         self._gates = u[2::stride]
         self._gate = 0
 
@@ -206,13 +207,8 @@ class BatSwarm:
         self._gate += p.population
         if self._gate >= len(self._gates):
             self._draw()
-        decays, pulses, *others = self._readers
-        if self._paired:
-            pairs = self._pairs(*others[-2:])
-            others = others[:-2]
-        else:
-            pairs = None
-        bats = zip(self._x, self._v, self._r, decays, pulses, *others)
+        pairs = self._pairs(*self._picks) if self._paired else None
+        bats = zip(self._x, self._v, self._r, *self._readers)
         return self._flight(bats, self._time(), self.best_x, self._scale, pairs)
 
     def _pairs(self, ones: Iterator[float], others: Iterator[float]) -> list[Pair]:
@@ -264,16 +260,17 @@ def minimize(
     that raised or returned no number every time.
     """
     swarm = BatSwarm(params, region, rng, ahead=params.iterations)
+    n, ask, tell = params.population, swarm.ask, swarm.tell
     for _ in range(params.iterations + 1):
         values: list[Any] = []
-        points = iter(swarm.ask())
-        while len(values) < params.population:
+        points = iter(ask())
+        while len(values) < n:
             try:
                 for x in points:
                     values.append(objective(x))
             except Exception as error:  # named and counted by tell
                 values.append(error)
-        swarm.tell(values)
+        tell(values)
     if swarm.failures.broken == params.population * (params.iterations + 1):
         raise InputError(
             f"objective failed at all {swarm.failures.broken} points ({swarm.failures}); "
