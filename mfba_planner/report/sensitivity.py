@@ -63,7 +63,7 @@ def to_table(rows: Sequence[Row], title: str, width: int = 120) -> Table:
         table.add_column(f"case {case[-1]}" + ("" if narrow else ": mean (m)"), no_wrap=True)
         table.add_column("row", no_wrap=True)
         table.add_column("told", justify="right", no_wrap=True)
-    table.add_column("contact", justify="right", no_wrap=True)
+    table.add_column("hit" if narrow else "contact", justify="right", no_wrap=True)
     for cells in _lines(rows):
         table.add_row(*(_narrowed(cells) if narrow else cells))
     return table
@@ -96,4 +96,4 @@ def _lines(rows: Sequence[Row]) -> Iterator[list[str]]:
 
 def _narrowed(cells: Sequence[str]) -> list[str]:
     """A line without its group and intervals."""
-    return [cell.partition(" [")[0] for cell in cells[1:]]
+    return [cell.partition(" [")[0].replace(f"{ROW_MARK} ", ROW_MARK) for cell in cells[1:]]
