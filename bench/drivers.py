@@ -24,11 +24,14 @@ from mfba_planner.scenarios import load_scenario
 MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
 
 
-def recorded(scenario: str, algorithm: str, seed: int, driver: str, out: Path) -> Episode:
-    """Run through a ROS driver and read the bag."""
+def recorded(scenario: str, algorithm: str, seed: int, driver: str, out: Path) -> Episode | None:
+    """Run through a ROS driver and read the bag; None, and why, for a run that failed."""
     arguments = ["run", scenario, "--algorithm", algorithm, "--seed", str(seed)]
     command = [sys.executable, "-c", MFBA, *arguments, "--driver", driver, "--out", str(out)]
-    subprocess.run([*command, "--no-picture"], check=True, stdout=subprocess.DEVNULL)
+    done = subprocess.run([*command, "--no-picture"], check=False, capture_output=True, text=True)
+    if done.returncode:
+        print(f"{' '.join(arguments)}: {done.stderr.strip().splitlines()[-1:]}", flush=True)
+        return None
     return read_episode(out / "bag")
 
 
@@ -50,6 +53,8 @@ def main() -> int:
                 out = Path(root) / f"{driver}-{scenario}-{algorithm}-{seed}"
                 ours = recorded(scenario, algorithm, seed, driver, out)
                 runs += 1
+                if ours is None:
+                    continue
                 equal += ours.ticks == core.ticks
                 good += evaluate(ours).success
                 decisions += len(ours.ticks)
