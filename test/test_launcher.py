@@ -128,6 +128,6 @@ def test_time_limit_is_no_success(tmp_path: Path) -> None:
     done = complete("launcher", "far.yaml", "--no-picture", "--out", "run", cwd=tmp_path)
     assert done.process.returncode == 1
     assert done.stderr.count("\n") == 1
-    assert "launcher: run: no success: 87.30 m left to the goal after 3.29 s" in done.stderr
+    assert "launcher: run: no success: 87.60 m left to the goal after 3.06 s" in done.stderr
     result = json.loads((tmp_path / "run/result.json").read_text())
     assert result["result"]["outcome"] == "time_limit"

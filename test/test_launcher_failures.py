@@ -38,7 +38,7 @@ def only_line(program: Program) -> str:
         (["--set", "planner.bat.population=1"], "launcher: population=1: out of range; give"),
         (["--set", "sensor.sensing_range_m=nan"], "launcher: sensing_range_m=nan: not finite;"),
         (["--reading", "fig2"], "launcher: 'fig2': unknown planner reading; did you mean"),
-        (["--swarm", "x"], "launcher: 'x': unknown swarm reading; known: literal, robust"),
+        (["--swarm", "x"], "launcher: 'x': unknown swarm reading; known: best, literal, robust"),
         (["--speed", "0"], "launcher: speed_factor=0.0: out of range; give"),
         (["--timeout", "0"], "launcher: --timeout=0: out of range; give seconds above 0"),
         (["--driver", "core", "--real-time"], "launcher: --real-time: the core driver has no"),
