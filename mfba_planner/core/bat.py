@@ -227,14 +227,14 @@ class BatSwarm:
             limits = [limit] * len(own)
         always = changed = self._always
         for i, value in enumerate(values):
-            accepted = value <= limits[i] and gates[gate + i] < a[i]
-            if accepted:
+            if value <= limits[i] and gates[gate + i] < a[i]:
                 self._x[i] = self.candidates[i]
                 own[i] = value
-            if accepted or always:
-                changed = True
-                a[i] *= p.alpha  # eq. 8
-                self._r[i] = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
+            elif not always:
+                continue
+            changed = True
+            a[i] *= p.alpha  # eq. 8
+            self._r[i] = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
         if changed:
             self._scale = p.sigma * math.fsum(a) / p.population
 
@@ -266,8 +266,7 @@ def minimize(
         points = iter(ask())
         while len(values) < n:
             try:
-                for x in points:
-                    values.append(objective(x))
+                values.extend(map(objective, points))  # keeps what came before an exception
             except Exception as error:  # named and counted by tell
                 values.append(error)
         tell(values)

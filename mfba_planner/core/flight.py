@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .bat_params import BatParams, Bounds, Velocity, Walk
-from .region import Region, Vector
+from .region import Box, Region, Vector
 
 Bats = Iterable[Any]
 Pair = tuple[Vector, Vector]
@@ -29,6 +29,7 @@ class Law:
     low: Vector
     high: Vector
     clamp: Callable[[Vector], Vector]
+    is_box: bool
 
     @classmethod
     def of(cls, params: BatParams, region: Region) -> Law:
@@ -40,7 +41,9 @@ class Law:
         # Eq. 5 with the sign that flies towards the best; the printed one is -f.
         sign = 1.0 if params.velocity is Velocity.TOWARDS_BEST else -1.0
         f_span, from_best = params.f_max - params.f_min, params.walk is Walk.BEST
-        return cls(params.f_min, f_span, sign, params.inertia, from_best, low, high, clamp)
+        # Not a subclass: its clamp may be another one.
+        is_box = type(region) is Box and params.bounds is Bounds.CLAMP
+        return cls(params.f_min, f_span, sign, params.inertia, from_best, low, high, clamp, is_box)
 
     def flight(self, d: int) -> Flight:
         """What moves n bats in d dimensions: (bats, t, best, scale, pairs) -> candidates.
@@ -77,7 +80,7 @@ class Law:
     ) -> list[Vector]:
         """Two coordinates unrolled: the same numbers to the last bit, in half the time."""
         f_min, f_span, sign, inertia = self.f_min, self.f_span, self.sign, self.inertia
-        clamp, from_best, (bx, by) = self.clamp, self.from_best, best
+        clamp, is_box, from_best, (bx, by) = self.clamp, self.is_box, self.from_best, best
         (left, bottom), (right, top) = self.low, self.high
         points = []
         i = -1
@@ -104,6 +107,10 @@ class Law:
                 x += vx  # eq. 6
                 y += vy  # eq. 6
             if left < x < right and bottom < y < top:
+                points.append([x, y])
+            elif is_box:  # as Box.clamp, without its call
+                x = left if not x > left else x if x < right else right
+                y = bottom if not y > bottom else y if y < top else top
                 points.append([x, y])
             else:
                 points.append(clamp([x, y]))
