@@ -174,7 +174,10 @@ class BatSwarm:
         """The t of eq. 10; normalized it stays in [0, 1] beyond iteration T as well."""
         if self._random:
             return 1.0
-        return min(1.0, self.t / self.horizon) if self._normalized else self.t
+        if not self._normalized:
+            return self.t
+        t = self.t / self.horizon
+        return t if t < 1.0 else 1.0
 
     def _decays(self, u: Vector) -> Vector:
         """What t is multiplied with to give beta."""
@@ -251,6 +254,14 @@ class BatSwarm:
         return [self.region.clamp(x) for x in points]
 
 
+def _value(objective: Callable[[Vector], float], x: Vector) -> Any:
+    """The value at x, or the exception that stands for it."""
+    try:
+        return objective(x)
+    except Exception as error:
+        return error
+
+
 def minimize(
     objective: Callable[[Vector], float], region: Region, params: BatParams, rng: Generator
 ) -> BatSwarm:
@@ -260,15 +271,15 @@ def minimize(
     that raised or returned no number every time.
     """
     swarm = BatSwarm(params, region, rng, ahead=params.iterations)
-    n, ask, tell = params.population, swarm.ask, swarm.tell
+    ask, tell = swarm.ask, swarm.tell
     for _ in range(params.iterations + 1):
         values: list[Any] = []
-        points = iter(ask())
-        while len(values) < n:
-            try:
-                values.extend(map(objective, points))  # keeps what came before an exception
-            except Exception as error:  # named and counted by tell
-                values.append(error)
+        points = ask()
+        try:
+            values.extend(map(objective, points))  # keeps what came before an exception
+        except Exception as error:
+            values.append(error)  # named and counted by tell
+            values += [_value(objective, x) for x in points[len(values) :]]
         tell(values)
     if swarm.failures.broken == params.population * (params.iterations + 1):
         raise InputError(

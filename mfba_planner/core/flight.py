@@ -82,10 +82,8 @@ class Law:
         f_min, f_span, sign, inertia = self.f_min, self.f_span, self.sign, self.inertia
         clamp, is_box, from_best, (bx, by) = self.clamp, self.is_box, self.from_best, best
         (left, bottom), (right, top) = self.low, self.high
-        points = []
-        i = -1
+        points: list[Vector] = []
         for (x, y), v, r, decay, pulse, ex, ey in bats:
-            i += 1
             f = sign * (f_min + f_span * (t * decay))  # eq. 4
             vx, vy = v
             v[0] = vx = inertia * vx + (bx - x) * f  # eq. 5
@@ -94,7 +92,7 @@ class Law:
                 ex = 2.0 * ex - 1.0
                 ey = 2.0 * ey - 1.0
                 if pairs:
-                    here, there = pairs[i]
+                    here, there = pairs[len(points)]
                     ex *= there[0] - here[0]
                     ey *= there[1] - here[1]
                 if from_best:
