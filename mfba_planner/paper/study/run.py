@@ -84,6 +84,11 @@ def _compute(plan: Sequence[Chunk], workers: int) -> Iterator[tuple[Chunk, Colum
             "a worker process died (out of memory?); run again with fewer --workers, "
             "finished parts are kept"
         ) from None
+    except BaseException:
+        # A worker that a Ctrl-C met while it started may never end; what it does is not needed.
+        for child in multiprocessing.active_children():
+            child.kill()
+        raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
 
