@@ -2,6 +2,7 @@
 """The sensitivity study: what varies, what is judged, what the command leaves behind."""
 
 import csv
+import io
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -231,6 +232,17 @@ def test_the_command_goes_on_where_it_was(
     assert {name: (out / name).read_bytes() for name in names} == before
     with pytest.raises(OutputError):
         cli.main([*args, "--seed", "5"])
+
+
+@pytest.mark.usefixtures("small")
+def test_a_terminal_without_these_letters_is_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    screen = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr("sys.stdout", screen)
+    assert cli.main(["sensitivity", "--quick", "--workers", "1", "--out", str(tmp_path / "s")]) == 0
+    screen.seek(0)
+    assert "? the printed row lies within ours" in " ".join(screen.read().split())
 
 
 @pytest.mark.usefixtures("small")

@@ -63,7 +63,9 @@ def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
 def _show(rows: Sequence[sensitivity.Row], title: str) -> None:
     from rich.console import Console
 
+    from ..report.console import print_encodable
     from ..report.sensitivity import to_table
 
     console = Console()
-    console.print(to_table(rows, title, console.width))
+    table = to_table(rows, title, console.width)
+    print_encodable(console, lambda encodable: encodable.print(table))

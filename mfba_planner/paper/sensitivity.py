@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
 from ..core.world import Obstacle, Scenario
 from . import published, readings, statistics
-from .study.chunk import Chunk, Columns, Trips, chunks
+from .study.chunk import Chunk, Trips, chunks
 from .study.run import Sample
 
 CASES = tuple(published.TRIP_TABLES)
@@ -119,18 +119,16 @@ class Variation(Trips):
             "enlarged": self.reading.enlarged,
         }
 
-    def run(self, seeds: Sequence[int]) -> Columns:
+    def _row(self, seed: int) -> dict[str, float]:
         """Length, contacts, whether the goal was reached, whether it met whom the paper tells."""
-        rows = [self._told(seed) for seed in seeds]
-        return {name: [row[name] for row in rows] for name in rows[0]}
-
-    def _told(self, seed: int) -> dict[str, float]:
         seen = turned(self.scenario, -self.reading.sectors_rad)
         if not self.reading.enlarged:
             seen = replace(seen, robot_radius_m=0.0)
         episode = run(seen, planner=self.planner, sensor=self.reading.sensor, seed=seed)
-        result = evaluate(_with_radius(episode, self.scenario.robot_radius_m))
-        met = evaluate(episode).encounters
+        result = evaluate(episode)
+        met = result.encounters
+        if not self.reading.enlarged:
+            result = evaluate(_with_radius(episode, self.scenario.robot_radius_m))
         told = met == (1,) if self.scenario.name == "case1" else met[:2] == (1, 2)
         return {
             "length_m": result.length_m,
@@ -190,7 +188,7 @@ class Row:
     def holds(self, law: str) -> tuple[bool, ...]:
         """Whether the printed length lies within the interval, for each of STATISTICS."""
         printed = printed_m(self.case, law)
-        return tuple(i.low <= length <= i.high for i, length in zip(self.intervals, printed))
+        return tuple(length in i for i, length in zip(self.intervals, printed))
 
     @property
     def reproduces(self) -> tuple[str, ...]:

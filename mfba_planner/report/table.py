@@ -15,6 +15,7 @@ from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.metrics import Result
 
 from . import words
+from .console import print_encodable
 
 _ROOM_FOR_REMARKS = 60  # columns
 Row = tuple[str, str, str]
@@ -99,13 +100,9 @@ def print_result(
     console: Console, episode: Episode, result: Result, ticks_per_s: float | None = None
 ) -> None:
     """Print the table; the console knows width, colour and encoding of where it goes."""
-    with console.capture() as captured:
-        remarks = console.width >= _ROOM_FOR_REMARKS
-        console.print(result_table(episode, result, ticks_per_s, remarks=remarks))
-    # a scenario's name may hold what the terminal's encoding does not
-    encoding = console.encoding
-    console.file.write(captured.get().encode(encoding, "replace").decode(encoding))
-    console.file.flush()
+    remarks = console.width >= _ROOM_FOR_REMARKS
+    table = result_table(episode, result, ticks_per_s, remarks=remarks)
+    print_encodable(console, lambda encodable: encodable.print(table))
 
 
 def comparison_text(left: tuple[str, Result], right: tuple[str, Result]) -> str:

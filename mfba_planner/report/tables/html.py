@@ -80,7 +80,7 @@ def _section(section: Section) -> str:
 
 
 def _entry(e: Entry, names: Sequence[str], digits: int) -> Iterable[str]:
-    yield escape(f"{e.row}, {e.column}" if e.column not in ("claim", "value") else e.row)
+    yield escape(text.label(e))
     yield f"<b>{escape(e.printed)}</b>"
     for name in names:
         yield escape(text.ours(e, name, digits))

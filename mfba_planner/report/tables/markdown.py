@@ -60,7 +60,7 @@ def body(section: Section) -> str:
         names = text.readings(section)
         shown = [
             (
-                f"{e.row}, {e.column}" if e.column not in ("claim", "value") else e.row,
+                text.label(e),
                 e.printed,
                 *(text.ours(e, name, section.digits) for name in names),
                 e.verdict.value,

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from mfba_planner.paper.tables.model import Entry, Grid, Section, Verdict
 
+from ..console import print_encodable
 from . import markdown, text
 from .text import Origin
 
@@ -26,12 +27,7 @@ STYLES = {
 
 def show(console: Console, sections: Sequence[Section], origin: Origin) -> None:
     """Print all sections, the summary last, where the eyes are."""
-    with console.capture() as captured:
-        _print(console, sections, origin)
-    # a terminal's encoding may lack the Greek letters of a formula
-    encoding = console.encoding
-    console.file.write(captured.get().encode(encoding, "replace").decode(encoding))
-    console.file.flush()
+    print_encodable(console, lambda encodable: _print(encodable, sections, origin))
 
 
 def _print(console: Console, sections: Sequence[Section], origin: Origin) -> None:
@@ -62,9 +58,8 @@ def _numbers(section: Section) -> Table:
     for head in ("number", "printed", "ours", "verdict", "why"):
         table.add_column(head, overflow="fold")
     for e in section.entries:
-        label = f"{e.row}, {e.column}" if e.column not in ("claim", "value") else e.row
         table.add_row(
-            Text(label),
+            Text(text.label(e)),
             Text(e.printed),
             Text(_ours(e, names, section.digits)),
             Text(e.verdict.value, style=STYLES[e.verdict]),

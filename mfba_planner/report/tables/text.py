@@ -66,6 +66,11 @@ def readings(section: Section) -> tuple[str, ...]:
     return tuple(dict.fromkeys(o.reading for e in section.entries for o in e.ours))
 
 
+def label(entry: Entry) -> str:
+    """What an entry is, within its section; some columns go without saying."""
+    return entry.row if entry.column in ("claim", "value") else f"{entry.row}, {entry.column}"
+
+
 def ours(entry: Entry, reading: str, digits: int) -> str:
     """What a reading gives for an entry."""
     found = [cell(o.value, digits) for o in entry.ours if o.reading == reading]
