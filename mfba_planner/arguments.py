@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 from .core.errors import ConfigError
@@ -19,6 +20,10 @@ class Parser(argparse.ArgumentParser):
         super().__init__(
             allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs
         )
+
+    def add_bag(self, name: str = "bag") -> None:
+        """A bag to read: outputs.bag_in finds it in a run directory."""
+        self.add_argument(name, type=Path, metavar="BAG", help="run or bag directory, or .mcap")
 
     def parse(self, args: Sequence[str]) -> argparse.Namespace:
         """Parse all of args; ConfigError for whatever is unknown, missing or refused."""

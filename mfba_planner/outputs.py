@@ -39,6 +39,12 @@ def write_new(path: Path, data: bytes) -> None:
         file.write(data)
 
 
+def write_same(path: Path, data: bytes) -> None:
+    """Write a file, unless it is there and holds just that; OutputError as new_file."""
+    if not (path.is_file() and path.read_bytes() == data):
+        write_new(path, data)
+
+
 @contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """Open a file that must not exist yet; it gets its name when all has been written.

@@ -39,6 +39,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "outputs": ({"core"}, set()),
     "arguments": ({"core"}, set()),
     "entry": ({"core"}, set()),
+    "figures": ({"core", "paper", "report", "scenarios"}, set()),
     "watched": ({"core", "paper"}, {"rich"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
     "messages": ({"core"}, {"numpy"}),

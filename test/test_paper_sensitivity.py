@@ -240,7 +240,8 @@ def test_a_terminal_without_these_letters_is_no_error(
 ) -> None:
     screen = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     monkeypatch.setattr("sys.stdout", screen)
-    assert cli.main(["sensitivity", "--quick", "--workers", "1", "--out", str(tmp_path / "s")]) == 0
+    out = str(tmp_path / "s")
+    assert cli.main(["sensitivity", "--quick", "--workers", "1", "--out", out]) == 0
     screen.seek(0)
     assert "? the printed row lies within ours" in " ".join(screen.read().split())
 

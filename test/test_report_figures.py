@@ -12,8 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from mfba_planner import cli
-from mfba_planner.cli import figures
+from mfba_planner import cli, figures
 from mfba_planner.core.bat import Algorithm, Schedule
 from mfba_planner.core.errors import ConfigError, InputError, OutputError
 from mfba_planner.core.gaps import gap_vector

@@ -24,7 +24,7 @@ from mfba_planner.core.metrics import Result, evaluate
 from mfba_planner.core.options import override
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.core.sensing import SensorParams
-from mfba_planner.report.files import write_new
+from mfba_planner.outputs import write_new
 from mfba_planner.report.result import read_result, result_to_dict, write_result
 from mfba_planner.scenarios import load_scenario
 

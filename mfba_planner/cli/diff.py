@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from ..arguments import Parser
 from ..core.digest import digest
+from ..core.episode import Episode
 from ..core.metrics import evaluate
 from ..core.options import flatten
 from ..outputs import bag_in
@@ -19,7 +18,7 @@ def main(args: list[str]) -> int:
     """Compare two bags; 0 when all decisions are equal, 1 when not, as diff does."""
     parser = Parser(prog="mfba diff", description="Say where the decisions of two bags differ.")
     for name in ("left", "right"):
-        parser.add_argument(name, type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+        parser.add_bag(name)
     given = parser.parse(args)
     left, right = (read_episode(bag_in(path)) for path in (given.left, given.right))
     found = first_divergence(left.ticks, right.ticks)
@@ -35,14 +34,14 @@ def main(args: list[str]) -> int:
     return 1
 
 
-def _settings(left: object, right: object) -> list[tuple[str, object, object]]:
+def _settings(left: Episode, right: Episode) -> list[tuple[str, object, object]]:
     """What was set differently."""
     rows: list[tuple[str, object, object]] = []
     for group in ("planner", "sensor"):
         a, b = (flatten(getattr(episode, group)) for episode in (left, right))
         rows += [(f"{group}.{name}", a[name], b[name]) for name in a if a[name] != b[name]]
-    for name in ("seed", "scenario"):
-        a, b = getattr(left, name), getattr(right, name)
-        if a != b:
-            rows.append((name, getattr(a, "name", a), getattr(b, "name", b)))
+    if left.seed != right.seed:
+        rows.append(("seed", left.seed, right.seed))
+    if left.scenario != right.scenario:
+        rows.append(("scenario", left.scenario.name, right.scenario.name))
     return rows

@@ -27,7 +27,7 @@ def main(args: list[str]) -> int:
         description="Write a bag's ticks and decisions as one table, a row per decision.",
         epilog="columns:\n" + "\n".join([*lines, "  range_1 ...  range of each sector, m"]),
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+    parser.add_bag()
     parser.add_argument("table", type=Path, metavar="FILE", help="a .csv or .parquet to create")
     found = parser.parse(args)
     writers = {".csv": _write_csv, ".parquet": _write_parquet}

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from ..arguments import Parser
 from ..core.errors import BagError
 from ..launcher.conclusion import show
@@ -17,7 +15,7 @@ from ..recording.info import describe, format_info
 def main(args: list[str]) -> int:
     """Describe a bag."""
     parser = Parser(prog="mfba info", description="Say what a bag holds, and how its run went.")
-    parser.add_argument("bag", type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+    parser.add_bag()
     bag = bag_in(parser.parse(args).bag)
     info = describe(bag)
     print(format_info(info))

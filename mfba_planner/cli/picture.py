@@ -15,7 +15,7 @@ def main(args: list[str]) -> int:
     parser = Parser(
         prog="mfba picture", description="Draw the run that a bag holds, as `mfba run` does."
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+    parser.add_bag()
     parser.add_argument("png", type=Path, metavar="PNG", help="file to create")
     found = parser.parse(args)
     episode = read_episode(bag_in(found.bag))

@@ -16,7 +16,7 @@ def main(args: list[str]) -> int:
         prog="mfba recover",
         description="Copy all that is whole of a killed, truncated or damaged bag into a new one.",
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+    parser.add_bag()
     parser.add_argument("out", type=Path, metavar="OUT", help="bag directory to create")
     found = parser.parse(args)
     report = recover(bag_in(found.bag), found.out)

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..arguments import Parser
-from ..outputs import new_run_directory, write_new
+from ..figures import FORMATS
+from ..outputs import new_run_directory, write_same
 from ..paper import sensitivity
 from ..paper.study.store import Store
 from ..scenarios import load_scenario
@@ -44,7 +45,7 @@ def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
     from ..report import style
     from ..report.figures.sensitivity import draw
     from ..report.sensitivity import to_csv, to_markdown
-    from ..report.sheet import FORMATS, to_bytes
+    from ..report.sheet import to_bytes
 
     files = {
         "sensitivity.csv": to_csv(rows).encode(),
@@ -53,10 +54,8 @@ def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
     with style.context():
         figure = draw(rows)
         files |= {f"sensitivity.{form}": to_bytes(figure, form) for form in FORMATS}
-    for name, wanted in files.items():
-        path = directory / name
-        if not (path.is_file() and path.read_bytes() == wanted):
-            write_new(path, wanted)
+    for name, data in files.items():
+        write_same(directory / name, data)
     return list(files)
 
 

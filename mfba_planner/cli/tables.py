@@ -6,12 +6,12 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
 
 from ..arguments import Parser
 from ..core.errors import InputError, OutputError
-from ..outputs import new_run_directory, write_new
+from ..figures import FIGURES, render
+from ..outputs import new_run_directory, write_new, write_same
 from ..paper.study.plan import FULL, QUICK
 from ..paper.study.store import Store
 from ..paper.tables.build import SECTIONS, build, check_sections, plan
@@ -78,17 +78,14 @@ def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None
         "tables.html": html.page(sections, origin, pictures),
     }
     for name, content in forms.items():
-        path, wanted = directory / name, content.encode()
-        if not (path.is_file() and path.read_bytes() == wanted):
-            write_new(path, wanted)
+        write_same(directory / name, content.encode())
 
 
 def _pictures(quick: bool) -> list[html.Picture]:
     """What `mfba figures` draws; the quick form does without the one that takes longest."""
-    figures = import_module(".figures", __package__)  # by name: commands do not know each other
     return [
-        html.Picture(title=f"{name}: {what}", svg=figures.render(name, ("svg",))["svg"].decode())
-        for name, what in figures.FIGURES.items()
+        html.Picture(title=f"{name}: {what}", svg=render(name, ("svg",))["svg"].decode())
+        for name, what in FIGURES.items()
         if not (quick and name == "convergence")
     ]
 

@@ -24,7 +24,7 @@ def main(args: list[str]) -> int:
         description="Decide again, without ROS, on the odometry and sectors a bag recorded, and "
         "compare with the recorded decisions bit for bit. Nothing is written into the bag.",
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+    parser.add_bag()
     parser.add_argument(
         "--closed-loop", action="store_true", help="simulate the world again as well"
     )

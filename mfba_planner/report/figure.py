@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from mfba_planner.core.episode import Episode
 from mfba_planner.core.metrics import Result, evaluate
+from mfba_planner.outputs import write_new
 
 from . import legend, style, words
-from .files import write_new
 from .moments import Pass, closest_passes
 from .page import Page
 from .scene import draw_scene, draw_way, label_numbers

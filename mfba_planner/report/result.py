@@ -20,8 +20,7 @@ from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.metrics import Result, evaluate
 from mfba_planner.core.options import flatten
-
-from .files import write_new
+from mfba_planner.outputs import write_new
 
 SCHEMA_VERSION = 1
 _KINDS = {

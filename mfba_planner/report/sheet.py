@@ -18,7 +18,6 @@ from .legend import Entry
 from .words import one_line
 
 EDGE = 0.3
-FORMATS = ("svg", "png")
 # neither date nor version: the same figure gives the same bytes
 _PLAIN: dict[str, dict[str, None]] = {
     "png": {"Software": None},

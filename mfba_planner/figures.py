@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's figures by name: what each shows, the run it shows, and its bytes."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from .core.episode import Episode, run
+from .paper import readings
+from .scenarios import load_scenario
+
+FIGURES = {
+    "fig2": "beta of eq. 10 over the iterations, for several rho",
+    "fig4": "obstacles enlarged by the robot's radius",
+    "fig5": "sensing range, sectors, tangents and the example of Vs",
+    "fig6": "the gap vector of that example",
+    "fig7": "case study 1 at the paper's moments",
+    "fig8": "case study 2 at the paper's moments",
+    "convergence": "BA and MFBA on F1 to F6",
+}
+_MODULES = {
+    "fig2": "beta",
+    "fig4": "enlargement",
+    "fig5": "sectors",
+    "fig6": "gaps",
+    "convergence": "convergence",
+}
+_TITLES = {
+    "fig7": "Fig. 7: case study 1",
+    "fig8": "Fig. 8: case study 2",
+}
+_CHOICE = "of 1000 runs that which comes nearest to the printed length and meets as told"
+FORMATS = ("svg", "png")
+
+
+def render(name: str, forms: tuple[str, ...] = FORMATS) -> dict[str, bytes]:
+    """One figure in several formats, {format: bytes}."""
+    from .report import style
+    from .report.sheet import to_bytes
+
+    with style.context():
+        figure = _draw(name)
+        return {form: to_bytes(figure, form) for form in forms}
+
+
+def figure_run(name: str) -> Episode:
+    """The run that fig7 or fig8 shows."""
+    case, seed = readings.FIGURE_RUNS[name]
+    return run(load_scenario(case), planner=readings.planner("section6"), seed=seed)
+
+
+def _draw(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"mfba_planner.report.figures.{_MODULES[name]}").draw()
+    from .report.figures import trips
+
+    return trips.draw(figure_run(name), _TITLES[name], _CHOICE)
