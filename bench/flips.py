@@ -18,15 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from mfba_planner.core.planner import Mode, PlannerParams
-from mfba_planner.launcher.domain import claim_domain
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import Driver, RunConfig
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.core.planner import Mode
 from mfba_planner.verification.check import verify
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "test"))
-from edited_bags import one_changed, rewrite, set_field
+from edited_bags import one_changed, record, rewrite, set_field
 
 DECISION = "/planner/decision"
 
@@ -41,16 +37,7 @@ def main() -> int:
     made: Counter[str] = Counter()
     noticed: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as root:
-        bag = Path(root) / "bag"
-        domain, lock = claim_domain()
-        told = RunConfig(
-            scenario=load_scenario("case2"),
-            driver=Driver.IN_PROCESS,
-            planner=PlannerParams(),
-            seed=4,
-        )
-        with lock:
-            run_in_process(told, bag, domain_id=domain)
+        bag = record(Path(root) / "bag", "case2", 4)
         ticks = len(verify(bag).recorded)
         assert verify(bag).is_identical
         for index in range(options.flips):

@@ -8,23 +8,40 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message, serialize_message
 
+from mfba_planner.launcher.domain import claim_domain
+from mfba_planner.recording.configuration import attach_configuration, read_configuration
 from mfba_planner.recording.merge import RawMessage
 from mfba_planner.recording.reader import BagReader
 from mfba_planner.recording.writer import BagWriter
 from mfba_planner.ros import topics
+from mfba_planner.ros.in_process import run_in_process
+from mfba_planner.run_config import Driver, RunConfig
+from mfba_planner.scenarios import load_scenario
+
+
+def record(directory: Path, scenario: str, seed: int) -> Path:
+    """Record a run of a shipped scenario in a domain of its own; return the bag."""
+    domain, lock = claim_domain()
+    told = RunConfig(scenario=load_scenario(scenario), driver=Driver.IN_PROCESS, seed=seed)
+    with lock:
+        run_in_process(told, directory, domain_id=domain)
+    return directory
+
 
 KINDS = {f"/{topic.name.lstrip('/')}": topic.type for topic in topics.GRAPH}
 Edit = Callable[[list[RawMessage]], Iterable[RawMessage]]
 
 
-def rewrite(bag: Path, out: Path, edit: Edit, *, configuration: bool = True) -> Path:
-    """A whole, sound bag with other messages: only what they say can betray it."""
+def rewrite(
+    bag: Path, out: Path, edit: Edit, *, configure: Callable[[Any], Any] = lambda content: content
+) -> Path:
+    """A whole, sound bag with other messages and configuration (None: without)."""
     with BagReader(bag) as reader, BagWriter(out) as writer:
         for topic in reader.topics.values():
             writer.add_topic(topic.name, topic.type_name, topic.qos)
-        for found in reader.iter_attachments():
-            if configuration:
-                writer.attach(found.name, found.media_type, found.data)
+        content = configure(read_configuration(reader))
+        if content is not None:
+            attach_configuration(writer, content)
         for message in edit(list(reader.messages())):
             writer.write(message.topic, message.data, message.log_time_ns, message.publish_time_ns)
     return out
@@ -43,6 +60,31 @@ def one_changed(topic: str, index: int, change: Callable[[Any], None]) -> Edit:
     def edit(messages: list[RawMessage]) -> list[RawMessage]:
         place = [k for k, message in enumerate(messages) if message.topic == topic][index]
         messages[place] = changed(messages[place], change)
+        return messages
+
+    return edit
+
+
+def each_changed(change: Callable[[str, Any], Any]) -> Edit:
+    """Change every message: change(topic, message) returns it, or None to leave it out."""
+
+    def edit(messages: list[RawMessage]) -> Iterable[RawMessage]:
+        for raw in messages:
+            message = change(raw.topic, deserialize_message(raw.data, KINDS[raw.topic]))
+            if message is not None:
+                yield raw._replace(data=bytes(serialize_message(message)))
+
+    return edit
+
+
+def swapped(topic: str, index: int) -> Edit:
+    """Two messages change places: under the same log times, or a reader puts them right."""
+
+    def edit(messages: list[RawMessage]) -> list[RawMessage]:
+        a, b = [k for k, m in enumerate(messages) if m.topic == topic][index : index + 2]
+        first, second = messages[a], messages[b]
+        messages[a] = first._replace(data=second.data)
+        messages[b] = second._replace(data=first.data)
         return messages
 
     return edit

@@ -7,27 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from edited_bags import one_changed, rewrite
-from helpers import claim_domain
+from edited_bags import one_changed, record, rewrite
 from pyarrow import parquet
 
 from mfba_planner import cli
 from mfba_planner.core import episode
 from mfba_planner.core.errors import BagError, ConfigError, OutputError
 from mfba_planner.recording.table import COLUMNS
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import Driver, RunConfig
 from mfba_planner.scenarios import load_scenario
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("export") / "bag"
-    config = RunConfig(scenario=load_scenario("case2"), driver=Driver.IN_PROCESS, seed=4)
-    domain, lock = claim_domain()
-    with lock:
-        run_in_process(config, directory, domain_id=domain)
-    return directory
+    return record(tmp_path_factory.mktemp("export") / "bag", "case2", 4)
 
 
 def expected_rows() -> list[dict[str, Any]]:

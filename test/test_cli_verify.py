@@ -5,27 +5,19 @@ import json
 from pathlib import Path
 
 import pytest
-from edited_bags import last_bit, one_changed, rewrite, set_field
-from helpers import claim_domain
+from edited_bags import last_bit, one_changed, record, rewrite, set_field
 
 from mfba_planner import cli
 from mfba_planner.core import episode
 from mfba_planner.core.digest import digest
 from mfba_planner.core.errors import BagError, ConfigError, OutputError
 from mfba_planner.report.result import result_to_dict, write_result
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import Driver, RunConfig
 from mfba_planner.scenarios import load_scenario
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("cli") / "bag"
-    config = RunConfig(scenario=load_scenario("case1"), driver=Driver.IN_PROCESS, seed=2)
-    domain, lock = claim_domain()
-    with lock:
-        run_in_process(config, directory, domain_id=domain)
-    return directory
+    return record(tmp_path_factory.mktemp("cli") / "bag", "case1", 2)
 
 
 EXPECTED = digest(episode.run(load_scenario("case1"), seed=2).ticks)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from edited_bags import record as record_run
 from geometry_msgs.msg import TwistStamped
 from graph import Graph
 from rclpy.context import Context
@@ -27,27 +28,19 @@ from mfba_planner.recording.reader import BagReader
 from mfba_planner.recording.schemas import definition_of
 from mfba_planner.ros import params, topics
 from mfba_planner.ros.convert import clock_msg, odometry_msg, path_msg, pose_stamped_msg, time_msg
-from mfba_planner.ros.in_process import run_in_process
 from mfba_planner.ros.planner import PlannerNode
 from mfba_planner.ros.qos import offered
 from mfba_planner.ros.recorder import Recorder
 from mfba_planner.ros.virtual_sensor import VirtualSensor
 from mfba_planner.ros.world_sim import WorldSim
-from mfba_planner.run_config import NODES, Driver, RunConfig
+from mfba_planner.run_config import NODES
 from mfba_planner.scenarios import load_scenario
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One recorded run of case study 2."""
-    from helpers import claim_domain
-
-    domain, lock = claim_domain()
-    with lock:
-        path = tmp_path_factory.mktemp("recorder") / "bag"
-        told = RunConfig(scenario=load_scenario("case2"), driver=Driver.IN_PROCESS, seed=9)
-        run_in_process(told, path, domain_id=domain)
-    return path
+    return record_run(tmp_path_factory.mktemp("recorder") / "bag", "case2", 9)
 
 
 def counts(path: Path) -> Counter[str]:

@@ -7,19 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import claim_domain
-from rclpy.serialization import deserialize_message, serialize_message
+from edited_bags import each_changed, record, rewrite, swapped
 from recording_bags import FOREIGN
 
+from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Outcome, run
 from mfba_planner.core.errors import BagError
-from mfba_planner.recording.configuration import attach_configuration, read_configuration
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.writer import BagWriter
-from mfba_planner.ros import topics
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import Driver, RunConfig
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.recording.episode import read_episode, summarize
 from mfba_planner.scenarios import load_scenario
 
 Change = Callable[[str, Any], Any]  # (topic, message) -> message, or None to leave it out
@@ -27,28 +22,14 @@ Change = Callable[[str, Any], Any]  # (topic, message) -> message, or None to le
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("episode") / "bag"
-    config = RunConfig(scenario=load_scenario("empty"), driver=Driver.IN_PROCESS, seed=2)
-    domain, lock = claim_domain()
-    with lock:
-        run_in_process(config, directory, domain_id=domain)
-    return directory
+    return record(tmp_path_factory.mktemp("episode") / "bag", "empty", 2)
 
 
-def edited(bag: Path, out: Path, change: Change, configure: Change = lambda _, c: c) -> Path:
+def edited(
+    bag: Path, out: Path, change: Change, configure: Callable[[Any], Any] = lambda content: content
+) -> Path:
     """A copy with messages and configuration changed."""
-    kinds = {f"/{t.name.lstrip('/')}": t.type for t in topics.GRAPH}
-    with BagReader(bag) as reader, BagWriter(out) as writer:
-        content = configure("configuration", read_configuration(reader))
-        if content is not None:
-            attach_configuration(writer, content)
-        for raw in reader.messages():
-            message = change(raw.topic, deserialize_message(raw.data, kinds[raw.topic]))
-            if message is not None:
-                writer.add_topic(raw.topic, raw.type_name)
-                data = bytes(serialize_message(message))
-                writer.write(raw.topic, data, raw.log_time_ns, raw.publish_time_ns)
-    return out
+    return rewrite(bag, out, each_changed(change), configure=configure)
 
 
 def keep(_: str, message: Any) -> Any:
@@ -118,7 +99,7 @@ def test_a_garbled_decision_is_refused(bag: Path, tmp_path: Path, key: str, valu
 def test_a_configuration_that_explains_nothing_is_refused(
     bag: Path, tmp_path: Path, change: Callable[[Any], Any], reason: str
 ) -> None:
-    def configure(_: str, content: Any) -> Any:
+    def configure(content: Any) -> Any:
         content = json.loads(json.dumps(content))
         change(content)
         return content
@@ -127,6 +108,31 @@ def test_a_configuration_that_explains_nothing_is_refused(
         read_episode(edited(bag, tmp_path / "odd", keep, configure))
     assert reason in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_decisions_that_changed_places_are_none_lost(bag: Path, tmp_path: Path) -> None:
+    """All are read in their order; what streams cannot wait for them and says so."""
+    odd = rewrite(bag, tmp_path / "odd", swapped("/planner/decision", 5))
+    assert read_episode(odd).ticks == read_episode(bag).ticks
+    with pytest.raises(BagError, match=r"the decision at stamp \d+ ns comes after that at \d+ ns"):
+        summarize(odd)
+
+
+def test_a_decision_that_is_there_twice_counts_once(bag: Path, tmp_path: Path) -> None:
+    def twice(messages: list[Any]) -> Any:
+        for message in messages:
+            yield from [message] * (2 if message.topic == "/planner/decision" else 1)
+
+    copy = rewrite(bag, tmp_path / "twice", twice)
+    assert read_episode(copy) == read_episode(bag)
+    assert summarize(copy) == summarize(bag)
+
+
+def test_the_summary_is_that_of_the_episode(bag: Path) -> None:
+    episode, result, found = summarize(bag)
+    whole = read_episode(bag)
+    assert (result, found) == (evaluate(whole), digest(whole.ticks))
+    assert (episode.outcome, episode.ticks) == (whole.outcome, whole.ticks[-1:])
 
 
 def test_refused_sectors_are_an_episode_all_the_same(bag: Path, tmp_path: Path) -> None:

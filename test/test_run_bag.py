@@ -4,7 +4,7 @@
 from pathlib import Path
 
 import pytest
-from helpers import claim_domain
+from edited_bags import record
 from recording_bags import count_with_all
 
 from mfba_planner.core.metrics import evaluate
@@ -12,8 +12,6 @@ from mfba_planner.recording.configuration import read_configuration
 from mfba_planner.recording.episode import read_episode
 from mfba_planner.recording.reader import BagReader
 from mfba_planner.ros import topics
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import Driver, RunConfig
 from mfba_planner.scenarios import load_scenario
 
 NEVER = {topics.SCAN.name, topics.INITIALPOSE.name}  # nobody publishes them in a simulation
@@ -21,12 +19,7 @@ NEVER = {topics.SCAN.name, topics.INITIALPOSE.name}  # nobody publishes them in 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("run") / "bag"
-    config = RunConfig(scenario=load_scenario("case2"), driver=Driver.IN_PROCESS, seed=4)
-    domain, lock = claim_domain()
-    with lock:
-        run_in_process(config, directory, domain_id=domain)
-    return directory
+    return record(tmp_path_factory.mktemp("run") / "bag", "case2", 4)
 
 
 def test_readers_of_others_find_every_topic_with_a_message_per_tick(bag: Path) -> None:

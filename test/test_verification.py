@@ -7,14 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from edited_bags import Edit, last_bit, one_changed, rewrite, set_field
-from helpers import claim_domain
+from edited_bags import Edit, last_bit, one_changed, record, rewrite, set_field, swapped
 
 from mfba_planner.core import episode
 from mfba_planner.core.digest import digest
 from mfba_planner.core.errors import BagError
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import Driver, RunConfig
 from mfba_planner.scenarios import load_scenario
 from mfba_planner.verification.check import verify
 
@@ -23,18 +20,13 @@ DECISION = "/planner/decision"
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("verified") / "bag"
-    config = RunConfig(scenario=load_scenario("case2"), driver=Driver.IN_PROCESS, seed=4)
-    domain, lock = claim_domain()
-    with lock:
-        run_in_process(config, directory, domain_id=domain)
-    return directory
+    return record(tmp_path_factory.mktemp("verified") / "bag", "case2", 4)
 
 
 def test_an_honest_bag_is_identical(bag: Path) -> None:
     report = verify(bag)
     assert report.is_identical
-    assert (report.faults, report.notes) == ([], [])
+    assert (report.faults, report.notes) == ((), ())
     expected = episode.run(load_scenario("case2"), seed=4).ticks
     assert report.decided == expected
     assert report.digest == digest(expected)
@@ -141,19 +133,6 @@ def twice(topic: str, index: int) -> Edit:
     return edit
 
 
-def swapped(topic: str, index: int) -> Edit:
-    """Two messages change places: under the same log times, or a reader puts them right."""
-
-    def edit(messages: list[Any]) -> list[Any]:
-        a, b = [k for k, m in enumerate(messages) if m.topic == topic][index : index + 2]
-        first, second = messages[a], messages[b]
-        messages[a] = first._replace(data=second.data)
-        messages[b] = second._replace(data=first.data)
-        return messages
-
-    return edit
-
-
 @pytest.mark.parametrize(
     ("edit", "named"),
     [
@@ -178,7 +157,7 @@ def test_missing_and_reordered_messages_are_named(
 def test_a_repeated_message_is_noted_but_is_no_contradiction(bag: Path, tmp_path: Path) -> None:
     report = verify(rewrite(bag, tmp_path / "edited", twice("/odom", 20)))
     assert report.is_identical
-    assert report.notes == ["/odom: 1 messages are there once more, all alike"]
+    assert report.notes == ("/odom: 1 messages are there once more, all alike",)
 
 
 def test_a_recording_that_was_interrupted_is_checked_as_far_as_it_goes(
@@ -193,7 +172,7 @@ def test_a_recording_that_was_interrupted_is_checked_as_far_as_it_goes(
 
 
 def test_without_configuration_it_says_so(bag: Path, tmp_path: Path) -> None:
-    plain = rewrite(bag, tmp_path / "plain", list, configuration=False)
+    plain = rewrite(bag, tmp_path / "plain", list, configure=lambda _: None)
     with pytest.raises(BagError, match="carries no mfba_planner/configuration"):
         verify(plain)
 

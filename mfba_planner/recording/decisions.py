@@ -14,7 +14,9 @@ from ..messages import decision, sector_ranges, stamp_ns
 from .reader import BagReader
 
 SECTORS, DECISION = "/sectors", "/planner/decision"
-WAITING_LIMIT = 10_000  # messages of one kind that wait for the other; older ones are given up
+REMEMBERED = 10_000  # of sectors without a decision, of decisions without sectors, of stamps
+
+Answered = tuple[Decision, Any]
 
 
 def require_decisions(reader: BagReader) -> None:
@@ -24,46 +26,60 @@ def require_decisions(reader: BagReader) -> None:
             raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
 
 
-def stream_decisions(reader: BagReader) -> Iterator[tuple[Decision, Any]]:
-    """Yield (decision, its sectors message) under rising stamps.
+def stream_decisions(reader: BagReader) -> Iterator[Answered]:
+    """Yield (decision, its sectors message) in the order of the bag, one for each stamp.
 
-    Of several decisions on a stamp, the first: a later one only says that its inputs have
-    become stale. Raises BagError for a bag without decisions, for one that is garbled, and
-    where the sectors of a decision are missing.
+    The first counts: a later one on its stamp only says that its inputs have become stale.
+    Raises BagError for a bag without decisions, for one that is garbled, and where the sectors
+    of a decision are missing.
     """
     require_decisions(reader)
-    seen: OrderedDict[int, Any] = OrderedDict()
-    waiting: OrderedDict[int, Any] = OrderedDict()
-    last_ns = -1
-    for message in reader.decoded([SECTORS, DECISION]):
+    waiting: dict[str, OrderedDict[int, Any]] = {SECTORS: OrderedDict(), DECISION: OrderedDict()}
+    sectors, decisions = waiting.values()
+    answered: OrderedDict[int, None] = OrderedDict()
+    for message in reader.decoded(waiting):
         stamp = stamp_ns(message.message.header.stamp)
-        if message.topic == SECTORS:
-            seen[stamp] = message.message
-            if len(seen) > WAITING_LIMIT:
-                seen.popitem(last=False)
-        elif stamp > last_ns:
-            waiting.setdefault(stamp, message.message)
-        while waiting and next(iter(waiting)) in seen:
-            last_ns, diagnostics = waiting.popitem(last=False)
-            yield _decision(reader, diagnostics, seen[last_ns]), seen[last_ns]
-        if len(waiting) > WAITING_LIMIT:
+        if stamp in answered:
+            continue
+        waiting[message.topic].setdefault(stamp, message.message)
+        if stamp in sectors and stamp in decisions:
+            answered[stamp] = None
+            seen = sectors.pop(stamp)
+            yield _decision(reader, decisions.pop(stamp), seen), seen
+        for kept in (sectors, answered):
+            if len(kept) > REMEMBERED:
+                kept.popitem(last=False)
+        if len(decisions) > REMEMBERED:
             break
-    if waiting:
+    if decisions:
         raise BagError(
-            f"{reader.path}: no sectors at stamp {next(iter(waiting))} ns; was the bag edited?"
+            f"{reader.path}: no sectors at stamp {next(iter(decisions))} ns; was the bag edited?"
         )
 
 
-def _decision(reader: BagReader, diagnostics: Any, sectors: Any) -> Decision:
-    try:
-        return decision(diagnostics, _seen(sectors))
-    except InputError as error:
-        raise BagError(f"{reader.path}: {error}") from None
+def rising_decisions(reader: BagReader) -> Iterator[Answered]:
+    """stream_decisions; raises BagError where a stamp goes back."""
+    last_ns = -1
+    for found, sectors in stream_decisions(reader):
+        if found.stamp_ns < last_ns:
+            raise BagError(
+                f"{reader.path}: the decision at stamp {found.stamp_ns} ns comes after that at "
+                f"{last_ns} ns; `mfba verify` says what else was edited"
+            )
+        last_ns = found.stamp_ns
+        yield found, sectors
 
 
-def _seen(sectors: Any) -> Ranges:
+def ranges_seen(sectors: Any) -> Ranges:
     """What the planner made of a sectors message: nothing, where it refused it."""
     try:
         return sector_ranges(sectors)
     except InputError:
         return ()
+
+
+def _decision(reader: BagReader, diagnostics: Any, sectors: Any) -> Decision:
+    try:
+        return decision(diagnostics, ranges_seen(sectors))
+    except InputError as error:
+        raise BagError(f"{reader.path}: {error}") from None

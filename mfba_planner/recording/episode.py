@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -17,10 +18,11 @@ from mfba_planner.scenarios import load_scenario
 
 from ..core.errors import BagError, ConfigError, InputError
 from .configuration import read_configuration
-from .decisions import stream_decisions
+from .decisions import rising_decisions, stream_decisions
 from .reader import BagReader
 
 T = TypeVar("T")
+
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
     """The Episode a bag of ours holds; `salvage` also reads one that was never closed.
@@ -29,36 +31,27 @@ def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
     decision's inputs are missing.
     """
     with BagReader(path, salvage=salvage) as reader:
-        try:
-            return _read(reader)
-        except (ConfigError, InputError) as error:
-            raise BagError(f"{path}: {error}") from None
-
-
-def _read(reader: BagReader) -> Episode:
-    setup = read_setup(reader)
-    return setup.episode(tuple(found for found, _ in stream_decisions(reader)))
+        setup = read_setup(reader)
+        ticks: dict[int, Decision] = {}
+        for found, _ in stream_decisions(reader):
+            ticks.setdefault(found.stamp_ns, found)
+    return setup.episode(tuple(ticks[stamp] for stamp in sorted(ticks)))
 
 
 def summarize(path: str | Path, *, salvage: bool = False) -> tuple[Episode, Result, str]:
     """Of a bag of any length: an Episode with its last tick only, the Result, the digest.
 
-    Streams; raises as read_episode does.
+    Streams; raises as read_episode does, and where the stamp of a decision goes back.
     """
     with BagReader(path, salvage=salvage) as reader:
-        try:
-            setup = read_setup(reader)
-            tally: Tally | None = None
-            hashed = Digest()
-            for found, _ in stream_decisions(reader):
-                tally = tally or Tally(setup.episode((found,)))
-                tally.add(found)
-                hashed.add(found)
-                last = found
-        except (ConfigError, InputError) as error:
-            raise BagError(f"{path}: {error}") from None
-    assert tally is not None  # stream_decisions yields one or raises
-    episode = setup.episode((last,))
+        setup = read_setup(reader)
+        stream = (found for found, _ in rising_decisions(reader))
+        first = next(stream)  # or it raises
+        tally, hashed = Tally(setup.episode((first,))), Digest()
+        for tick in chain([first], stream):
+            tally.add(tick)
+            hashed.add(tick)
+    episode = setup.episode((tick,))
     return episode, tally.result(episode.outcome), hashed.hexdigest()
 
 
@@ -101,6 +94,8 @@ def read_setup(reader: BagReader) -> Setup:
             driver=configuration["run"].get("driver", "by hand"),
             lockstep=bool(planner["lockstep"]),
         )
+    except (ConfigError, InputError) as error:
+        raise BagError(f"{reader.path}: {error}") from None
     except KeyError as error:
         raise BagError(
             f"{reader.path}: its configuration lacks {error}; record with `mfba run`"

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..core.planner import NANO
 from ..messages import bits_text
-from .decisions import stream_decisions
+from .decisions import rising_decisions
 from .reader import BagReader
 
 Row = dict[str, Any]
@@ -35,9 +35,9 @@ COLUMNS: dict[str, tuple[type, str]] = {
 
 
 def read_rows(reader: BagReader) -> Iterator[Row]:
-    """Yield the rows under rising stamps. Raises BagError as stream_decisions does."""
+    """Yield the rows under rising stamps. Raises BagError as rising_decisions does."""
     first_ns: int | None = None
-    for found, sectors in stream_decisions(reader):
+    for found, sectors in rising_decisions(reader):
         first_ns = found.stamp_ns if first_ns is None else first_ns
         goal = found.goal or (None, None)
         yield {

@@ -74,26 +74,24 @@ class Recorder(GraphNode):
     def _on_clock(self, letter: Letter) -> None:
         self._tick_before_ns = self._log_time_ns
         self._log_time_ns = stamp_ns(deserialize_message(letter.data, ClockMsg).clock)
-        for name, held in self._held:
-            self._write(name, held)
+        for name, data in [*self._held, ("/clock", letter.data)]:
+            self._write(name, data, self._log_time_ns)
         self._held.clear()
-        self._write("/clock", letter.data)
 
     def _on_message(self, name: str, is_of_tick: bool, letter: Letter) -> None:
+        log_time_ns = self._log_time_ns
         if not self.settings.sim_time:
-            self._log_time_ns = letter.received_ns or time.time_ns()  # not all middleware says
-        elif not self._log_time_ns:
+            log_time_ns = letter.received_ns or time.time_ns()  # not all middleware says
+        elif not log_time_ns:
             self._held.append((name, letter.data))  # latched before the first tick
             return
         elif is_of_tick and header_stamp_ns(letter.data) == self._tick_before_ns:
-            self._write(name, letter.data, self._tick_before_ns)  # said while the world moved on
-            return
-        self._write(name, letter.data)
+            log_time_ns = self._tick_before_ns or log_time_ns  # said while the world moved on
+        self._write(name, letter.data, log_time_ns)
 
-    def _write(self, name: str, data: bytes, log_time_ns: int = 0) -> None:
+    def _write(self, name: str, data: bytes, log_time_ns: int) -> None:
         if name in self._types:  # its writer came late
             self._announce(name)
-        log_time_ns = log_time_ns or self._log_time_ns
         self.writer.write(name, data, log_time_ns, log_time_ns)
 
     def _announce(self, name: str) -> None:
@@ -128,9 +126,9 @@ class Recorder(GraphNode):
         """Write what has come or is held and finish the bag."""
         for _ in range(2):  # what was sent during the first round waits for the second
             self._letterboxes.empty()
+        now_ns = time.time_ns()  # of a clock that never came
         for name, held in self._held:
-            self._log_time_ns = self._log_time_ns or time.time_ns()
-            self._write(name, held)
+            self._write(name, held, now_ns)
         self.explain(self._survey.found)
         self.writer.close()
 

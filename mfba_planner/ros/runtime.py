@@ -119,13 +119,7 @@ class GraphNode(Node):
         several = len(profiles) > 1
         # With several, a writer that does not fit the one fits the other: no warning then.
         events = SubscriptionEventCallbacks(use_default_callbacks=not several)
-        once = Once()
-
-        def call_once(message: Any, info: Any) -> None:
-            if once.is_new(info):
-                callback(message)
-
-        call: Any = call_once if several else callback
+        call: Any = _once(callback) if several else callback
         for qos in profiles:
             self.create_subscription(kind, name, call, qos, event_callbacks=events)
 
@@ -209,6 +203,17 @@ class GraphNode(Node):
         while self._jumps:
             self._jumps.pop().unregister()
         super().destroy_node()
+
+
+def _once(callback: Callable[[Any], None]) -> Callable[[Any, Any], None]:
+    """Hand each message on once, though two subscriptions bring it."""
+    once = Once()
+
+    def call(message: Any, info: Any) -> None:
+        if once.is_new(info):
+            callback(message)
+
+    return call
 
 
 class Refusals:

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..core.digest import digest
-from ..core.errors import BagError, ConfigError, InputError
+from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner import Decision, Mode, Planner, observe
 from ..core.sensing import sense_circles, sensory_vector
@@ -34,20 +34,19 @@ from .evidence import (
 )
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """What a check of a bag has found; identical when nothing speaks against it."""
+    """What a check of a bag has found; identical when nothing speaks against it.
+
+    divergence is the first recorded decision that is not what the planner decides.
+    """
 
     setup: Setup
     recorded: tuple[Decision, ...]
     decided: tuple[Decision, ...]
-    faults: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def divergence(self) -> Divergence | None:
-        """The first recorded decision that is not what the planner decides."""
-        return first_divergence(self.recorded, self.decided)
+    divergence: Divergence | None
+    faults: tuple[str, ...]
+    notes: tuple[str, ...]
 
     @property
     def is_identical(self) -> bool:
@@ -65,18 +64,13 @@ def verify(path: str | Path) -> Report:
     with BagReader(path) as reader:
         for file in reader.file_paths:
             check_data(file)
-        try:
-            setup = read_setup(reader)
-            evidence = gather(reader, setup.planner.tick_ns if setup.lockstep else None)
-        except (ConfigError, InputError) as error:
-            raise BagError(f"{path}: {error}") from None
+        setup = read_setup(reader)
+        evidence = gather(reader, setup.planner.tick_ns if setup.lockstep else None)
     return _check(setup, evidence)
 
 
 def _check(setup: Setup, evidence: Evidence) -> Report:
-    report = Report(
-        setup=setup, recorded=(), decided=(), faults=evidence.faults, notes=evidence.notes
-    )
+    faults, notes = [*evidence.faults], [*evidence.notes]
     brain = Planner(setup.planner, setup.seed)
     goals = deque(evidence.goals)
     goal: Point | None = None
@@ -90,14 +84,14 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         try:
             was = read_decision(tick.said[DECISION], () if isinstance(ranges, str) else ranges)
         except InputError as error:
-            report.faults.append(f"stamp {tick.stamp_ns} ns: {error}")
+            faults.append(f"stamp {tick.stamp_ns} ns: {error}")
             continue
         if was.goal != goal:
             while goals and goal != was.goal:
                 goal = goals.popleft()
                 brain.reset()
             if goal != was.goal:
-                report.faults.append(
+                faults.append(
                     f"stamp {tick.stamp_ns} ns: decided for a goal that no /goal_pose gave"
                 )
                 goal = was.goal
@@ -111,11 +105,17 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         pose = observation.pose
         recorded.append(was)
         decided.append(brain.decide(observation))
-        report.faults += _contradictions(setup, tick, was)
+        faults += _contradictions(setup, tick, was)
     if unchecked:
-        report.notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
-    report.recorded, report.decided = tuple(recorded), tuple(decided)
-    return report
+        notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
+    return Report(
+        setup=setup,
+        recorded=tuple(recorded),
+        decided=tuple(decided),
+        divergence=first_divergence(recorded, decided),
+        faults=tuple(faults),
+        notes=tuple(notes),
+    )
 
 
 def _read(reader: Any, message: Any) -> Any:
@@ -155,8 +155,7 @@ def _step_agrees(step: Any, was: Decision) -> bool:
 
 
 def _twist_agrees(twist: Any, was: Decision) -> bool:
-    said = velocity(getattr(twist, "twist", twist))
-    return said == (*rotated(was.velocity, -was.pose.yaw), 0.0)
+    return bool(_read(velocity, twist) == (*rotated(was.velocity, -was.pose.yaw), 0.0))
 
 
 def _is_sensed(setup: Setup, tick: Tick, was: Decision) -> bool:

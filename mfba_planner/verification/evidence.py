@@ -3,19 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 from ..core.errors import InputError
 from ..core.geometry import Point
-from ..messages import goal_point, sector_ranges, stamp_ns
-from ..recording.decisions import require_decisions
+from ..messages import goal_point, stamp_ns
+from ..recording.decisions import DECISION, SECTORS, ranges_seen, require_decisions
 from ..recording.reader import BagReader
 
-ODOM, OBSTACLES, SECTORS, VECTOR = "/odom", "/obstacles", "/sectors", "/sensory_vector"
-GOAL, STEP, TWIST, DECISION = "/goal_pose", "/goal_step", "/cmd_vel", "/planner/decision"
+ODOM, OBSTACLES, VECTOR = "/odom", "/obstacles", "/sensory_vector"
+GOAL, STEP, TWIST = "/goal_pose", "/goal_step", "/cmd_vel"
 STAMPED = (ODOM, OBSTACLES, SECTORS, STEP, DECISION)
 
 
@@ -51,8 +50,10 @@ def gather(reader: BagReader, tick_ns: int | None) -> Evidence:
     for topic in STAMPED:
         # In real time a later decision on a stamp only says that its inputs have become stale.
         _join(found, ticks, topic, heard[topic], all_alike=bool(tick_ns) or topic != DECISION)
-    _join_by_order(found, ticks, heard, SECTORS, VECTOR, _is_seen)
-    _join_by_order(found, ticks, heard, STEP, TWIST, lambda _: True)
+    # No sensory vector follows where the sensor was blind.
+    seen = [message for message in heard[SECTORS] if ranges_seen(message)]
+    _join_by_order(found, ticks, SECTORS, seen, VECTOR, heard[VECTOR])
+    _join_by_order(found, ticks, STEP, heard[STEP], TWIST, heard[TWIST])
     found.ticks = [ticks[stamp] for stamp in sorted(ticks)]
     if tick_ns:
         _look_for_gaps(found, tick_ns)
@@ -103,26 +104,15 @@ def _content(topic: str, message: Any) -> str:
     return str(message)
 
 
-def _is_seen(sectors: Any) -> bool:
-    """Whether a sensory vector follows these sectors: not where the sensor was blind."""
-    try:
-        sector_ranges(sectors)
-    except InputError:
-        return False
-    return True
-
-
 def _join_by_order(
     found: Evidence,
     ticks: dict[int, Tick],
-    heard: dict[str, list[Any]],
     stamped: str,
+    leaders: list[Any],
     topic: str,
-    follows: Callable[[Any], bool],
+    followers: list[Any],
 ) -> None:
     """Give messages without a stamp the one of the message that each of them followed."""
-    leaders = [message for message in heard[stamped] if follows(message)]
-    followers = heard[topic]
     if not leaders or not followers:
         return
     if hasattr(followers[0], "header"):
@@ -132,9 +122,8 @@ def _join_by_order(
         found.faults.append(f"{topic}: {len(followers)} messages for {len(leaders)} on {stamped}")
         return
     for leader, follower in zip(leaders, followers):
-        said = ticks[stamp_ns(leader.header.stamp)].said
-        if str(said.setdefault(topic, follower)) != str(follower):
-            stamp = stamp_ns(leader.header.stamp)
+        stamp = stamp_ns(leader.header.stamp)
+        if str(ticks[stamp].said.setdefault(topic, follower)) != str(follower):
             found.faults.append(f"{topic}: stamp {stamp} ns is there twice, and not alike")
 
 
