@@ -51,7 +51,7 @@ def decisions(ranges_m: tuple[float, ...], mode: Mode) -> Callable[[int], object
 
     def once(stamp: int) -> object:
         pose = Pose2D(1.0 + 1e-4 * (stamp % 50_000), 2.0)
-        decision = planner.decide(
+        decision = planner.plan(
             Observation(stamp_ns=stamp, now_ns=stamp, pose=pose, ranges_m=ranges_m, goal=GOAL)
         )
         assert decision.mode is mode

@@ -89,7 +89,7 @@ def test_the_driver_is_sense_decide_move() -> None:
     for k, tick in enumerate(episode.ticks):
         stamp, t = (k + 1) * params.tick_ns, k * params.tick_ns * 1e-9
         ranges = sense_circles(pose.position, scenario.enlarged(t), sensor)
-        assert tick == brain.decide(
+        assert tick == brain.plan(
             Observation(
                 stamp_ns=stamp, now_ns=stamp, pose=pose, ranges_m=ranges, goal=(12.0, 12.0)
             )

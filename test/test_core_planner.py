@@ -259,7 +259,7 @@ def test_the_velocity_leads_to_the_waypoint_and_never_too_fast(
     bat = BatParams(bounds=bounds, schedule=Schedule.RAW)
     params = PlannerParams(speed_mps=speed, step_length_m=step, swarm=swarm, bat=bat)
     planner = Planner(params, seed)
-    decision = planner.decide(observe(pose=Pose2D(x, y), goal=(gx, gy), ranges_m=ring))
+    decision = planner.plan(observe(pose=Pose2D(x, y), goal=(gx, gy), ranges_m=ring))
     assert decision.mode in (Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE)
     dt = params.tick_ns * 1e-9
     reached = (x + decision.velocity[0] * dt, y + decision.velocity[1] * dt)
@@ -302,7 +302,7 @@ def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
 def test_the_last_step_is_cut_to_the_goal(kind: Swarm) -> None:
     params = PlannerParams(step_length_m=0.25, swarm=kind)
     for goal, exact in (((1.25, 2.0), True), ((1.1, 2.1), True), ((1.2500001, 2.0), False)):
-        decision = Planner(params, 0).decide(observe(goal=goal))
+        decision = Planner(params, 0).plan(observe(goal=goal))
         assert decision.mode is Mode.PATH_GENERATION
         assert (decision.waypoint == goal) is exact
         assert bool(decision.candidates) is not exact
@@ -338,7 +338,7 @@ def drive(planner: Planner, scenario: Scenario, ticks: int) -> list[Decision]:
             ranges_m=sense(world, SensorParams()),
             goal=scenario.goal_m,
         )
-        decisions.append(planner.decide(obs))
+        decisions.append(planner.plan(obs))
         world.step(decisions[-1].velocity)
     return decisions
 
@@ -349,7 +349,7 @@ def test_a_planner_that_is_restarted_decides_as_the_first_one_did(name: str) -> 
     for k in (1, 7, 20, len(episode.ticks) - 1):
         restarted = Planner(PARAMS, 5)
         for tick in episode.ticks[k:]:
-            again = restarted.decide(
+            again = restarted.plan(
                 observe(
                     stamp_ns=tick.stamp_ns,
                     now_ns=tick.stamp_ns,
@@ -363,7 +363,7 @@ def test_a_planner_that_is_restarted_decides_as_the_first_one_did(name: str) -> 
 
 def test_decisions_depend_on_the_seed_and_on_the_stamp() -> None:
     ways = {
-        Planner(PARAMS, seed).decide(observe(stamp_ns=stamp, now_ns=stamp)).waypoint
+        Planner(PARAMS, seed).plan(observe(stamp_ns=stamp, now_ns=stamp)).waypoint
         for seed in range(5)
         for stamp in (1, 2, 10**18)
     }
@@ -372,23 +372,23 @@ def test_decisions_depend_on_the_seed_and_on_the_stamp() -> None:
 
 def test_a_planner_remembers_its_mode_until_the_goal_changes() -> None:
     planner = Planner(PARAMS, 0)
-    assert planner.decide(observe(goal=(1.0, 2.0))).mode is Mode.ARRIVED
+    assert planner.plan(observe(goal=(1.0, 2.0))).mode is Mode.ARRIVED
     away = {"pose": Pose2D(5.0, 5.0)}
-    assert planner.decide(observe(goal=(1.0, 2.0), **away)).mode is Mode.ARRIVED
+    assert planner.plan(observe(goal=(1.0, 2.0), **away)).mode is Mode.ARRIVED
     assert planner.mode is Mode.ARRIVED
-    assert planner.decide(observe(goal=(1.0, 2.5), **away)).mode is Mode.PATH_GENERATION
-    assert planner.decide(observe(goal=(5.0, 5.0), **away)).mode is Mode.ARRIVED
-    assert planner.decide(observe(goal=None, **away)).mode is Mode.IDLE
-    assert planner.decide(observe(goal=(1.0, 2.0), **away)).mode is Mode.PATH_GENERATION
+    assert planner.plan(observe(goal=(1.0, 2.5), **away)).mode is Mode.PATH_GENERATION
+    assert planner.plan(observe(goal=(5.0, 5.0), **away)).mode is Mode.ARRIVED
+    assert planner.plan(observe(goal=None, **away)).mode is Mode.IDLE
+    assert planner.plan(observe(goal=(1.0, 2.0), **away)).mode is Mode.PATH_GENERATION
 
 
 def test_reset_forgets_arrival() -> None:
     planner = Planner(PARAMS, 0)
-    planner.decide(observe(goal=(1.0, 2.0)))
+    planner.plan(observe(goal=(1.0, 2.0)))
     planner.reset()
     assert planner.mode is Mode.IDLE
     away = observe(goal=(1.0, 2.0), pose=Pose2D(5.0, 5.0))
-    assert planner.decide(away).mode is Mode.PATH_GENERATION
+    assert planner.plan(away).mode is Mode.PATH_GENERATION
 
 
 # --- the persistent swarm of Fig. 1 ---------------------------------------------------------
@@ -405,10 +405,10 @@ def test_fig_1_keeps_its_swarm_over_the_trip() -> None:
     obs = observe(
         stamp_ns=tick.stamp_ns, now_ns=tick.stamp_ns, pose=tick.pose, goal=scenario.goal_m
     )
-    assert Planner(FIG1, 3).decide(obs).candidates != tick.candidates, "it has a memory"
-    for restart in (fresh.reset, lambda: fresh.decide(replace(obs, goal=(0.0, 9.0)))):
+    assert Planner(FIG1, 3).plan(obs).candidates != tick.candidates, "it has a memory"
+    for restart in (fresh.reset, lambda: fresh.plan(replace(obs, goal=(0.0, 9.0)))):
         restart()
-        assert fresh.decide(obs) == Planner(FIG1, 3).decide(obs)
+        assert fresh.plan(obs) == Planner(FIG1, 3).plan(obs)
 
 
 def test_fig_1_steps_one_bat_iteration_at_a_time_to_the_best_point_seen() -> None:
@@ -437,8 +437,8 @@ def test_fig_1_spreads_the_schedule_of_eq_10_over_the_trip() -> None:
     params = replace(FIG1, bat=bat)
     # 0.95 m to go in steps of 0.1 m: T = 10
     planner, goal = Planner(params, 1), (1.95, 2.0)
-    first = planner.decide(observe(goal=goal))
-    second = planner.decide(observe(goal=goal))
+    first = planner.plan(observe(goal=goal))
+    second = planner.plan(observe(goal=goal))
     best = min(first.candidates, key=lambda c: math.dist(c, goal))
     for old, new in zip(first.candidates, second.candidates):
         expected = [o + (b - o) * 0.1 for o, b in zip(old, best)]

@@ -125,7 +125,7 @@ def test_decisions_are_the_cores_and_travel_whole(graph: Graph, params: PlannerP
         pair = [odom(stamp, x, y, yaw), sectors(stamp, ranges)]
         message = talk.answer(*(pair if stamp % 2 else reversed(pair)))
         answer = read_decision(message, ranges)
-        expected = core.decide(
+        expected = core.plan(
             Observation(stamp_ns=stamp, pose=answer.pose, ranges_m=ranges, goal=GOAL, now_ns=stamp)
         )
         assert answer == expected

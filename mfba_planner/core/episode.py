@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from .geometry import Point, Pose2D, distance
-from .planner import NANO, Decision, Observation, Planner, PlannerParams
+from .planner import NANO, Decision, Observation, PathPlanner, Planner, PlannerParams
 from .sensing import Ranges, SensorParams, sense_circles
 from .world import Scenario
 
@@ -89,6 +89,20 @@ def sense(world: World, params: SensorParams) -> Ranges:
     return sense_circles(world.pose.position, world.scenario.enlarged(world.time_s), params)
 
 
+def look(world: World, sensor: SensorParams) -> Observation:
+    """What the paper's planner gets to know at the present tick: pose, sectors, goal."""
+    return Observation(
+        stamp_ns=world.stamp_ns,
+        pose=world.pose,
+        ranges_m=sense(world, sensor),
+        goal=world.scenario.goal_m,
+        now_ns=world.stamp_ns,
+    )
+
+
+Look = Callable[[World, SensorParams], Observation]
+
+
 def run(
     scenario: Scenario,
     *,
@@ -96,19 +110,23 @@ def run(
     sensor: SensorParams | None = None,
     seed: int = 0,
     go_on: Callable[[World], bool] = lambda _: True,
+    brain: PathPlanner | None = None,
+    look: Look = look,
 ) -> Episode:
     """The core driver: Algorithm 1 from start to goal or time limit, without ROS.
 
-    go_on sees the world after every decision and ends the run by returning False.
+    go_on sees the world after every decision and ends the run by returning False. brain takes
+    the decisions instead of Algorithm 1, with planner's speed, step and tolerance; look is what
+    it gets to know.
     """
     planner = planner or PlannerParams()
     sensor = sensor or SensorParams()
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m)
-    brain = Planner(planner, seed)
-    ticks = [_turn(world, brain, sensor)]
+    brain = brain or Planner(planner, seed)
+    ticks = [brain.plan(look(world, sensor))]
     while (outcome := world.outcome()) is None and go_on(world):
         world.step(ticks[-1].velocity)
-        ticks.append(_turn(world, brain, sensor))
+        ticks.append(brain.plan(look(world, sensor)))
     return Episode(
         scenario=scenario,
         sensor=sensor,
@@ -117,17 +135,4 @@ def run(
         driver="core",
         ticks=tuple(ticks),
         outcome=outcome or Outcome.INTERRUPTED,
-    )
-
-
-def _turn(world: World, brain: Planner, sensor: SensorParams) -> Decision:
-    """The decision at the present tick, also at the one where the run has ended."""
-    return brain.decide(
-        Observation(
-            stamp_ns=world.stamp_ns,
-            pose=world.pose,
-            ranges_m=sense(world, sensor),
-            goal=world.scenario.goal_m,
-            now_ns=world.stamp_ns,
-        )
     )

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Protocol
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from .errors import ConfigError
 from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
 from .geometry import Point, Pose2D, bearing, distance, towards
 from .options import check, option
-from .sensing import Bits, Ranges, sensory_vector
+from .sensing import Bits, Ranges, Scan, sensory_vector
 
 NANO = 1e-9
 PLANNER_STREAM = 1  # spawn key of the planner's SeedSequence child; one number per purpose
@@ -103,8 +104,21 @@ class PlannerParams:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Circle:
+    """An obstacle as a planner may know it, enlarged by the robot: m and m/s in the odom frame."""
+
+    center_m: Point
+    radius_m: float
+    velocity_mps: Point = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
-    """What the planner knows at one tick; now_ns - stamp_ns is the age of the inputs."""
+    """What the planner knows at one tick; now_ns - stamp_ns is the age of the inputs.
+
+    The paper's planner reads the sectors alone. circles (what is within SR) and scan (real
+    surfaces, in a frame aligned with odom) are for planners that want more than bits.
+    """
 
     stamp_ns: int
     pose: Pose2D
@@ -112,6 +126,8 @@ class Observation:
     goal: Point | None
     now_ns: int
     refused: str = ""
+    circles: tuple[Circle, ...] | None = None
+    scan: Scan | None = None
 
 
 Refused = str  # an input that was refused travels as its reason
@@ -153,6 +169,14 @@ class Decision:
     waypoint: Point
     velocity: Point
     candidates: tuple[Point, ...] = ()
+
+
+class PathPlanner(Protocol):
+    """What may drive the robot: one Observation in, one Decision out; it may remember."""
+
+    def plan(self, obs: Observation) -> Decision:
+        """Answer one observation; called once per tick, stamps rising."""
+        ...
 
 
 Generate = Callable[[Point, Point], tuple[Point, tuple[Point, ...]]]
@@ -260,7 +284,7 @@ class Planner:
         """Forget everything but parameters and seed (a jump of time, a new trip)."""
         self.mode, self._goal, self._swarm = Mode.IDLE, None, None
 
-    def decide(self, obs: Observation) -> Decision:
+    def plan(self, obs: Observation) -> Decision:
         """Answer one observation and remember the mode."""
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)

@@ -106,7 +106,7 @@ class PlannerNode(GraphNode):
             return
         seen = observe(stamp, pose, ranges, self._goal, self._pose, round(age_s / NANO))
         self._pose = seen.pose
-        decision = self.brain.decide(seen)
+        decision = self.brain.plan(seen)
         if decision.mode is Mode.STOPPED:
             self.get_logger().warning(decision.reason, throttle_duration_sec=1.0)
         self._last = decision

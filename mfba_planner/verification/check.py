@@ -104,7 +104,7 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         observation = observe(tick.stamp_ns, seen, ranges, goal, pose)
         pose = observation.pose
         recorded.append(was)
-        decided.append(brain.decide(observation))
+        decided.append(brain.plan(observation))
         faults += _contradictions(setup, tick, was)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
