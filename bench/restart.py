@@ -8,68 +8,30 @@ which picks up at the tick the world repeats. The bag is then verified without R
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from by_hand import ByHand
 
 from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import run
 from mfba_planner.core.planner import PlannerParams
-from mfba_planner.launcher.crew import Crew
-from mfba_planner.launcher.domain import private_domain
-from mfba_planner.launcher.monitor import Monitor
 from mfba_planner.paper import readings
-from mfba_planner.ros import topics
-from mfba_planner.run_config import NODES, RunConfig, node_parameters, run_facts
+from mfba_planner.run_config import RunConfig
 from mfba_planner.scenarios import load_scenario
 from mfba_planner.verification.check import verify
-
-TIMEOUT_S = 120.0
 
 
 def interrupted_run(config: RunConfig, kill_at: int, bag: Path) -> None:
     """Run case and kill; return when the world says that the run is over."""
-    told = node_parameters(config, (*NODES, topics.RECORDER))
-    told["world_sim"] |= {"answer_timeout_s": 0.5, "answer_retries": 60}
-    recorder = {"output": str(bag), "nodes": ",".join(NODES), "sim_time": True}
-    recorder["run"] = json.dumps(run_facts(config))
-    lines: list[str] = []
-    with (
-        private_domain() as domain,
-        Monitor(domain) as monitor,
-        Crew(lambda name, line: lines.append(f"{name}: {line}"), lambda: False) as crew,
-    ):
-        deadline = time.monotonic() + TIMEOUT_S
-
-        def until(done: object, what: str) -> None:
-            while not done():  # type: ignore[operator]
-                assert time.monotonic() < deadline, f"{what}\n" + "\n".join(lines[-20:])
-                monitor.spin(0.01)
-
-        crew.start({topics.RECORDER: recorder, **told}, {})
-        for name, question in monitor.ask_ready([topics.RECORDER, *NODES]).items():
-            until(lambda q=question: (a := q.answer()) is not None and a.success, f"{name} ready")
-        monitor.listen()
-        pause = monitor.ask_pause(False)
-        until(lambda: pause.answer() is not None, "pause")
-        tick_ns = config.planner.tick_ns
-
-        def tick() -> int:
-            monitor.take_in()
-            now = monitor.progress()
-            return now.stamp_ns // tick_ns - 1 if now else -1
-
-        until(lambda: tick() >= kill_at or monitor.ticks_at_end(), "tick to kill at")
-        (planner,) = [child for child in crew.children if child.name == topics.PLANNER]
-        planner.process.kill()
-        planner.process.wait()
-        crew.children.remove(planner)
-        crew.start({topics.PLANNER: told[topics.PLANNER] | {"wait_for": ""}}, {})
-        until(monitor.ticks_at_end, "end of the run")
+    with ByHand(config, bag, answer_timeout_s=0.5, answer_retries=60) as run:
+        run.start()
+        over = run.monitor.ticks_at_end
+        run.until(lambda: run.tick() >= kill_at or over(), "tick to kill at")
+        run.replace_planner()
+        run.end()
 
 
 def main() -> int:

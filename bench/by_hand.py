@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded run, a process per node, conducted by hand: for benches that disturb it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from mfba_planner.launcher.crew import Crew
+from mfba_planner.launcher.domain import private_domain
+from mfba_planner.launcher.monitor import Monitor
+from mfba_planner.ros import topics
+from mfba_planner.run_config import NODES, RunConfig, node_parameters, run_facts
+
+TIMEOUT_S = 180.0
+ALL = (topics.RECORDER, *NODES)
+
+
+class ByHand:
+    """The nodes of one run in a domain of their own; all of them end with the context."""
+
+    def __init__(self, config: RunConfig, bag: Path, **world: Any) -> None:
+        """Prepare; world holds further parameters of world_sim."""
+        self.told = node_parameters(config, ALL)
+        self.told[topics.WORLD_SIM] |= world
+        self.told[topics.RECORDER] = {
+            "output": str(bag),
+            "nodes": ",".join(NODES),
+            "sim_time": True,
+            "run": json.dumps(run_facts(config)),
+        }
+        self._tick_ns = config.planner.tick_ns
+        self._lines: list[str] = []
+        self._stack = ExitStack()
+
+    def __enter__(self) -> ByHand:
+        domain = self._stack.enter_context(private_domain())
+        self.monitor = self._stack.enter_context(Monitor(domain))
+        hear = lambda name, line: self._lines.append(f"{name}: {line}")  # noqa: E731
+        self.crew = self._stack.enter_context(Crew(hear, lambda: False))
+        self._deadline = time.monotonic() + TIMEOUT_S
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.__exit__(kind, error, trace)
+
+    def until(self, done: Callable[[], Any], what: str) -> None:
+        """Spin until done; AssertionError with the nodes' last lines after TIMEOUT_S."""
+        while not done():
+            if time.monotonic() > self._deadline:
+                raise AssertionError(f"{what}: never\n" + "\n".join(self._lines[-20:]))
+            self.monitor.spin(0.01)
+
+    def start(self, order: Sequence[str] = ALL, delays_s: Sequence[float] = ()) -> None:
+        """Start the nodes in an order, each after a delay; then let them play."""
+        for name, delay_s in zip(order, [*delays_s, *[0.0] * len(order)]):
+            due = time.monotonic() + delay_s
+            self.until(lambda due=due: time.monotonic() >= due, "delay")  # type: ignore[misc]
+            self.crew.start({name: self.told[name]}, {})
+        for name, question in self.monitor.ask_ready(ALL).items():
+            ready = lambda q=question: (a := q.answer()) is not None and a.success  # noqa: E731
+            self.until(ready, f"{name} ready")
+        self.monitor.listen()
+        self.until(self.monitor.ask_pause(False).answer, "pause")
+
+    def tick(self) -> int:
+        """The last tick that was decided, -1 before the first."""
+        self.monitor.take_in()
+        now = self.monitor.progress()
+        return now.stamp_ns // self._tick_ns - 1 if now else -1
+
+    def end(self) -> None:
+        """Wait until the world says that the run is over."""
+        self.until(self.monitor.ticks_at_end, "end of the run")
+
+    def replace_planner(self) -> None:
+        """Kill the planner with -9 and start another."""
+        (planner,) = [child for child in self.crew.children if child.name == topics.PLANNER]
+        planner.process.kill()
+        planner.process.wait()
+        self.crew.children.remove(planner)
+        self.crew.start({topics.PLANNER: self.told[topics.PLANNER] | {"wait_for": ""}}, {})
