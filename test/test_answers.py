@@ -34,6 +34,16 @@ def test_a_twist_older_than_every_goal_step_is_nobodys() -> None:
     assert heard.take(7) == "a"
 
 
+def test_a_twist_that_was_taken_answers_nothing_sent_in_its_nanosecond() -> None:
+    heard = Answers()
+    heard.goal_step(7, sent_ns=10)
+    heard.cmd_vel("seven", sent_ns=11)
+    assert heard.take(7) == "seven"
+    heard.goal_step(8, sent_ns=11)
+    heard.cmd_vel("eight", sent_ns=12)
+    assert heard.take(8) == "eight"
+
+
 def test_a_second_answer_to_one_tick_is_none_to_the_next() -> None:
     heard = Answers()
     for sent_ns in (10, 20):

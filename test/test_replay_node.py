@@ -19,11 +19,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 
+from mfba_planner.core.digest import digest
 from mfba_planner.core.errors import BagError, ConfigError, GraphError
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.planner import Mode, PlannerParams
 from mfba_planner.core.sensing import SensorParams
-from mfba_planner.messages import decision
+from mfba_planner.messages import decision, sector_ranges
 from mfba_planner.recording.qos import OfferedQos
 from mfba_planner.recording.writer import BagWriter
 from mfba_planner.ros import topics
@@ -32,6 +33,7 @@ from mfba_planner.ros.planner import PlannerNode
 from mfba_planner.ros.replay import Replay
 from mfba_planner.ros.replay_args import parse
 from mfba_planner.ros.virtual_sensor import VirtualSensor
+from mfba_planner.verification.scratch import Robot, decide_from_scratch
 
 COUNT = 40
 LATCHED_QOS = topics.LATCHED_QOS
@@ -278,6 +280,7 @@ def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
     graph: Graph, line: str
 ) -> None:
     decisions, vectors = graph.hear(topics.DECISION), graph.hear(topics.SENSORY_VECTOR)
+    sectors = graph.hear(topics.SECTORS)
     graph.start(VirtualSensor, {"source": "scan", "lockstep": True, "wait_for": "planner"})
     graph.start(PlannerNode, {"lockstep": True})
     nodes = "--inputs-of virtual_sensor planner --wait-for-subscribers"
@@ -285,8 +288,10 @@ def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
     graph.until(lambda: len(decisions) >= 133)
     graph.settle()
     assert (len(decisions), len(vectors)) == (133, 133)
-    modes = {decision(message, ()).mode for message in decisions}
-    assert modes == {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE}
+    found = [decision(why, sector_ranges(ring)) for why, ring in zip(decisions, sectors)]
+    assert {tick.mode for tick in found} == {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE}
+    alone = decide_from_scratch(FOREIGN, Robot(robot_radius_m=0.3))
+    assert digest(found) == alone.digest, "verify decides as the nodes do"
 
 
 def test_it_waits_for_subscribers_and_says_for_whom(graph: Graph, bag: Path) -> None:

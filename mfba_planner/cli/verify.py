@@ -11,10 +11,12 @@ from ..core.episode import Episode, run
 from ..core.errors import BagError, ConfigError
 from ..launcher.options import add_set_argument, with_settings
 from ..outputs import bag_in
+from ..recording.reader import BagReader
 from ..verification.check import Report, verify
 from ..verification.compare import Divergence, first_divergence, side_by_side
-
-SHOWN = 10  # faults; more of them say nothing new
+from ..verification.scratch import is_foreign
+from . import from_scratch
+from .from_scratch import show_remarks
 
 
 def main(args: list[str]) -> int:
@@ -32,10 +34,15 @@ def main(args: list[str]) -> int:
     parser.add_argument(
         "--picture", type=Path, metavar="PNG", help="with --set: both trails, a file to create"
     )
+    from_scratch.add_arguments(parser)
     found = parser.parse(args)
+    bag = bag_in(found.bag)
+    with BagReader(bag) as reader:
+        if is_foreign(reader):
+            return from_scratch.report(bag, found)
+    from_scratch.refuse_arguments(bag, found)
     if found.picture and not found.settings:
         raise ConfigError("--picture: there is one trail only; give --set NAME=VALUE as well")
-    bag = bag_in(found.bag)
     report = verify(bag)
     _show(report)
     if not report.is_identical:
@@ -50,12 +57,7 @@ def main(args: list[str]) -> int:
 
 
 def _show(report: Report) -> None:
-    for note in report.notes:
-        print(f"note: {note}")
-    for fault in report.faults[:SHOWN]:
-        print(f"fault: {fault}")
-    if len(report.faults) > SHOWN:
-        print(f"fault: ... and {len(report.faults) - SHOWN} more")
+    show_remarks(report)
     if report.divergence:
         _show_divergence(report.divergence, "recorded", "decided again")
     elif not report.faults:

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner would decide on a recording of /scan and /odom that is not ours."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..core.digest import digest
+from ..core.errors import BagError, InputError
+from ..core.geometry import Point, Pose2D
+from ..core.planner import Decision, Planner, PlannerParams, Refused, observe
+from ..core.sensing import Ranges, SensorParams, sense_scan
+from ..messages import goal_point, laser_scan, robot_pose, stamp_ns
+from ..recording.integrity import check_data
+from ..recording.reader import BagReader
+
+ODOMETRY, SCAN, GOAL = (
+    "nav_msgs/msg/Odometry",
+    "sensor_msgs/msg/LaserScan",
+    "geometry_msgs/msg/PoseStamped",
+)
+GOAL_TOPIC = "goal_pose"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robot:
+    """What a recording does not say; goal None: the one that was recorded."""
+
+    robot_radius_m: float
+    scan_yaw_rad: float = 0.0
+    goal: Point | None = None
+    scan: str = ""
+    odom: str = ""
+    planner: PlannerParams = field(default_factory=PlannerParams)
+    sensor: SensorParams = field(default_factory=SensorParams)
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FromScratch:
+    """The decisions on every scan; faults speak against the recording, notes do not."""
+
+    decided: tuple[Decision, ...]
+    faults: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def digest(self) -> str:
+        """Decision digest."""
+        return digest(self.decided)
+
+
+def is_foreign(reader: BagReader) -> bool:
+    """Whether a bag has scans and odometry, but neither decisions nor sectors of ours."""
+    types = {topic.type_name for topic in reader.topics.values()}
+    ours = {"/planner/decision", "/sectors"} & set(reader.topics)
+    return not ours and {ODOMETRY, SCAN} <= types
+
+
+def decide_from_scratch(path: str | Path, robot: Robot) -> FromScratch:
+    """Decide on every scan with the odometry of its stamp, or the newest recorded before it.
+
+    As virtual_sensor (source: scan) and planner do when the bag is replayed. Raises BagError for
+    a bag that cannot be read, without goal, or where topics must be named.
+    """
+    with BagReader(path) as reader:
+        for file in reader.file_paths:
+            check_data(file)
+        scan = _topic(reader, SCAN, robot.scan, "--scan")
+        odom = _topic(reader, ODOMETRY, robot.odom, "--odom")
+        faults: list[str] = []
+        poses = _Poses(reader, odom, faults)
+        goals = _goals(reader, robot)
+        return _Decider(robot, poses, goals, faults).on(reader, scan)
+
+
+def _topic(reader: BagReader, kind: str, wanted: str, option: str) -> str:
+    found = sorted(name for name, topic in reader.topics.items() if topic.type_name == kind)
+    if wanted in found:
+        return wanted
+    if wanted or len(found) > 1:
+        what = f"{option} {wanted}: not one of" if wanted else f"{len(found)} topics of {kind},"
+        raise BagError(f"{reader.path}: {what} {', '.join(found)}; name one with {option}")
+    return found[0]
+
+
+def _goals(reader: BagReader, robot: Robot) -> list[tuple[int, Point]]:
+    """Goals and when they were recorded, rising."""
+    if robot.goal is not None:
+        return [(-1, robot.goal)]
+    names = [
+        name
+        for name, topic in reader.topics.items()
+        if topic.type_name == GOAL and name.rpartition("/")[2] == GOAL_TOPIC
+    ]
+    goals = []
+    for message in reader.decoded(names) if names else ():
+        try:
+            goals.append((message.log_time_ns, goal_point(message.message)))
+        except InputError:  # the planner would refuse it as well
+            continue
+    if not goals:
+        raise BagError(f"{reader.path}: no {GOAL_TOPIC} was recorded; give one with --goal X Y")
+    return goals
+
+
+class _Poses:
+    """All poses of a recording: by stamp, and by when they were recorded."""
+
+    def __init__(self, reader: BagReader, topic: str, faults: list[str]) -> None:
+        self.by_stamp: dict[int, Pose2D | Refused] = {}
+        self._times_ns: list[int] = []
+        self._all: list[tuple[int, Pose2D | Refused]] = []
+        last_ns = -1
+        for message in reader.decoded([topic]):
+            stamp = stamp_ns(message.message.header.stamp)
+            if stamp <= last_ns:
+                faults.append(f"{topic}: stamp {stamp} ns comes after {last_ns} ns")
+                continue
+            last_ns = stamp
+            pose = _read(robot_pose, message.message)
+            self.by_stamp[stamp] = pose
+            self._times_ns.append(message.log_time_ns)
+            self._all.append((stamp, pose))
+
+    def newest(self, log_time_ns: int) -> tuple[int, Pose2D | Refused] | None:
+        """(stamp, pose) recorded last before a time."""
+        place = bisect_right(self._times_ns, log_time_ns)
+        return self._all[place - 1] if place else None
+
+
+class _Decider:
+    """Takes the scans one by one."""
+
+    def __init__(
+        self, robot: Robot, poses: _Poses, goals: list[tuple[int, Point]], faults: list[str]
+    ) -> None:
+        self._robot = robot
+        self._poses = poses
+        self._goals = goals
+        self._faults = faults
+        self._brain = Planner(robot.planner, robot.seed)
+        self._pose = Pose2D(0.0, 0.0)
+        self._counts: Counter[str] = Counter()
+
+    def on(self, reader: BagReader, topic: str) -> FromScratch:
+        decided = []
+        last_ns = -1
+        for message in reader.decoded([topic]):
+            stamp = stamp_ns(message.message.header.stamp)
+            if stamp <= last_ns:
+                self._faults.append(f"{topic}: stamp {stamp} ns comes after {last_ns} ns")
+                continue
+            last_ns = stamp
+            decision = self._decide(stamp, message.log_time_ns, message.message)
+            if decision is not None:
+                decided.append(decision)
+        return FromScratch(
+            decided=tuple(decided),
+            faults=tuple(self._faults),
+            notes=tuple(f"{count} scans {what}" for what, count in self._counts.items()),
+        )
+
+    def _decide(self, stamp: int, log_time_ns: int, scan: Any) -> Decision | None:
+        if stamp in self._poses.by_stamp:
+            posed_ns, pose = stamp, self._poses.by_stamp[stamp]
+        elif newest := self._poses.newest(log_time_ns):
+            posed_ns, pose = newest
+            self._counts["without odometry of their stamp: the newest before them was taken"] += 1
+        else:
+            self._counts["before the first odometry: not decided"] += 1
+            return None
+        ranges = self._measure(pose, scan)
+        if isinstance(ranges, str):
+            self._counts["that the sensor refuses"] += 1
+        goal = next((g for t, g in reversed(self._goals) if t <= log_time_ns), None)
+        seen = observe(stamp, pose, ranges, goal, self._pose, max(stamp - posed_ns, 0))
+        self._pose = seen.pose
+        return self._brain.plan(seen)
+
+    def _measure(self, pose: Pose2D | Refused, scan: Any) -> Ranges | Refused:
+        if isinstance(pose, str):
+            return pose
+        robot = self._robot
+        yaw = pose.yaw + robot.scan_yaw_rad
+        return _read(
+            lambda x: sense_scan(laser_scan(x), yaw, robot.robot_radius_m, robot.sensor), scan
+        )
+
+
+def _read(reader: Any, message: Any) -> Any:
+    """The value, or the reason why it is refused."""
+    try:
+        return reader(message)
+    except InputError as error:
+        return str(error)

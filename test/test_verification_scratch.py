@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""mfba verify of recordings that are not ours: decisions from scratch."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from edited_bags import record
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.serialization import serialize_message
+from recording_bags import FOREIGN, SECOND
+from sensor_msgs.msg import LaserScan
+
+from mfba_planner import cli
+from mfba_planner.core.errors import BagError, ConfigError, MfbaError
+from mfba_planner.core.planner import Mode
+from mfba_planner.recording.writer import BagWriter
+from mfba_planner.verification.scratch import Robot, decide_from_scratch
+
+ROBOT = Robot(robot_radius_m=0.3)
+TICK_NS = SECOND // 10
+Message = tuple[str, Any, int]  # topic, message, log time
+
+
+def odom(stamp_ns: int, x: float = 0.0) -> Message:
+    message = Odometry()
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, SECOND)
+    message.pose.pose.position.x = x
+    return "/robot/odom", message, stamp_ns
+
+
+def scan(stamp_ns: int, ahead_m: float = math.inf, beams: int = 36) -> Message:
+    """Beam 0 looks along +x."""
+    message = LaserScan(angle_increment=2.0 * math.pi / beams, range_max=10.0)
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, SECOND)
+    message.ranges = [ahead_m] + [math.inf] * (beams - 1)
+    return "/front/scan", message, stamp_ns
+
+
+def goal(stamp_ns: int, x: float, y: float, topic: str = "/goal_pose") -> Message:
+    message = PoseStamped()
+    message.pose.position.x, message.pose.position.y = x, y
+    return topic, message, stamp_ns
+
+
+def bag(path: Path, *messages: Message) -> Path:
+    kinds = {Odometry: "nav_msgs/msg/Odometry", LaserScan: "sensor_msgs/msg/LaserScan"}
+    with BagWriter(path) as writer:
+        for topic, message, time_ns in messages:
+            writer.add_topic(topic, kinds.get(type(message), "geometry_msgs/msg/PoseStamped"))
+            writer.write(topic, serialize_message(message), time_ns, time_ns)
+    return path
+
+
+def test_each_scan_is_decided_on_the_odometry_of_its_stamp(tmp_path: Path) -> None:
+    messages = [goal(0, 10.0, 0.0)]
+    for k in range(1, 6):
+        messages += [scan(k * TICK_NS, 0.9 if k == 3 else math.inf), odom(k * TICK_NS, 0.1 * k)]
+    found = decide_from_scratch(bag(tmp_path / "bag", *messages), ROBOT)
+    assert not found.faults
+    assert not found.notes
+    assert [tick.pose.x for tick in found.decided] == [0.1 * k for k in range(1, 6)]
+    assert [tick.mode is Mode.OBSTACLE_AVOIDANCE for tick in found.decided] == [
+        False, False, True, False, False,
+    ]  # fmt: skip
+
+
+def test_without_one_of_its_stamp_the_newest_before_counts(tmp_path: Path) -> None:
+    path = bag(
+        tmp_path / "bag",
+        goal(0, 10.0, 0.0),
+        scan(1 * TICK_NS),
+        odom(2 * TICK_NS, 1.0),
+        odom(3 * TICK_NS, 2.0),
+        scan(3 * TICK_NS + 5),
+        odom(4 * TICK_NS, 3.0),
+        scan(3 * TICK_NS + 2 * SECOND),
+    )
+    found = decide_from_scratch(path, ROBOT)
+    assert [tick.pose.x for tick in found.decided] == [2.0, 3.0]
+    assert [tick.mode for tick in found.decided] == [Mode.PATH_GENERATION, Mode.STOPPED]
+    assert found.decided[1].reason == "input is 1.900 s old"
+    assert found.notes == (
+        "1 scans before the first odometry: not decided",
+        "2 scans without odometry of their stamp: the newest before them was taken",
+    )
+
+
+def test_before_the_goal_the_robot_waits_and_a_new_goal_counts_from_then(tmp_path: Path) -> None:
+    path = bag(
+        tmp_path / "bag",
+        *(odom(k * TICK_NS) for k in range(1, 5)),
+        scan(1 * TICK_NS),
+        goal(2 * TICK_NS, 5.0, 0.0),
+        scan(2 * TICK_NS),
+        goal(3 * TICK_NS, math.nan, 0.0),
+        scan(3 * TICK_NS),
+        goal(4 * TICK_NS, 0.0, 5.0),
+        scan(4 * TICK_NS),
+    )
+    goals = [tick.goal for tick in decide_from_scratch(path, ROBOT).decided]
+    assert goals == [None, (5.0, 0.0), (5.0, 0.0), (0.0, 5.0)]
+    given = decide_from_scratch(path, replace(ROBOT, goal=(7.0, 7.0)))
+    assert {tick.goal for tick in given.decided} == {(7.0, 7.0)}
+
+
+def test_the_robots_size_and_the_scans_yaw_count(tmp_path: Path) -> None:
+    path = bag(tmp_path / "bag", goal(0, 10.0, 0.0), odom(TICK_NS), scan(TICK_NS, 1.2))
+
+    def bits(**changes: Any) -> list[int]:
+        (tick,) = decide_from_scratch(path, replace(ROBOT, **changes)).decided
+        return [number for number, bit in enumerate(tick.vs, start=1) if bit]
+
+    assert bits(robot_radius_m=0.3) == []
+    assert bits(robot_radius_m=0.45) == [1, 12]
+    assert bits(robot_radius_m=0.45, scan_yaw_rad=math.pi / 2) == [3, 4]
+
+
+def test_stamps_that_go_back_and_refused_inputs_are_named(tmp_path: Path) -> None:
+    bad = odom(3 * TICK_NS, math.nan)
+    path = bag(
+        tmp_path / "bag",
+        goal(0, 10.0, 0.0),
+        odom(2 * TICK_NS),
+        (*odom(1 * TICK_NS)[:2], 2 * TICK_NS),
+        scan(2 * TICK_NS),
+        (*scan(2 * TICK_NS)[:2], 3 * TICK_NS),
+        bad,
+        scan(3 * TICK_NS),
+        odom(4 * TICK_NS),
+        scan(4 * TICK_NS, math.nan, beams=1),
+    )
+    found = decide_from_scratch(path, ROBOT)
+    assert found.faults == (
+        f"/robot/odom: stamp {TICK_NS} ns comes after {2 * TICK_NS} ns",
+        f"/front/scan: stamp {2 * TICK_NS} ns comes after {2 * TICK_NS} ns",
+    )
+    assert [tick.mode for tick in found.decided] == [
+        Mode.PATH_GENERATION, Mode.STOPPED, Mode.STOPPED,
+    ]  # fmt: skip
+    assert found.notes == ("2 scans that the sensor refuses",)
+
+
+def test_two_scans_must_be_chosen_from(tmp_path: Path) -> None:
+    _, message, time_ns = scan(TICK_NS, 0.9)
+    path = bag(
+        tmp_path / "bag", goal(0, 9.0, 0.0), odom(TICK_NS), scan(TICK_NS),
+        ("/rear", message, time_ns),
+    )  # fmt: skip
+    with pytest.raises(BagError, match=r"2 topics of .*LaserScan, /front/scan, /rear; name one"):
+        decide_from_scratch(path, ROBOT)
+    (front,) = decide_from_scratch(path, replace(ROBOT, scan="/front/scan")).decided
+    (rear,) = decide_from_scratch(path, replace(ROBOT, scan="/rear")).decided
+    assert (any(front.vs), any(rear.vs)) == (False, True)
+
+
+def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["verify", str(FOREIGN)]) == 0
+    expected = decide_from_scratch(FOREIGN, ROBOT)
+    assert capsys.readouterr().out == (
+        f"modes: obstacle_avoidance 67, path_generation 66\n"
+        f"from scratch, 133 decisions, digest {expected.digest}\n"
+    )
+    assert cli.main(["verify", str(FOREIGN), "--set", "sensor.sensing_range_m=0.05"]) == 0
+    other = capsys.readouterr().out
+    assert "133 decisions" in other
+    assert expected.digest not in other
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--closed-loop", "not a recording of ours, so there is no world to simulate"),
+        ("--goal nan 1", "--goal nan 1.0: not finite"),
+        ("--seed -1", "seed=-1: negative"),
+        ("--robot-radius -1", "robot_radius_m=-1.0: out of range"),
+        ("--odom /o", "--odom /o: not one of /odom; name one with --odom"),
+        ("--set planner.speed=1", "unknown option; did you mean"),
+    ],
+)
+def test_mistakes(options: str, message: str) -> None:
+    with pytest.raises(MfbaError, match=message):
+        cli.main(["verify", str(FOREIGN), *options.split()])
+
+
+def test_faults_are_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    again = [(*scan(TICK_NS)[:2], TICK_NS + k) for k in range(13)]
+    path = bag(tmp_path / "bag", goal(0, 9.0, 0.0), odom(TICK_NS), *again)
+    with pytest.raises(BagError, match="12 faults, the first: /front/scan: stamp 100000000 ns"):
+        cli.main(["verify", str(path)])
+    assert "fault: ... and 2 more\n" in capsys.readouterr().out
+
+
+def test_without_goal(tmp_path: Path) -> None:
+    path = bag(tmp_path / "bag", odom(TICK_NS), scan(TICK_NS))
+    with pytest.raises(BagError, match="no goal_pose was recorded; give one with --goal X Y"):
+        cli.main(["verify", str(path)])
+    assert cli.main(["verify", str(path), "--goal", "1", "2"]) == 0
+
+
+def test_a_bag_of_ours_says_all_that_itself(tmp_path: Path) -> None:
+    ours = record(tmp_path / "ours", "case1", 2)
+    with pytest.raises(ConfigError, match=r"--seed: .* says that itself; leave it out"):
+        cli.main(["verify", str(ours), "--seed", "3"])
