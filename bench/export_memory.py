@@ -20,6 +20,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.episode import run
+from mfba_planner.core.options import flatten
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.core.sensing import SensorParams
 from mfba_planner.recording.configuration import attach_configuration
@@ -45,7 +46,10 @@ def write_bag(path: Path, size_bytes: int) -> int:
             ("/scan", "sensor_msgs/msg/LaserScan"),
         ):
             writer.add_topic(name, kind)
-        attach_configuration(writer, {"nodes": node_parameters(config, ()), "run": {}})
+        nodes = node_parameters(config, ())
+        nodes["world_sim"]["scenario_json"] = nodes["world_sim"]["scenario"]
+        nodes["planner"] |= flatten(config.planner)
+        attach_configuration(writer, {"nodes": nodes, "run": {}})
         written = count = 0
         while written < size_bytes:
             decision = ticks[count % len(ticks)]
@@ -70,7 +74,7 @@ def write_bag(path: Path, size_bytes: int) -> int:
 def main() -> None:
     """Print the largest resident set of each command on the bag."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--megabytes", type=int, default=1100)
+    parser.add_argument("--megabytes", type=int, default=1250)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as root:
         bag = Path(root) / "bag"
@@ -81,11 +85,13 @@ def main() -> None:
                       ["export", str(bag), f"{root}/run.parquet"],
                       ["info", str(bag)]):  # fmt: skip
             started = time.monotonic()
-            child = subprocess.Popen(
-                [sys.executable, "-c", MFBA, *words], stdout=subprocess.DEVNULL
-            )
-            _, status, used = os.wait4(child.pid, 0)
+            with tempfile.TemporaryFile("w+") as said:
+                child = subprocess.Popen([sys.executable, "-c", MFBA, *words], stdout=said)
+                _, status, used = os.wait4(child.pid, 0)
+                said.seek(0)
+                text = said.read()
             took = time.monotonic() - started
+            assert f"{ticks} rows" in text or "\ndigest " in text, text
             name = f"{words[0]} {Path(words[-1]).suffix}"
             print(
                 f"{name:<16} exit {status}, {used.ru_maxrss / 1024:.0f} MB resident at most, "

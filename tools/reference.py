@@ -14,10 +14,11 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from mfba_planner import node_settings as settings
 from mfba_planner.core.options import walk
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.core.sensing import SensorParams
-from mfba_planner.ros import settings, topics
+from mfba_planner.ros import topics
 
 README = Path(__file__).resolve().parent.parent / "README.md"
 

@@ -13,7 +13,7 @@ from ..core.geometry import Point
 from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
 from ..launcher.options import with_settings
-from ..ros.settings import VirtualSensorSettings
+from ..node_settings import VirtualSensorSettings
 from ..verification.check import Report
 from ..verification.scratch import FromScratch, Robot, decide_from_scratch
 

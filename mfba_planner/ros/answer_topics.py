@@ -9,12 +9,12 @@ from typing import Any
 from geometry_msgs.msg import TwistStamped
 
 from ..messages import stamp_ns
+from ..node_settings import WorldSimSettings
 from . import topics
 from .answers import Answers
 from .letterboxes import Letter, Letterboxes
 from .runtime import GraphNode
 from .serialized import header_stamp_ns
-from .settings import WorldSimSettings
 
 
 class AnswerTopics:

@@ -12,10 +12,10 @@ from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner import NANO, Decision, Mode, Planner, PlannerParams, observe
 from ..messages import goal_point, robot_pose, sector_ranges, stamp_ns
+from ..node_settings import PlannerSettings, names
 from . import convert, markers, params, topics
 from .inputs import Lockstep, Newest, Ready
 from .runtime import GraphNode, Refusals, spin_node
-from .settings import PlannerSettings, names
 
 
 class PlannerNode(GraphNode):

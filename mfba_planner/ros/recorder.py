@@ -16,6 +16,7 @@ from rosgraph_msgs.msg import Clock as ClockMsg
 
 from ..core.errors import ConfigError
 from ..messages import stamp_ns
+from ..node_settings import RecorderSettings, names
 from ..outputs import new_run_directory
 from ..recording.configuration import attach_configuration
 from ..recording.qos import OfferedQos
@@ -27,7 +28,6 @@ from .letterboxes import Deliver, Letter, Letterboxes
 from .qos import offered
 from .runtime import GraphNode, spin_node
 from .serialized import has_header, header_stamp_ns, type_name
-from .settings import RecorderSettings, names
 from .survey import Found, ParameterSurvey
 
 EMPTY_PERIOD_S = 0.02  # far below what a crash may cost, and a hundred times a message's cost

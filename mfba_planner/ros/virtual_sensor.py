@@ -18,11 +18,11 @@ from ..core.sensing import (
     sensory_vector,
 )
 from ..messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
+from ..node_settings import Source, VirtualSensorSettings, names
 from . import params, topics
 from .convert import sectors_msg, sensory_vector_msg
 from .pairing import StampPairs
 from .runtime import GraphNode, Refusals, spin_node
-from .settings import Source, VirtualSensorSettings, names
 
 _DEFAULT_RADII = [0.3]
 

@@ -13,12 +13,12 @@ from ..core.episode import World
 from ..core.errors import InputError
 from ..core.planner import NANO
 from ..messages import pose2d, rotated, velocity
+from ..node_settings import WorldSimSettings, names
 from ..scenarios import load_scenario, scenario_to_json
 from . import params, topics
 from .answer_topics import AnswerTopics
 from .pace import Pace
 from .runtime import GraphNode, Refusals, spin_node
-from .settings import WorldSimSettings, names
 from .world_topics import WorldTopics
 
 

@@ -7,9 +7,9 @@ from collections import deque
 
 from ..core.episode import Outcome, World
 from ..core.geometry import Point
+from ..node_settings import WorldSimSettings
 from . import convert, markers, topics
 from .runtime import GraphNode
-from .settings import WorldSimSettings
 
 TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is shown
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ..core.options import check, option
-from ..core.planner import PlannerParams
-from ..core.world import Scenario
+from .core.options import check, option
+from .core.planner import PlannerParams
+from .core.world import Scenario
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
 _WORLD_WAITS_FOR = f"{_WAIT_FOR}; in real time tick 0 waits too"
