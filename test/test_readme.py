@@ -52,7 +52,8 @@ def test_every_command_is_one_that_is_checked_here() -> None:
 
 def test_mfba_commands_run_in_order(tmp_path: Path) -> None:
     """All of them in one directory, as a reader would type them; then the Python blocks."""
-    (tmp_path / "config").symlink_to(ROOT / "config")
+    for name in ("config", "test"):
+        (tmp_path / name).symlink_to(ROOT / name)
     mfba = Path(sys.executable).parent / "mfba"
     for words in MFBA:
         if words[0] == "sim" and "100" in words:
