@@ -58,7 +58,8 @@ def main() -> int:
                 fate = "same digest"
             elif not report.is_identical:
                 refused += 1
-                fault = next(iter(report.faults), f"tick {report.divergence}")
+                first = report.divergence and f"tick {report.divergence.tick} differs"
+                fault = next(iter(report.faults), first)
                 fate = f"refused: {fault}"
             else:
                 silent += 1

@@ -88,6 +88,7 @@ def other_bit(bits: str) -> str:
         (one_changed(DECISION, 30, set_field("vg", other_bit)), "tick 30"),
         (one_changed(DECISION, 30, set_field("gap", lambda gap: str(int(gap) + 1))), "tick 30"),
         (one_changed(DECISION, 30, set_field("goal", lambda _: "1.0,2.0")), "for a goal that no"),
+        (one_changed(DECISION, 30, set_field("goal", lambda _: "")), "without the goal that was"),
         (one_changed(DECISION, 30, set_field("mode", lambda _: "flying")), "garbles"),
     ],
 )

@@ -91,9 +91,12 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
                 goal = goals.popleft()
                 brain.reset()
             if goal != was.goal:
-                faults.append(
-                    f"stamp {tick.stamp_ns} ns: decided for a goal that no /goal_pose gave"
+                what = (
+                    "without the goal that was known (a planner that was restarted?)"
+                    if was.goal is None
+                    else "for a goal that no /goal_pose gave"
                 )
+                faults.append(f"stamp {tick.stamp_ns} ns: decided {what}")
                 goal = was.goal
         seen: Any = was.pose
         if setup.lockstep:
