@@ -2,6 +2,7 @@
 """mfba verify: an honest bag is identical, and an edited one is caught and named."""
 
 import math
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from edited_bags import Edit, last_bit, one_changed, record, rewrite, set_field,
 from mfba_planner.core import episode
 from mfba_planner.core.digest import digest
 from mfba_planner.core.errors import BagError
+from mfba_planner.recording.integrity import check_data
 from mfba_planner.scenarios import load_scenario
 from mfba_planner.verification.check import verify
 
@@ -192,6 +194,20 @@ def test_any_one_bit_on_the_disk_is_noticed(bag: Path, tmp_path: Path) -> None:
         data[place] ^= bit
     copy.write_bytes(data)
     assert verify(copy).is_identical
+
+
+def test_an_index_that_points_elsewhere_is_named(bag: Path, tmp_path: Path) -> None:
+    """The footer ends in: start of the summary and of its offsets, CRC, eight bytes of magic."""
+    (source,) = bag.glob("*.mcap")
+    content = bytearray(source.read_bytes())
+    place = len(content) - 8 - 4 - 8 - 8
+    (start,) = struct.unpack_from("<Q", content, place)
+    struct.pack_into("<Q", content, place, start - 1)
+    path = tmp_path / source.name
+    path.write_bytes(content)
+    assert check_data(source)
+    with pytest.raises(BagError, match="data section does not end where its index says"):
+        check_data(path)
 
 
 def test_the_bag_that_is_checked_is_not_touched(bag: Path) -> None:
