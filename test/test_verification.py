@@ -8,11 +8,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from edited_bags import Edit, last_bit, one_changed, record, rewrite, set_field, swapped
+from edited_bags import (
+    Edit,
+    each_changed,
+    last_bit,
+    one_changed,
+    record,
+    rewrite,
+    set_field,
+    swapped,
+)
 
 from mfba_planner.core import episode
 from mfba_planner.core.digest import digest
 from mfba_planner.core.errors import BagError
+from mfba_planner.core.planner import Mode
+from mfba_planner.messages import stamp_ns
 from mfba_planner.recording.integrity import check_data
 from mfba_planner.scenarios import load_scenario
 from mfba_planner.verification.check import verify
@@ -155,6 +166,22 @@ def test_missing_and_reordered_messages_are_named(
     report = verify(rewrite(bag, tmp_path / "edited", edit))
     assert not report.is_identical
     assert any(named in fault for fault in report.faults), report.faults
+
+
+def test_a_stamp_between_two_ticks_is_named(bag: Path, tmp_path: Path) -> None:
+    """Of a tick at which no bats flew, as their numbers hang on the stamp."""
+    ticks = verify(bag).recorded
+    stamp = next(t.stamp_ns for t in ticks if t.mode is Mode.OBSTACLE_AVOIDANCE)
+
+    def later(_: str, message: Any) -> Any:
+        if hasattr(message, "header") and stamp_ns(message.header.stamp) == stamp:
+            message.header.stamp.nanosec += 1
+        return message
+
+    report = verify(rewrite(bag, tmp_path / "edited", each_changed(later)))
+    assert report.divergence is None
+    tick_ns = ticks[1].stamp_ns - ticks[0].stamp_ns
+    assert f"stamp {stamp + 1} ns: no tick of {tick_ns} ns after the last" in report.faults
 
 
 def test_a_repeated_message_is_noted_but_is_no_contradiction(bag: Path, tmp_path: Path) -> None:

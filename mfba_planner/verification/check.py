@@ -89,7 +89,6 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         if was.goal != goal:
             while goals and goal != was.goal:
                 goal = goals.popleft()
-                brain.reset()
             if goal != was.goal:
                 what = (
                     "without the goal that was known (a planner that was restarted?)"
