@@ -42,6 +42,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "figures": ({"core", "paper", "report", "scenarios"}, set()),
     "watched": ({"core", "paper"}, {"rich"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
+    "worlds": ({"core", "scenarios", "worlds"}, {"numpy"}),
+    "oracle": ({"core", "oracle"}, {"numpy", "scipy"}),
     "messages": ({"core"}, {"numpy"}),
     "run_config": ({"core", "scenarios"}, {"numpy"}),
     "paper": ({"core", "outputs", "paper"}, {"numpy", "scipy"}),
