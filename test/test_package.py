@@ -43,6 +43,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "figures": ({"core", "paper", "report", "scenarios"}, set()),
     "watched": ({"core", "paper"}, {"rich"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
+    "worlds": ({"core", "scenarios", "worlds"}, {"numpy"}),
+    "oracle": ({"core", "oracle"}, {"numpy", "scipy"}),
     "messages": ({"core"}, {"numpy"}),
     "node_settings": ({"core"}, set()),
     "run_config": ({"core", "scenarios"}, {"numpy"}),
