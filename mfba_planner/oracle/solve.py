@@ -156,8 +156,6 @@ class _Task:
                 return [way for way in ways if not self._touched(way, legs)]
             self.active |= touched
 
-    def _by_lattice(
-        self, legs: Legs, limit_s: float, params: LatticeParams
-    ) -> list[np.ndarray]:
+    def _by_lattice(self, legs: Legs, limit_s: float, params: LatticeParams) -> list[np.ndarray]:
         start, goal = self.scenario.start_m, self.scenario.goal_m
         return lattice_ways(start, goal, self.v, legs, limit_s, params, self.inside)

@@ -152,9 +152,7 @@ class Search:
             parts.append(self._along(x, y, t, leg, side))
         origin, ex, ey, et, eleg, eside = (np.concatenate(column) for column in zip(*parts))
         f = et + np.hypot(ex - self.goal[0], ey - self.goal[1]) / self.v
-        keep = np.flatnonzero(
-            (f <= limit) & (et <= self.horizon) & within(self.inside, ex, ey)
-        )
+        keep = np.flatnonzero((f <= limit) & (et <= self.horizon) & within(self.inside, ex, ey))
         origin, ex, ey, et, eleg, eside, f = (
             column[keep] for column in (origin, ex, ey, et, eleg, eside, f)
         )
@@ -221,9 +219,7 @@ class Search:
                 parts.append((i, ex, ey, end[i, j], j, np.full(len(i), s)))
         return parts
 
-    def _kinks(
-        self, x: np.ndarray, y: np.ndarray, t: np.ndarray
-    ) -> list[tuple[np.ndarray, ...]]:
+    def _kinks(self, x: np.ndarray, y: np.ndarray, t: np.ndarray) -> list[tuple[np.ndarray, ...]]:
         """Places on a circle's edge that are reached just when it bounces or turns."""
         if not self.kinked.any():
             return []

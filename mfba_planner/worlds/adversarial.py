@@ -101,9 +101,7 @@ def corridor(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
         side = 1.0 if rng.random() < 0.5 else -1.0
         speed = trip.speed_mps * rng.uniform(*_SPEEDS)
         aside = side * rng.uniform(0.3, half - ENLARGED_M)
-        yield _mover(
-            trip.beside(rng.uniform(8.0, 18.0), aside), speed, trip.heading(math.pi)
-        )
+        yield _mover(trip.beside(rng.uniform(8.0, 18.0), aside), speed, trip.heading(math.pi))
 
 
 def closing_gap(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:

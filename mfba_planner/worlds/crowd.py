@@ -93,9 +93,7 @@ def _one(params: CrowdParams, rng: np.random.Generator) -> Obstacle:
     )
 
 
-def _place(
-    params: CrowdParams, radius_m: float, rng: np.random.Generator
-) -> tuple[float, float]:
+def _place(params: CrowdParams, radius_m: float, rng: np.random.Generator) -> tuple[float, float]:
     (x0, y0), (x1, y1) = ROOM.lower_m, ROOM.upper_m
     for _ in range(_TRIES):
         x = rng.uniform(x0 + radius_m, x1 - radius_m)
@@ -107,9 +105,7 @@ def _place(
     )
 
 
-def _turns(
-    params: CrowdParams, heading_rad: float, rng: np.random.Generator
-) -> tuple[Turn, ...]:
+def _turns(params: CrowdParams, heading_rad: float, rng: np.random.Generator) -> tuple[Turn, ...]:
     turns: list[Turn] = []
     t = 0.0
     while True:
