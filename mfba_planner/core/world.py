@@ -106,25 +106,6 @@ def center_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Poi
     )
 
 
-def velocity_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
-    """(vx, vy) in m/s at time t: turned round by every bounce before."""
-    velocity = obstacle.velocity
-    if walls is None:
-        return velocity
-    vx, vy = (
-        v
-        if _bounces(p + v * t_s, low + obstacle.radius_m, high - obstacle.radius_m) % 2 == 0
-        else -v
-        for p, v, low, high in zip(obstacle.center_m, velocity, walls.lower_m, walls.upper_m)
-    )
-    return (vx, vy)
-
-
-def _bounces(value: float, low: float, high: float) -> int:
-    """Number of folds that bring an unbounded coordinate into [low, high]."""
-    return math.floor((value - low) / (high - low)) if high > low else 0
-
-
 def _fold(value: float, low: float, high: float) -> float:
     """Reflect an unbounded coordinate into [low, high] (a triangle wave)."""
     if low <= value <= high:
