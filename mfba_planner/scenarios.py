@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .core.errors import ConfigError
 from .core.options import did_you_mean
-from .core.world import Obstacle, Scenario, Walls
+from .core.world import Obstacle, Scenario, Turn, Walls
 from .resources import scenario_names, scenario_path
 
 _EXAMPLE = "compare config/scenarios/case1.yaml"
@@ -38,27 +38,42 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class _Obstacle(_Strict):
-    center_m: _Point
-    radius_m: _Positive
-    speed_mps: _NotNegative = _default(Obstacle, "speed_mps")
+class _Heading(_Strict):
     heading_deg: _Number | None = None
     heading_rad: _Number | None = None  # what programs write: degrees would lose the last bit
 
-    def build(self) -> Obstacle:
+    def heading(self) -> float:
         if self.heading_deg is not None and self.heading_rad is not None:
             raise ConfigError(
                 f"heading_deg={self.heading_deg:g}: heading_rad={self.heading_rad:g} is given "
                 "as well; keep one of them"
             )
-        heading_rad = self.heading_rad
-        if heading_rad is None:
-            heading_rad = math.radians(self.heading_deg or 0.0)
+        if self.heading_rad is None:
+            return math.radians(self.heading_deg or 0.0)
+        return self.heading_rad
+
+
+class _Turn(_Heading):
+    at_s: _Positive
+    speed_mps: _NotNegative
+
+    def build(self) -> Turn:
+        return Turn(at_s=self.at_s, speed_mps=self.speed_mps, heading_rad=self.heading())
+
+
+class _Obstacle(_Heading):
+    center_m: _Point
+    radius_m: _Positive
+    speed_mps: _NotNegative = _default(Obstacle, "speed_mps")
+    turns: list[_Turn] = []
+
+    def build(self) -> Obstacle:
         return Obstacle(
             center_m=self.center_m,
             radius_m=self.radius_m,
             speed_mps=self.speed_mps,
-            heading_rad=heading_rad,
+            heading_rad=self.heading(),
+            turns=tuple(turn.build() for turn in self.turns),
         )
 
 
@@ -215,14 +230,21 @@ def _explain(error: ValidationError) -> str:
 
 
 def _keys_at(location: tuple[Any, ...]) -> list[str]:
-    models: dict[Any, type[BaseModel]] = {"obstacles": _Obstacle, "walls": _Walls}
-    head = location[0] if len(location) > 1 else None
-    return list(models.get(head, _Scenario).model_fields)
+    models: dict[Any, type[BaseModel]] = {
+        "obstacles": _Obstacle,
+        "turns": _Turn,
+        "walls": _Walls,
+    }
+    within = [models[part] for part in location[:-1] if part in models]
+    return list((within or [_Scenario])[-1].model_fields)
 
 
 def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
     """The scenario as plain data that load_scenario accepts and turns into an equal one."""
     plain: dict[str, Any] = json.loads(json.dumps(asdict(scenario)))
+    for obstacle in plain["obstacles"]:
+        if not obstacle["turns"]:  # most have none, and recordings compare scenarios as text
+            del obstacle["turns"]
     return plain
 
 

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 from .errors import ConfigError
@@ -12,17 +13,35 @@ from .geometry import Point, closest_approach, distance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Turn:
+    """From at_s (s) on, an obstacle moves at another speed (m/s) and heading (rad)."""
+
+    at_s: float
+    speed_mps: float
+    heading_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacle:
-    """A row of Table 4 or 6: centre at t = 0 (m), radius (m), speed (m/s), heading (rad)."""
+    """A row of Table 4 or 6: centre at t = 0 (m), radius (m), speed (m/s), heading (rad).
+
+    turns change speed and heading on the way, in order of time; the paper has none.
+    """
 
     center_m: Point
     radius_m: float
     speed_mps: float = 0.0
     heading_rad: float = 0.0
+    turns: tuple[Turn, ...] = ()
+
+    @property
+    def top_speed_mps(self) -> float:
+        """The highest speed of the whole motion in m/s."""
+        return max([self.speed_mps, *(turn.speed_mps for turn in self.turns)])
 
     @property
     def velocity(self) -> Point:
-        """(vx, vy) in m/s while no wall is met."""
+        """(vx, vy) in m/s until a wall is met or the first turn is due."""
         return (
             self.speed_mps * math.cos(self.heading_rad),
             self.speed_mps * math.sin(self.heading_rad),
@@ -63,6 +82,7 @@ class Scenario:
                 )
             if self.walls is not None:
                 _check_inside(number, obstacle, self.walls)
+            _check_turns(number, obstacle)
 
     def enlarged_radius(self, obstacle: Obstacle) -> float:
         """Obstacle radius plus robot radius (Fig. 4), metres."""
@@ -91,8 +111,44 @@ def _check_inside(number: int, obstacle: Obstacle, walls: Walls) -> None:
             )
 
 
+def _check_turns(number: int, obstacle: Obstacle) -> None:
+    times = [0.0, *(turn.at_s for turn in obstacle.turns)]
+    for before, at_s in pairwise(times):
+        if not before < at_s:
+            raise ConfigError(
+                f"obstacle {number} turns: at_s={at_s:g} does not come after {before:g}; "
+                "give the turns in order of time, the first after 0"
+            )
+
+
+@lru_cache(maxsize=4096)
+def _stretches(obstacle: Obstacle, walls: Walls | None) -> tuple[tuple[float, Obstacle], ...]:
+    """The motion cut at its turns: since when (s), and an obstacle that starts there then."""
+    at_s, now = 0.0, replace(obstacle, turns=())
+    stretches = [(at_s, now)]
+    for turn in obstacle.turns:
+        now = replace(
+            now,
+            center_m=center_at(now, turn.at_s - at_s, walls),
+            speed_mps=turn.speed_mps,
+            heading_rad=turn.heading_rad,
+        )
+        at_s = turn.at_s
+        stretches.append((at_s, now))
+    return tuple(stretches)
+
+
+def _stretch(obstacle: Obstacle, t_s: float, walls: Walls | None) -> tuple[float, Obstacle]:
+    """The stretch under way at time t; a turn's own moment belongs to what follows."""
+    number = sum(turn.at_s <= t_s for turn in obstacle.turns)
+    return _stretches(obstacle, walls)[number]
+
+
 def center_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
     """Centre at time t in metres: straight, or folded back into the walls; no drift with t."""
+    if obstacle.turns:
+        since_s, obstacle = _stretch(obstacle, t_s, walls)
+        t_s -= since_s
     x, y = (
         position + velocity * t_s
         for position, velocity in zip(obstacle.center_m, obstacle.velocity)
@@ -119,8 +175,39 @@ def _fold(value: float, low: float, high: float) -> float:
     return min(high, low + (offset if offset <= length else 2.0 * length - offset))
 
 
+def velocity_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
+    """(vx, vy) at time t in m/s; at a wall or a turn, the one that follows."""
+    if obstacle.turns:
+        since_s, obstacle = _stretch(obstacle, t_s, walls)
+        t_s -= since_s
+    if walls is None:
+        return obstacle.velocity
+    vx, vy = (
+        _folded_speed(
+            obstacle.center_m[axis],
+            obstacle.velocity[axis],
+            t_s,
+            walls.lower_m[axis] + obstacle.radius_m,
+            walls.upper_m[axis] - obstacle.radius_m,
+        )
+        for axis in (0, 1)
+    )
+    return (vx, vy)
+
+
+def _folded_speed(position: float, speed: float, t_s: float, low: float, high: float) -> float:
+    """The slope of _fold: it changes its sign with every reflection."""
+    if not high > low:
+        return 0.0
+    reached = (position + speed * t_s - low) / (high - low)
+    reflections = math.floor(reached) if speed >= 0.0 else math.ceil(reached) - 1
+    return -speed if reflections % 2 else speed
+
+
 def bounce_times(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:
-    """Times strictly within (t0, t1) at which the obstacle meets a wall, ascending."""
+    """Times strictly within (t0, t1) at which the obstacle meets a wall or turns, ascending."""
+    if obstacle.turns:
+        return _kinks(obstacle, t0_s, t1_s, walls)
     if walls is None:
         return []
     times = set()
@@ -138,13 +225,26 @@ def bounce_times(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | No
     return sorted(times)
 
 
+def _kinks(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:
+    stretches = _stretches(obstacle, walls)
+    times = {since_s for since_s, _ in stretches[1:] if t0_s < since_s < t1_s}
+    ends = [*(since_s for since_s, _ in stretches[1:]), math.inf]
+    starts = [-math.inf, *ends[:-1]]  # before t = 0 the first stretch goes on backwards
+    for start_s, end_s, (since_s, plain) in zip(starts, ends, stretches):
+        a, b = max(t0_s, start_s), min(t1_s, end_s)
+        if a < b:
+            bounces = bounce_times(plain, a - since_s, b - since_s, walls)
+            times.update(t for t in (since_s + t for t in bounces) if t0_s < t < t1_s)
+    return sorted(times)
+
+
 def step_clearances(
     scenario: Scenario, t0_s: float, t1_s: float, start: Point, end: Point
 ) -> list[float]:
     """Smallest gap (m) to each obstacle while the robot moves uniformly from start to end.
 
-    Continuous in time, not only at the ends, and exact through bounces: between two bounces
-    both motions are uniform. Negative means contact.
+    Continuous in time, not only at the ends, and exact through bounces and turns: between two
+    of them both motions are uniform. Negative means contact.
     """
     clearances = []
     for obstacle in scenario.obstacles:

@@ -80,18 +80,20 @@ def _track(ax: Axes, episode: Episode, view: View, obstacle: Obstacle, moment: P
     walls = episode.scenario.walls
     t0, t1 = span_s(episode)
     kind, longest = "track", _LONG * (view.width + view.height)
-    if walls and obstacle.speed_mps * (t1 - t0) > longest:
-        reach = 0.5 * longest / obstacle.speed_mps
+    if walls and obstacle.top_speed_mps * (t1 - t0) > longest:
+        reach = 0.5 * longest / obstacle.top_speed_mps
         t0, t1 = max(t0, moment.time_s - reach), min(t1, moment.time_s + reach)
         kind = "part"
-    if obstacle.speed_mps * (t1 - t0) <= 0.0:
+    if obstacle.top_speed_mps * (t1 - t0) <= 0.0:
         return
     points = track(obstacle, walls, t0, t1)
     line(ax, points, f"{kind}:{moment.number}", zorder=Z_TRACK, **style.TRACK)
     for t in np.linspace(t1, t0, _ARROW_TRIES, endpoint=False).tolist():
         tip = center_at(obstacle, t, walls)
         if view.holds(tip) and distance(tip, moment.center_m) > obstacle.radius_m:
-            tail = center_at(obstacle, t - _ARROW_M / obstacle.speed_mps, walls)
+            tail = center_at(obstacle, t - _ARROW_M / obstacle.top_speed_mps, walls)
+            if tail == tip:  # it stands still for a while
+                continue
             arrow = FancyArrowPatch(tail, tip, zorder=Z_TRACK, **style.ARROW)
             patch(ax, arrow, f"arrow:{moment.number}")
             break

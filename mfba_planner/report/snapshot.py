@@ -60,15 +60,16 @@ def _obstacle(ax: Axes, episode: Episode, index: int, number: int) -> None:
         center, scenario.enlarged_radius(obstacle), fill=False, zorder=Z_OBSTACLE, **edge
     )
     patch(ax, enlarged, f"{'seen' if sensed else 'enlarged'}:{number}")
-    if obstacle.speed_mps > 0.0:
+    if obstacle.top_speed_mps > 0.0:
         begin = span_s(episode)[0]
         if time_s > begin:
             points = track(obstacle, scenario.walls, begin, time_s)
             line(ax, points, f"past:{number}", zorder=Z_TRACK, **style.TRACK)
         bounces = bounce_times(obstacle, time_s, time_s + AHEAD_S, scenario.walls)
         tip = center_at(obstacle, min([time_s + AHEAD_S, *bounces]), scenario.walls)
-        arrow = FancyArrowPatch(center, tip, zorder=Z_OBSTACLE, **style.MOTION)
-        patch(ax, arrow, f"motion:{number}")
+        if tip != center:  # it may stand still for a while
+            arrow = FancyArrowPatch(center, tip, zorder=Z_OBSTACLE, **style.MOTION)
+            patch(ax, arrow, f"motion:{number}")
     body = Circle(center, obstacle.radius_m, zorder=Z_OBSTACLE, **style.OBSTACLE)
     patch(ax, body, f"body:{number}")
     label = ax.text(*center, str(number), zorder=Z_MARK, clip_on=True, **style.NUMBER)
