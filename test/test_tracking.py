@@ -170,5 +170,5 @@ def test_nan_and_too_long_ranges_are_no_returns() -> None:
 
 
 def test_options_are_checked() -> None:
-    with pytest.raises(ConfigError, match="range_sd_m=0.0: out of range"):
+    with pytest.raises(ConfigError, match=r"range_sd_m=0\.0: out of range"):
         TrackingParams(range_sd_m=0.0)

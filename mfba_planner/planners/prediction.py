@@ -69,9 +69,11 @@ class Prediction:
             (x, y), (vx, vy), r = circle.center_m, circle.velocity_mps, circle.radius_m
             margin = params.margin_m + params.margin_ticks * tick_s * math.sqrt(vx * vx + vy * vy)
             self._rows.append((x - px, y - py, vx, vy, r, margin, (r + margin) ** 2))
+        # The nearest first: it refuses most.
+        self._rows.sort(key=lambda row: row[0] * row[0] + row[1] * row[1] - row[6])
 
     def closed(self, ux: np.ndarray, uy: np.ndarray) -> np.ndarray:
-        """Whether a robot with velocity (ux, uy), (m,) each, comes too close within tau; (m,)."""
+        """Bits (m,): 1 where a robot with velocity (ux, uy) comes too close within tau."""
         x, y, vx, vy, _, _, outer = np.array(self._rows).T[:, :, None]
         wx, wy = vx - ux, vy - uy
         b = x * wx
@@ -82,8 +84,8 @@ class Prediction:
         t = np.minimum(np.maximum(-b / a, 0.0), self.params.horizon_s)
         away = x * x + y * y
         closest = (a * t + 2.0 * b) * t + away
-        closed: np.ndarray = (closest < np.minimum(away, outer) * _ROUNDING).any(axis=0)
-        return closed
+        near: np.ndarray = (closest < np.minimum(away, outer) * _ROUNDING).any(axis=0)
+        return near.astype(int)
 
     def cost(
         self, way: Point, t1: float, to_goal: Point, speed: float, bound: float = math.inf
@@ -118,8 +120,8 @@ class Prediction:
         approach at t costs close_m x times the share of the margin that is missing. Who is
         within a margin already may leave it in any direction, but not go deeper.
         """
-        p = self.params
-        worst = 0.0
+        p, worst = self.params, 0.0
+        tau, close, contact, urgent = p.horizon_s, p.close_m, p.contact_m, p.urgent_m
         for x, y, vx, vy, r, margin, outer in self._rows:
             dx, dy, wx, wy = x + vx * t0 - qx, y + vy * t0 - qy, vx - ux, vy - uy
             b = dx * wx + dy * wy
@@ -133,12 +135,15 @@ class Prediction:
             c = (a * t + 2.0 * b) * t + away
             if c >= outer or c >= away * _ROUNDING:
                 continue
-            missing = min(1.0, 1.0 - (math.sqrt(max(c, 0.0)) - r) / margin)
-            risk = missing * p.close_m * (1.0 - (t0 + t) / p.horizon_s)
+            missing = 1.0 - (math.sqrt(c) - r) / margin if c > 0.0 else 1.0
+            if missing > 1.0:
+                missing = 1.0
+            risk = missing * close * (1.0 - (t0 + t) / tau)
             if c < r * r:
-                before = math.sqrt((r * r - c) / a)
-                late = min(1.0, 1.0 - (t0 + max(0.0, t - before)) / p.horizon_s) ** 2
-                risk += late * (p.contact_m + p.urgent_m * late**3)
+                t -= math.sqrt((r * r - c) / a)
+                late = 1.0 - (t0 + t) / tau if t > 0.0 else 1.0 - t0 / tau
+                late *= late
+                risk += late * (contact + urgent * late * late * late)
             if risk > worst:
                 worst = risk
                 if worst >= bound:

@@ -20,7 +20,7 @@ from .steering import Move, Steering
 from .tracking import Tracker, TrackingParams
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # of a gap's waypoints, in reaches
-WAITS_S = (0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)
+WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, in full speeds; not 0, so that it has a direction
 SHUT = 12  # headings weighed when every one is closed
 _FREE_M = 1e-9
@@ -57,7 +57,7 @@ def preset(params: PlannerParams | None = None) -> PlannerParams:
     A step of 0.08 m is 0.1 s at 0.8 m/s: what an obstacle may do unseen stays small.
     """
     params = params or PlannerParams()
-    bat = replace(params.bat, population=8, iterations=2)
+    bat = replace(params.bat, population=5, iterations=2)
     return replace(params, step_length_m=0.08, bat=bat)
 
 
@@ -104,8 +104,8 @@ class Predictive(Steering):
         direct = world.cost(ahead, t_ahead, to_goal, speed)
         if direct <= left + _FREE_M:
             return Move(velocity=straight, reason="the straight way is free")
-        closed = world.closed(self._cos * speed, self._sin * speed)
-        gaps = self._nearest(closed, to_goal)
+        vs: Bits = tuple(world.closed(self._cos * speed, self._sin * speed).tolist())
+        gaps = self._nearest(vs, to_goal)
         way, lasts, least = ahead, t_ahead, direct
         for q, t1 in self._waypoints(gaps, to_goal, left):
             cost = world.cost(q, t1, to_goal, speed, least)
@@ -126,14 +126,19 @@ class Predictive(Steering):
             self._waypoint = (x + way[0], y + way[1])
         scale = 1.0 / max(lasts, distance((0.0, 0.0), way) / speed)
         u = (way[0] * scale, way[1] * scale)
-        vs: Bits = tuple(closed.astype(int).tolist())
+        gap = self._gap(way)
+        why = f"the straight way closes; {least - left:.3g} m longer"
+        if all(vs):
+            why, gap = f"every heading closes; the least risk costs {least - left:.3g} m", 0
+        elif vs[gap - 1]:
+            gap = 0
         return Move(
             velocity=u,
-            reason=f"straight way closed in prediction; extra {least - left:.3g} m",
+            reason=f"{why}, at {1e2 * distance((0.0, 0.0), u) / speed:.0f} % speed",
             event=Event.OBSTACLE,
             vs=vs,
-            vg=vs,
-            gap=0,
+            vg=vs,  # a heading is as narrow as a gap: it stands for both
+            gap=gap,
             waypoint=(x + way[0], y + way[1]),
             candidates=tuple((x + dx, y + dy) for dx, dy in swarm.candidates),
         )
@@ -153,17 +158,20 @@ class Predictive(Steering):
             return self._tracker.circles(obs.stamp_ns, self.options.robot_radius_m)
         return from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
-    def _nearest(self, closed: np.ndarray, to_goal: Point) -> list[int]:
-        """The free headings nearest to the goal's on either side."""
+    def _nearest(self, closed: Bits, to_goal: Point) -> list[int]:
+        """The free headings nearest to the goal's on either side; a few when none is free."""
         n = len(closed)
-        free = np.flatnonzero(~closed)
-        if not free.size:
+        below = math.floor(math.atan2(to_goal[1], to_goal[0]) * n / (2.0 * math.pi)) - 1
+        right = next(((below - k) % n for k in range(n) if not closed[(below - k) % n]), None)
+        if right is None:
             return list(range(0, n, n // SHUT))
-        base = math.floor(
-            math.atan2(to_goal[1], to_goal[0]) * n / (2.0 * math.pi)
-        )  # heading just below
-        turn = (free - base) % n  # 0 .. n-1 counter-clockwise, heading index offset
-        return list({int(free[turn.argmin()]), int(free[turn.argmax()])})
+        left = next((below + k) % n for k in range(1, n + 1) if not closed[(below + k) % n])
+        return [left, right] if left != right else [left]
+
+    def _gap(self, way: Point) -> int:
+        """Number (from 1) of the heading that leads nearest to a waypoint; gap n leads along +x."""
+        n = self.options.headings
+        return (round(math.atan2(way[1], way[0]) * n / (2.0 * math.pi)) - 1) % n + 1
 
     def _waypoints(
         self, gaps: list[int], to_goal: Point, left: float

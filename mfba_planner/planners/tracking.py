@@ -33,7 +33,7 @@ class TrackingParams:
     place_sd_m: float = option(
         0.1, "deviation of a new obstacle's centre", unit="m", minimum=1e-3, maximum=10.0
     )
-    range_sd_m: float = option(0.02, "noise of a range", unit="m", minimum=1e-4, maximum=10.0)
+    range_sd_m: float = option(0.01, "noise of a range", unit="m", minimum=1e-4, maximum=10.0)
     turning_mps2: float = option(
         0.05, "white acceleration", unit="m/s^2", minimum=0.0, maximum=100.0
     )
@@ -47,14 +47,14 @@ class TrackingParams:
         1.3, "width beyond which a shape is no circle", unit="m", minimum=0.01, maximum=100.0
     )
     caution: float = option(
-        1.0, "deviations of the centre by which a circle is enlarged", minimum=0.0, maximum=10.0
+        0.5, "deviations of the centre by which a circle is enlarged", minimum=0.0, maximum=10.0
     )
     caution_s: float = option(
         0.1, "time for which a velocity's deviation enlarges it", unit="s", minimum=0.0,
         maximum=10.0,
     )  # fmt: skip
     allowance_m: float = option(
-        0.02, "by which every tracked circle is enlarged", unit="m", minimum=0.0, maximum=1.0
+        0.01, "by which every tracked circle is enlarged", unit="m", minimum=0.0, maximum=1.0
     )
     forget_s: float = option(
         2.0, "time after which an unseen obstacle is given up", unit="s", minimum=0.0,
