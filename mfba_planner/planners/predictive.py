@@ -169,7 +169,7 @@ class Predictive(Steering):
         return [left, right] if left != right else [left]
 
     def _gap(self, way: Point) -> int:
-        """Number (from 1) of the heading that leads nearest to a waypoint; gap n leads along +x."""
+        """Number (from 1) of the heading nearest to a waypoint; the last one is +x."""
         n = self.options.headings
         return (round(math.atan2(way[1], way[0]) * n / (2.0 * math.pi)) - 1) % n + 1
 
