@@ -42,6 +42,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "entry": ({"core"}, set()),
     "figures": ({"core", "paper", "report", "scenarios"}, set()),
     "watched": ({"core", "paper"}, {"rich"}),
+    "planners": ({"core", "planners"}, {"numpy"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
     "worlds": ({"core", "scenarios", "worlds"}, {"numpy"}),
     "oracle": ({"core", "oracle"}, {"numpy", "scipy"}),
