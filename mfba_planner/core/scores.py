@@ -17,7 +17,7 @@ def time_to_goal_s(result: Result) -> float:
 
 
 def optimality_gap(result: Result, optimum_m: float) -> float:
-    """length / optimum - 1, optimum_m > 0; NaN for a run that did not reach the goal.
+    """Gap to the optimum, length / optimum - 1; NaN for a run that did not reach the goal.
 
     Negative where the run got round without what the optimum had to keep: it ended within the
     goal tolerance, or collided.
