@@ -41,6 +41,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "entry": ({"core"}, set()),
     "figures": ({"core", "paper", "report", "scenarios"}, set()),
     "watched": ({"core", "paper"}, {"rich"}),
+    "planners": ({"core", "planners"}, {"numpy"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
     "messages": ({"core"}, {"numpy"}),
     "run_config": ({"core", "scenarios"}, {"numpy"}),

@@ -117,7 +117,8 @@ class Observation:
     """What the planner knows at one tick; now_ns - stamp_ns is the age of the inputs.
 
     The paper's planner reads the sectors alone. circles (what is within SR) and scan (real
-    surfaces, in a frame aligned with odom) are for planners that want more than bits.
+    surfaces, in a frame aligned with odom) are for planners that want more than bits; where
+    they are older than the pose, sensed says since when and from where.
     """
 
     stamp_ns: int
@@ -128,6 +129,7 @@ class Observation:
     refused: str = ""
     circles: tuple[Circle, ...] | None = None
     scan: Scan | None = None
+    sensed: tuple[int, Pose2D] | None = None
 
 
 Refused = str  # an input that was refused travels as its reason
@@ -227,18 +229,11 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
 
 def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tuple[Event, str, int]:
     """Reduce an observation to one event, its reason and the chosen gap (0 when none)."""
-    refused = obs.refused or _fault(obs)
-    if refused:
-        return Event.INVALID, f"refused input: {refused}", 0
-    age_s = (obs.now_ns - obs.stamp_ns) * NANO
-    if age_s > params.input_timeout_s:
-        return Event.STALE, f"input is {age_s:.3f} s old", 0
-    if obs.goal is None:
-        return Event.NO_GOAL, "no goal given", 0
+    standing = reason_to_stand(obs, params)
+    if standing:
+        return *standing, 0
+    assert obs.goal is not None
     position = obs.pose.position
-    left = distance(position, obs.goal)
-    if left <= params.goal_tolerance_m:
-        return Event.AT_GOAL, "goal reached", 0
     if not any(vs):
         return Event.CLEAR, "no obstacle within SR", 0
     sensed = "+".join(str(i) for i, bit in enumerate(vs, start=1) if bit)
@@ -248,12 +243,29 @@ def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tupl
     return Event.OBSTACLE, f"sectors {sensed} set: gap {gap} is nearest to the goal", gap
 
 
-def _fault(obs: Observation) -> str:
+def reason_to_stand(
+    obs: Observation, params: PlannerParams, *, sectors: bool = True
+) -> tuple[Event, str] | None:
+    """What keeps any planner from moving, with its reason; sectors=False: it reads none."""
+    refused = obs.refused or _fault(obs, sectors)
+    if refused:
+        return Event.INVALID, f"refused input: {refused}"
+    age_s = (obs.now_ns - obs.stamp_ns) * NANO
+    if age_s > params.input_timeout_s:
+        return Event.STALE, f"input is {age_s:.3f} s old"
+    if obs.goal is None:
+        return Event.NO_GOAL, "no goal given"
+    if distance(obs.pose.position, obs.goal) <= params.goal_tolerance_m:
+        return Event.AT_GOAL, "goal reached"
+    return None
+
+
+def _fault(obs: Observation, sectors: bool) -> str:
     """What must never move a robot, "" for nothing; the last of the doors."""
     for name, numbers in (("pose", obs.pose), ("goal", obs.goal or ())):
         if not all(map(math.isfinite, numbers)):
             return f"{name} {tuple(numbers)} is not finite"
-    if len(obs.ranges_m) < 3:
+    if sectors and len(obs.ranges_m) < 3:
         return f"{len(obs.ranges_m)} sectors are fewer than 3"
     if any(map(math.isnan, obs.ranges_m)):
         return "a sector's range is NaN"

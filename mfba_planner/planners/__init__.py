@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Planners by name, all behind core.planner.PathPlanner: plan(observation) -> decision."""

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a planner gets to see: circles with true velocities, or a scan of real surfaces."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..core.episode import World, look
+from ..core.errors import ConfigError
+from ..core.geometry import Point, Pose2D
+from ..core.options import did_you_mean
+from ..core.planner import Circle, Observation
+from ..core.sensing import Ranges, Scan, SensorParams, sense_scan
+from ..core.world import center_at, velocity_at
+
+SENSOR_STREAM = 2  # spawn key of the noise's SeedSequence child; the planner's is 1
+BEAMS = {"scan-12": 12, "scan-360": 360}
+NAMES = ("sectors", "known", *BEAMS)
+
+Sensed = tuple[tuple[Circle, ...] | None, Scan | None]
+
+
+class Perception:
+    """A look for core.episode.run, by name.
+
+    sectors: the bits' ranges alone. known: the circles whose enlarged edge is within SR, with
+    their true velocities of that moment. scan-12, scan-360: beams from the robot's centre along
+    the middles of equal sectors to the real circles, up to SR + robot radius: there a surface
+    is exactly where its enlarged edge is SR away, so both sense the same region. Walls stop
+    obstacles only; no beam sees them.
+
+    noise_m is the standard deviation of ranges (of centres when known), drawn from a child of
+    the seed named by the stamp. With a latency circles and scan are that many ticks old (the
+    first ticks see tick 0's), and Observation.sensed tells stamp and pose they belong to; the
+    pose itself is the present one. The paper's sector ranges come with all of them, without
+    noise and latency where circles are known, from the scan where there is one; sectors=False
+    spares a scan that cost for planners that do not read them.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        noise_m: float = 0.0,
+        latency_ticks: int = 0,
+        seed: int = 0,
+        sectors: bool = True,
+    ) -> None:
+        """Start before tick 0; ConfigError for an unknown name or a number out of range."""
+        if name not in NAMES:
+            raise ConfigError(f"perception {name!r}: unknown; {did_you_mean(name, list(NAMES))}")
+        if not (math.isfinite(noise_m) and noise_m >= 0.0):
+            raise ConfigError(f"noise_m={noise_m}: give a finite standard deviation from 0 m up")
+        if latency_ticks < 0 or seed < 0:
+            raise ConfigError(
+                f"latency_ticks={latency_ticks}, seed={seed}: give whole numbers from 0 up"
+            )
+        self.name = name
+        self.noise_m = noise_m
+        self.seed = seed
+        self._beams = BEAMS.get(name, 0)
+        self._sectors = sectors
+        self._past: deque[tuple[int, Pose2D, Sensed]] = deque(maxlen=latency_ticks + 1)
+
+    def __call__(self, world: World, sensor: SensorParams) -> Observation:
+        """Look at the world at its present tick; ticks that do not rise begin anew."""
+        if self._past and world.stamp_ns <= self._past[-1][0]:
+            self._past.clear()
+        self._past.append((world.stamp_ns, world.pose, self._sense(world, sensor)))
+        stamp_ns, pose, (circles, scan) = self._past[0]
+        late = stamp_ns != world.stamp_ns
+        if scan is None:
+            seen = look(world, sensor)
+            if circles is None:
+                return seen
+            return replace(seen, circles=circles, sensed=(stamp_ns, pose) if late else None)
+        ranges: Ranges = ()
+        if self._sectors:
+            ranges = sense_scan(scan, 0.0, world.scenario.robot_radius_m, sensor)
+        return Observation(
+            stamp_ns=world.stamp_ns,
+            pose=world.pose,
+            ranges_m=ranges,
+            goal=world.scenario.goal_m,
+            now_ns=world.stamp_ns,
+            scan=scan,
+            sensed=(stamp_ns, pose) if late else None,
+        )
+
+    def _sense(self, world: World, sensor: SensorParams) -> Sensed:
+        if self._beams:
+            return None, self._scan(world, sensor)
+        if self.name == "known":
+            return self._circles(world, sensor), None
+        return None, None
+
+    def _circles(self, world: World, sensor: SensorParams) -> tuple[Circle, ...]:
+        scenario, t_s = world.scenario, world.time_s
+        circles = []
+        for obstacle, ((x, y), radius) in zip(scenario.obstacles, scenario.enlarged(t_s)):
+            if _near(world.pose.position, (x, y), radius + sensor.sensing_range_m):
+                velocity = velocity_at(obstacle, t_s, scenario.walls)
+                circles.append(Circle(center_m=(x, y), radius_m=radius, velocity_mps=velocity))
+        if not self.noise_m or not circles:
+            return tuple(circles)
+        offsets = self._noise(world.stamp_ns, 2 * len(circles)).reshape(-1, 2).tolist()
+        return tuple(
+            replace(c, center_m=(c.center_m[0] + dx, c.center_m[1] + dy))
+            for c, (dx, dy) in zip(circles, offsets)
+        )
+
+    def _scan(self, world: World, sensor: SensorParams) -> Scan:
+        scenario, t_s = world.scenario, world.time_s
+        longest = sensor.sensing_range_m + scenario.robot_radius_m
+        near = []
+        for obstacle in scenario.obstacles:
+            center = center_at(obstacle, t_s, scenario.walls)
+            if _near(world.pose.position, center, longest + obstacle.radius_m):
+                near.append((*center, obstacle.radius_m))
+        ranges = cast_rays(world.pose.position, near, self._beams, longest)
+        if self.noise_m:
+            noisy = np.maximum(ranges + self._noise(world.stamp_ns, self._beams), 0.0)
+            ranges = np.where(noisy <= longest, noisy, np.inf)
+        increment = 2.0 * math.pi / self._beams
+        return Scan(
+            ranges_m=ranges.astype(np.float32).astype(np.float64),
+            angle_min_rad=0.5 * increment,
+            angle_increment_rad=increment,
+            range_min_m=0.0,
+            range_max_m=float(np.nextafter(np.float32(longest), np.float32(np.inf))),
+        )
+
+    def _noise(self, stamp_ns: int, count: int) -> np.ndarray:
+        sequence = np.random.SeedSequence(self.seed, spawn_key=(SENSOR_STREAM, stamp_ns))
+        return np.random.Generator(np.random.PCG64(sequence)).normal(0.0, self.noise_m, count)
+
+
+def _near(a: Point, b: Point, reach_m: float) -> bool:
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    return math.sqrt(dx * dx + dy * dy) <= reach_m
+
+
+_RAYS: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+
+def rays(beams: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cosines and sines of n beams along the middles of n equal sectors, each (n,)."""
+    if beams not in _RAYS:
+        angles = (np.arange(beams) + 0.5) * (2.0 * math.pi / beams)
+        _RAYS[beams] = np.cos(angles), np.sin(angles)
+    return _RAYS[beams]
+
+
+def cast_rays(
+    position: Point, circles: Sequence[tuple[float, float, float]], beams: int, longest_m: float
+) -> np.ndarray:
+    """Range of each beam to the nearest circle (x, y, radius), inf beyond longest_m; (n,), m.
+
+    From within a circle every beam starts at its surface: 0.
+    """
+    if not circles:
+        return np.full(beams, np.inf)
+    c, s = rays(beams)
+    x, y, r = np.array(circles).T[:, :, None]
+    x, y = x - position[0], y - position[1]
+    along = x * c + y * s
+    outside = x * x + y * y - r * r
+    under_root = along * along - outside
+    ranges = along - np.sqrt(np.maximum(under_root, 0.0))
+    ranges[(under_root < 0.0) | (along <= 0.0)] = np.inf
+    ranges[np.broadcast_to(outside <= 0.0, ranges.shape)] = 0.0
+    nearest = ranges.min(axis=0)
+    nearest[nearest > longest_m] = np.inf
+    return nearest

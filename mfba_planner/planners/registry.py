@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Planners by name; a new one is one file and one line here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..core.bat import Algorithm
+from ..core.errors import ConfigError
+from ..core.options import did_you_mean
+from ..core.planner import PathPlanner, Planner, PlannerParams
+from ..core.sensing import SensorParams
+from .straight import Straight
+
+Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]
+
+
+def _paper(params: PlannerParams, _: SensorParams, seed: int) -> PathPlanner:
+    return Planner(params, seed)
+
+
+def _with(algorithm: Algorithm) -> Factory:
+    def planner(params: PlannerParams, _: SensorParams, seed: int) -> PathPlanner:
+        return Planner(replace(params, bat=replace(params.bat, algorithm=algorithm)), seed)
+
+    return planner
+
+
+PLANNERS: dict[str, Factory] = {
+    "paper": _paper,
+    "ba": _with(Algorithm.BA),
+    "mfba": _with(Algorithm.MFBA),
+    "straight": Straight,
+}
+
+
+def make(
+    name: str,
+    params: PlannerParams | None = None,
+    sensor: SensorParams | None = None,
+    seed: int = 0,
+) -> PathPlanner:
+    """A fresh planner: paper as params say, ba and mfba with that law of beta, and others.
+
+    Raises ConfigError for an unknown name, with the nearest known one, and a negative seed.
+    """
+    factory = PLANNERS.get(name)
+    if factory is None:
+        raise ConfigError(f"planner {name!r}: unknown; {did_you_mean(name, list(PLANNERS))}")
+    return factory(params or PlannerParams(), sensor or SensorParams(), seed)

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The straight line to the goal, whatever is in the way: what doing nothing is worth."""
+
+from __future__ import annotations
+
+from ..core.geometry import Point
+from ..core.planner import Observation
+from .steering import Move, Steering
+
+
+class Straight(Steering):
+    """Drives at the goal at full speed."""
+
+    def move(self, obs: Observation, goal: Point) -> Move:
+        """Straight on, never looking."""
+        velocity = self.straight(obs.pose.position, goal, self.params.speed_mps)
+        return Move(velocity=velocity, reason="straight to the goal")
