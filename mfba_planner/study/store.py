@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chunks of results on disk: written whole, checked when read, of one plan and one version."""
+"""Finished parts on disk: written whole, checked when read, of one study and one version."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ... import __version__
-from ...core.errors import OutputError
-from ...outputs import write_new
-from .chunk import Chunk, Columns
+from .. import __version__
+from ..core.errors import OutputError
+from ..outputs import write_new
+from .part import Columns, Part
 
 SCHEMA_VERSION = 1
 MANIFEST = "study.json"
@@ -23,16 +23,27 @@ _ANOTHER = "give another --out"
 
 
 class Store:
-    """A directory of finished chunks that an interrupted study goes on from."""
+    """A directory of finished parts that an interrupted study goes on from."""
 
-    def __init__(self, directory: Path, plan: Sequence[Chunk], facts: Mapping[str, Any]) -> None:
-        """Open or make it; OutputError when it is of another version, plan or kind."""
+    def __init__(
+        self,
+        directory: Path,
+        parts: Sequence[Part],
+        facts: Mapping[str, Any],
+        *,
+        command: str,
+        packages: Sequence[str],
+    ) -> None:
+        """Open or make it; OutputError when it is of another version, study or kind.
+
+        command names the study to users; packages are the folders whose code decides the numbers.
+        """
         self.directory = directory
         self._chunks = directory / "chunks"
-        wanted = manifest(plan, facts)
+        wanted = manifest(parts, facts, packages)
         try:
             if directory.is_dir() and any(directory.iterdir()):
-                _compare(directory, wanted)
+                _compare(directory, wanted, command)
             else:
                 self._chunks.mkdir(parents=True)
                 write_new(directory / MANIFEST, _text(wanted))
@@ -43,49 +54,56 @@ class Store:
                 f"{directory}: cannot be written ({reason}); give a writable --out"
             ) from None
 
-    def read(self, chunk: Chunk) -> Columns | None:
-        """A finished chunk; None when it is not there or not whole, and so to be computed."""
+    def read(self, part: Part) -> Columns | None:
+        """A finished part; None when it is not there or not whole, and so to be computed."""
         try:
-            data = json.loads((self._chunks / f"{chunk.name}.json").read_text(encoding="utf-8"))
+            data = json.loads((self._chunks / f"{part.name}.json").read_text(encoding="utf-8"))
             columns: Columns = data["columns"]
             whole = data["sha256"] == digest(columns)
         except (OSError, ValueError, TypeError, KeyError):
             return None
         return columns if whole else None
 
-    def write(self, chunk: Chunk, columns: Columns) -> None:
-        """Keep a finished chunk; what stood in its place was not whole."""
-        path = self._chunks / f"{chunk.name}.json"
+    def write(self, part: Part, columns: Columns) -> None:
+        """Keep a finished part; what stood in its place was not whole."""
+        path = self._chunks / f"{part.name}.json"
         path.unlink(missing_ok=True)
         write_new(path, _text({"columns": columns, "sha256": digest(columns)}))
 
 
-def manifest(plan: Sequence[Chunk], facts: Mapping[str, Any]) -> dict[str, Any]:
+def manifest(
+    parts: Sequence[Part], facts: Mapping[str, Any], packages: Sequence[str]
+) -> dict[str, Any]:
     """All that decides the numbers: versions, the code itself, what is run with what."""
-    works = {chunk.sample: chunk.work.facts() for chunk in plan}
     return {
         "schema_version": SCHEMA_VERSION,
         "mfba_planner": __version__,
-        "code": code_digest(),
+        "code": code_digest(*packages),
         "numpy": np.__version__,
         **facts,
-        "chunks": [chunk.name for chunk in plan],
-        "samples": digest(works),
+        "chunks": [part.name for part in parts],
+        "samples": digest([part.facts() for part in parts]),
     }
 
 
-def _compare(directory: Path, wanted: Mapping[str, Any]) -> None:
+def read_manifest(directory: Path, command: str) -> dict[str, Any]:
+    """What a directory of results says of itself. Raises OutputError."""
     try:
         found = json.loads((directory / MANIFEST).read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise OutputError(
-            f"{directory}: not empty and no results of `mfba tables` ({MANIFEST} is missing); "
+            f"{directory}: not empty and no results of `{command}` ({MANIFEST} is missing); "
             f"{_ANOTHER}"
         ) from None
     except ValueError:
         found = None
     if not isinstance(found, dict):
         raise OutputError(f"{directory}: {MANIFEST} is cut short or not JSON; {_ANOTHER}")
+    return found
+
+
+def _compare(directory: Path, wanted: Mapping[str, Any], command: str) -> None:
+    found = read_manifest(directory, command)
     for name, value in wanted.items():
         if found.get(name) != value:
             shown = f"{name}={found.get(name)!r}, now {value!r}"
@@ -102,14 +120,12 @@ def digest(data: Any) -> str:
 
 
 @cache
-def code_digest() -> str:
-    """SHA-256 over the sources that the numbers come from: core and paper."""
-    package = Path(__file__).parents[2]
-    sources = sorted([*package.glob("core/*.py"), *package.glob("paper/*.py")])
-    sources += sorted(package.glob("paper/study/*.py"))
+def code_digest(*packages: str) -> str:
+    """SHA-256 over the sources in some folders of this package, those inside them included."""
+    root = Path(__file__).parents[1]
     found = hashlib.sha256()
-    for path in sources:
-        found.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
+    for path in sorted(path for name in packages for path in (root / name).rglob("*.py")):
+        found.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return found.hexdigest()
 
 
