@@ -18,7 +18,7 @@ from ..outputs import write_new
 from .part import Columns, Part
 
 SCHEMA_VERSION = 1
-MANIFEST = "study.json"
+MANIFEST, CHUNKS = "study.json", "chunks"
 _ANOTHER = "give another --out"
 
 
@@ -39,15 +39,15 @@ class Store:
         command names the study to users; packages are the folders whose code decides the numbers.
         """
         self.directory = directory
-        self._chunks = directory / "chunks"
+        chunks = directory / CHUNKS
         wanted = manifest(parts, facts, packages)
         try:
             if directory.is_dir() and any(directory.iterdir()):
                 _compare(directory, wanted, command)
             else:
-                self._chunks.mkdir(parents=True)
+                chunks.mkdir(parents=True)
                 write_new(directory / MANIFEST, _text(wanted))
-            self._chunks.mkdir(exist_ok=True)
+            chunks.mkdir(exist_ok=True)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise OutputError(
@@ -56,19 +56,24 @@ class Store:
 
     def read(self, part: Part) -> Columns | None:
         """A finished part; None when it is not there or not whole, and so to be computed."""
-        try:
-            data = json.loads((self._chunks / f"{part.name}.json").read_text(encoding="utf-8"))
-            columns: Columns = data["columns"]
-            whole = data["sha256"] == digest(columns)
-        except (OSError, ValueError, TypeError, KeyError):
-            return None
-        return columns if whole else None
+        return read_part(self.directory, part.name)
 
     def write(self, part: Part, columns: Columns) -> None:
         """Keep a finished part; what stood in its place was not whole."""
-        path = self._chunks / f"{part.name}.json"
+        path = self.directory / CHUNKS / f"{part.name}.json"
         path.unlink(missing_ok=True)
         write_new(path, _text({"columns": columns, "sha256": digest(columns)}))
+
+
+def read_part(directory: Path, name: str) -> Columns | None:
+    """The finished part of that name; None when it is not there or not whole."""
+    try:
+        data = json.loads((directory / CHUNKS / f"{name}.json").read_text(encoding="utf-8"))
+        columns: Columns = data["columns"]
+        whole = data["sha256"] == digest(columns)
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    return columns if whole else None
 
 
 def manifest(

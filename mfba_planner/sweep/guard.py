@@ -17,6 +17,10 @@ class PlannerFault(Exception):  # noqa: N818
     """What a planner did that ends its run, in words."""
 
 
+class HungError(BaseException):
+    """An alarm went off while a planner decided; no `except Exception` of its own stops it."""
+
+
 class Guard:
     """Passes on what a planner decides; PlannerFault where it must not be followed.
 

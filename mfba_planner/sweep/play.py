@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..core.episode import Episode, Look, Outcome, look
 from ..core.episode import run as drive
 from ..core.planner import Planner
-from .guard import Guard, PlannerFault
+from .guard import Guard, HungError, PlannerFault
 from .order import Run, Setting
 
 
@@ -43,7 +43,7 @@ def play(run: Run, setting: Setting) -> Played:
             brain=guard,
             look=_look(brain, run, setting),
         )
-    except PlannerFault as error:
+    except (PlannerFault, HungError) as error:
         fault = str(error)
         episode = Episode(
             scenario=scenario,
