@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.legs import Legs
+from ..core.world import Walls
 
 FAR_M = 9.0  # gap reported for a pair that never moves at the same time
 
@@ -61,3 +62,12 @@ def edge_gaps(
     gap: np.ndarray = np.sqrt(px * px + py * py) - legs.radius
     gap[span < 0.0] = FAR_M
     return gap
+
+
+def within(area: Walls | None, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Which points lie in a rectangle; all when there is none."""
+    if area is None:
+        return np.ones(np.shape(x), dtype=bool)
+    (x0, y0), (x1, y1) = area.lower_m, area.upper_m
+    inside: np.ndarray = (x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1)
+    return inside

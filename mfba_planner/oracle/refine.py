@@ -8,16 +8,20 @@ import math
 import numpy as np
 
 from ..core.legs import Legs
-from .polyline import gaps, lengths
+from ..core.world import Walls
+from .polyline import gaps, lengths, within
 from .tangents import CLEAR_M
 
 _NEAR_M = 1.5  # obstacle legs further away are looked at only in the end
-_PAIR_M = 0.3  # pairs of legs closer than this are constraints
+_PAIR_M = 0.05  # pairs of legs closer than this are constraints
 _BEND_RAD = 0.12  # a sharper bend becomes several: r a^3 / 12 longer than the arc
 _DIFFERENCE_M = 1e-7
+_MOST_POINTS = 40  # SLSQP's time grows with their cube; a way that has to wait has many
 
 
-def refine(way: np.ndarray, speed_mps: float, legs: Legs) -> np.ndarray | None:
+def refine(
+    way: np.ndarray, speed_mps: float, legs: Legs, inside: Walls | None = None
+) -> np.ndarray | None:
     """The shortest free polyline (p, 2) found next to a way, None when the way is not free."""
     if not _free(way, speed_mps, legs):
         return None
@@ -26,7 +30,7 @@ def refine(way: np.ndarray, speed_mps: float, legs: Legs) -> np.ndarray | None:
         trial = _bend_finer(best) if split else best
         if trial is None:
             break
-        tight = _tighten(trial, speed_mps, legs)
+        tight = _tighten(trial, speed_mps, legs, inside)
         if tight is None:
             continue
         tight = _shortcut(tight, speed_mps, legs)
@@ -72,18 +76,24 @@ def _bend_finer(points: np.ndarray) -> np.ndarray | None:
     return np.array(finer) if len(finer) > len(points) else None
 
 
-def _tighten(points: np.ndarray, speed_mps: float, legs: Legs) -> np.ndarray | None:
+def _tighten(
+    points: np.ndarray, speed_mps: float, legs: Legs, inside: Walls | None
+) -> np.ndarray | None:
     """Minimise the length over the via points (SLSQP); None when the result is not free."""
-    if len(points) <= 2:
+    if not 2 < len(points) <= _MOST_POINTS:
         return None
     near = gaps(points[None], speed_mps, legs)[0].min(axis=0) < _NEAR_M
     local = Legs(*(column[near] for column in legs))
     pairs = gaps(points[None], speed_mps, local)[0] < _PAIR_M
     for margin in (CLEAR_M, 2.0 * CLEAR_M, 2e-4):
         problem = _Problem(points, speed_mps, local, pairs, margin)
-        found = problem.solve()
+        found = problem.solve(inside)
         gap = gaps(found[None], speed_mps, local)[0]
-        if gap.min(initial=math.inf) >= 0.0 and _free(found, speed_mps, legs):
+        if (
+            gap.min(initial=math.inf) >= 0.0
+            and _free(found, speed_mps, legs)
+            and within(inside, *found.T).all()
+        ):
             return found
         pairs = pairs | (gap < _PAIR_M)
     return None
@@ -103,9 +113,13 @@ class _Problem:
         self.points, self.v, self.legs, self.margin = points, speed_mps, legs, margin
         self.rows, self.columns = np.nonzero(pairs)
 
-    def solve(self) -> np.ndarray:
+    def solve(self, inside: Walls | None) -> np.ndarray:
         """The via points that SLSQP ends with, feasible or not."""
         from scipy.optimize import minimize
+
+        bounds = None
+        if inside is not None:
+            bounds = [*zip(inside.lower_m, inside.upper_m)] * (len(self.points) - 2)
 
         constraints = {"type": "ineq", "fun": self.slack, "jac": self.slack_gradient}
         found = minimize(
@@ -113,6 +127,7 @@ class _Problem:
             self.points[1:-1].ravel(),
             jac=self.length_gradient,
             method="SLSQP",
+            bounds=bounds,
             constraints=[constraints] if len(self.rows) else [],
             options={"maxiter": 60, "ftol": 1e-7},
         )

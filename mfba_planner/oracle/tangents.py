@@ -17,7 +17,8 @@ import numpy as np
 
 from ..core.geometry import Point
 from ..core.legs import Legs
-from .polyline import edge_gaps
+from ..core.world import Walls
+from .polyline import edge_gaps, within
 
 CLEAR_M = 1e-5  # kept from every circle, so that rounding cannot make contact
 
@@ -68,11 +69,17 @@ class Search:
     """Tangent search among the given legs, all of them obstacles."""
 
     def __init__(
-        self, start: Point, goal: Point, speed_mps: float, legs: Legs, params: SearchParams
+        self,
+        start: Point,
+        goal: Point,
+        speed_mps: float,
+        legs: Legs,
+        params: SearchParams,
+        inside: Walls | None = None,
     ) -> None:
-        """Prepare; speed in m/s."""
+        """Prepare; speed in m/s; all ways stay within the rectangle inside, if there is one."""
         self.start, self.goal, self.v, self.legs = start, goal, speed_mps, legs
-        self.params = params
+        self.params, self.inside = params, inside
         self.inner = legs._replace(radius=legs.radius + CLEAR_M)
         self.edge = (legs.radius + 2.0 * CLEAR_M) / math.cos(params.chord_rad / 2.0)
         self.end_x = legs.x + legs.vx * (legs.t1 - legs.t0)
@@ -145,7 +152,9 @@ class Search:
             parts.append(self._along(x, y, t, leg, side))
         origin, ex, ey, et, eleg, eside = (np.concatenate(column) for column in zip(*parts))
         f = et + np.hypot(ex - self.goal[0], ey - self.goal[1]) / self.v
-        keep = np.flatnonzero((f <= limit) & (et <= self.horizon))
+        keep = np.flatnonzero(
+            (f <= limit) & (et <= self.horizon) & within(self.inside, ex, ey)
+        )
         origin, ex, ey, et, eleg, eside, f = (
             column[keep] for column in (origin, ex, ey, et, eleg, eside, f)
         )
