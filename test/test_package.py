@@ -42,6 +42,12 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "figures": ({"core", "paper", "report", "scenarios"}, set()),
     "watched": ({"core", "paper", "study"}, {"rich"}),
     "statistics": (set(), {"numpy", "scipy"}),
+    "leash": (set(), set()),
+    "sweep": (
+        {"core", "leash", "messages", "oracle", "outputs", "planners", "statistics", "study"}
+        | {"sweep", "worlds"},
+        {"distributed", "numpy", "pyarrow"},
+    ),
     "study": ({"core", "outputs", "study"}, {"numpy"}),
     "planners": ({"core", "planners"}, {"numpy"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
@@ -54,7 +60,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "verification": ({"core", "messages", "recording", "verification"}, set()),
     "report": (
-        {"core", "outputs", "paper", "report", "statistics"},
+        {"core", "outputs", "paper", "report", "statistics", "sweep"},
         {"matplotlib", "numpy", "rich"},
     ),
     "ros": (
