@@ -51,6 +51,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "study": ({"core", "outputs", "study"}, {"numpy"}),
     "planners": ({"core", "planners"}, {"numpy"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
+    "worlds": ({"core", "scenarios", "worlds"}, {"numpy"}),
+    "oracle": ({"core", "oracle"}, {"numpy", "scipy"}),
     "messages": ({"core"}, {"numpy"}),
     "run_config": ({"core", "scenarios"}, {"numpy"}),
     "paper": ({"core", "paper", "statistics", "study"}, {"numpy", "scipy"}),

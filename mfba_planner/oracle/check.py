@@ -90,7 +90,7 @@ def _apart(a: Waypoint, b: Waypoint, piece: Piece, begin: float, end: float) -> 
     C = gx * gx + gy * gy
     span = end - begin
     least = min(C, (A * span + B) * span + C)
-    if B < 0.0 and -B < 2.0 * A * span:
+    if B < 0.0 and 2.0 * A * span > -B:
         least = C - B * B / (4.0 * A)
     return math.sqrt(max(0.0, least))
 

@@ -28,6 +28,7 @@ class LatticeParams:
     headings: int = 32
     cell_m: float = 0.2  # of the places in a cell at one time, the nearest to the goal is kept
     ways: int = 4
+    slack_s: float = 0.3  # ways that are later than the first found by more do not count
 
 
 def lattice_ways(
@@ -54,6 +55,7 @@ def lattice_ways(
         home = left / np.maximum(rest, 1e-9)[:, None]
         for n in np.flatnonzero(_free(here, home, t, t + rest, inner)).tolist():
             arrivals.append((t + float(rest[n]), layer, n))
+            limit_s = min(limit_s, t + float(rest[n]) + params.slack_s)
         origin = np.repeat(np.arange(len(here)), len(u))
         velocity = np.tile(u, (len(here), 1))
         there = here[origin] + velocity * params.step_s

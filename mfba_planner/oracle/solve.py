@@ -20,6 +20,10 @@ from .refine import refine
 from .solution import Certificate, Solution, Waypoint
 from .tangents import CLEAR_M, Search, SearchParams
 
+_LONG, _VERY_LONG = 1.05, 1.08  # times the straight line
+_FINE = LatticeParams(step_s=0.6, headings=48, cell_m=0.1)
+_COARSE = LatticeParams()
+
 
 def solve(
     scenario: Scenario,
@@ -67,6 +71,10 @@ def _timed(scenario: Scenario, points: np.ndarray, speed_mps: float) -> tuple[Wa
     return tuple(waypoints)
 
 
+def _length(points: np.ndarray) -> float:
+    return float(lengths(points[None])[0])
+
+
 class _Task:
     """One world for one speed: what has been tried, what was found."""
 
@@ -93,21 +101,39 @@ class _Task:
             yield self.straight
             return
         self.active |= touched
-        yield from self._refined(self._by_tangents(legs), legs)
+        if found := self._refined(self._by_tangents(legs), legs):
+            yield from self._seconded(found, legs)
+            return
         legs = uniform_legs(self.scenario, limit_s)
         self.proof = unreachable(self.scenario, self.v, legs)
         if self.proof:
             return
-        if horizon_s < limit_s:
-            yield from self._refined(self._by_tangents(legs), legs)
-        yield from self._refined(self._by_lattice(legs, 1.25 * straight_s), legs)
-        yield from self._refined(self._by_lattice(legs, min(limit_s, 2.5 * straight_s)), legs)
+        if horizon_s < limit_s and (found := self._refined(self._by_tangents(legs), legs)):
+            yield from self._seconded(found, legs)
+            return
+        for times in (1.25, 2.5, 5.0):
+            until_s = min(limit_s, times * straight_s)
+            if found := self._refined(self._by_lattice(legs, until_s, _COARSE), legs):
+                yield from found
+                return
 
-    def _refined(self, ways: list[np.ndarray], legs: Legs) -> Iterator[np.ndarray]:
+    def _refined(self, ways: list[np.ndarray], legs: Legs) -> list[np.ndarray]:
+        """The ways, refined, the best first."""
         tried = (refine(way, self.v, legs, self.inside) for way in ways)
-        refined = [points for points in tried if points is not None]
-        yield from sorted(refined, key=lambda points: float(lengths(points[None])[0]))
-        yield from ways
+        return sorted((points for points in tried if points is not None), key=_length)
+
+    def _seconded(self, ways: list[np.ndarray], legs: Legs) -> list[np.ndarray]:
+        """Ask the lattice too where the tangents' way is long.
+
+        Such a robot is early for a gap that opens, and how it spends the time it has left is
+        what tangents know least about.
+        """
+        best_m = _length(ways[0])
+        if best_m <= _LONG * self.straight_m:
+            return ways
+        params = _FINE if best_m <= _VERY_LONG * self.straight_m else _COARSE
+        others = self._refined(self._by_lattice(legs, best_m / self.v, params), legs)
+        return sorted([*ways, *others], key=_length)
 
     def _touched(self, way: np.ndarray, legs: Legs) -> set[int]:
         """Obstacles that a way runs into."""
@@ -130,6 +156,8 @@ class _Task:
                 return [way for way in ways if not self._touched(way, legs)]
             self.active |= touched
 
-    def _by_lattice(self, legs: Legs, limit_s: float) -> list[np.ndarray]:
+    def _by_lattice(
+        self, legs: Legs, limit_s: float, params: LatticeParams
+    ) -> list[np.ndarray]:
         start, goal = self.scenario.start_m, self.scenario.goal_m
-        return lattice_ways(start, goal, self.v, legs, limit_s, LatticeParams(), self.inside)
+        return lattice_ways(start, goal, self.v, legs, limit_s, params, self.inside)

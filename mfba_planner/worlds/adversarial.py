@@ -82,8 +82,7 @@ def _chaser(trip: Trip, center: Point, speed: float, rng: np.random.Generator) -
 
 
 def _lead(trip: Trip, here: Point, t: float, speed: float) -> float:
-    """Heading to the first point of the trip that can still be reached in time, or straight
-    at the robot when there is none."""
+    """Heading to the first point of the trip that can be reached in time, or at the robot."""
     ahead = t
     while ahead < trip.time_s:
         if distance(here, trip.at(ahead)) <= speed * (ahead - t):
@@ -110,7 +109,7 @@ def corridor(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
 def closing_gap(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
     """Two rows that slide together across the way; the gap shuts about when the robot comes."""
     along = rng.uniform(5.0, 12.0)
-    shut_s = along / trip.speed_mps * rng.uniform(0.7, 1.4)
+    shut_s = along / trip.speed_mps * rng.uniform(0.6, 1.2)
     speed = trip.speed_mps * rng.uniform(*_SPEEDS)
     each = int(rng.integers(3, 7))
     for side in (1.0, -1.0):
