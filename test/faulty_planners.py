@@ -58,7 +58,8 @@ class OldStamp(Faulty):
 
 class OneNumber(Faulty):
     def wrong(self, decision: Decision) -> Any:
-        return replace(decision, velocity=3.0)
+        velocity: Any = 3.0
+        return replace(decision, velocity=velocity)
 
 
 class Hangs(Faulty):

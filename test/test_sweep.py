@@ -26,6 +26,7 @@ from mfba_planner.sweep.run import Swept, dask_executor, open_store, sweep
 from mfba_planner.sweep.summary import comparisons, standings, versus
 from mfba_planner.sweep.table import sorted_hash, to_csv, to_parquet, write
 from mfba_planner.worlds import suite
+from mfba_planner.worlds.difficulty import survivability
 
 
 def an_order(**changes: Any) -> Order:
@@ -70,6 +71,7 @@ def test_a_row_is_what_the_core_says_of_the_run(small: Swept) -> None:
     optimum = solve(scenario, 0.8)
     assert row["optimum_m"] == optimum.length_m
     assert row["certificate"] == optimum.certificate.value
+    assert row["survivability"] == survivability(scenario, 0.8).share
     assert row["gap"] == result.length_m / optimum.length_m - 1.0
     assert row["spl"] == pytest.approx(1.0 / (1.0 + row["gap"]))
     assert row["barn"] == 0.5

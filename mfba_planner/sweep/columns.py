@@ -55,6 +55,7 @@ _MADE: dict[str, tuple[type, str]] = {
 }
 _JUDGED: dict[str, tuple[type, str]] = {
     "certificate": (str, "the oracle's: feasible, infeasible or undecided; empty without it"),
+    "survivability": (float, "share of places where nobody touches a standing robot"),
     "optimum_m": (float, "shortest collision-free path at constant speed, full knowledge, m"),
     "gap": (float, "length / optimum - 1, where the goal was reached"),
     "spl": (float, "success weighted by path length, against the optimum"),
@@ -110,7 +111,7 @@ def judged(row: Row, optimum: Mapping[str, Any] | None, speed_mps: float) -> Row
     found: Row = {**row, **dict.fromkeys(_JUDGED)}
     if optimum is None:
         return {**found, "certificate": ""}
-    found["certificate"] = optimum["certificate"]
+    found |= {name: optimum[name] for name in ("certificate", "survivability")}
     optimum_m = optimum["optimum_m"]
     if not math.isfinite(optimum_m):
         return found

@@ -10,6 +10,7 @@ from typing import Any
 from ..oracle import solve
 from ..study.part import Columns
 from ..worlds import suite
+from ..worlds.difficulty import survivability
 from .columns import Row
 from .keeper import rows
 from .order import Order, Run, Setting
@@ -68,11 +69,13 @@ class Optima:
     def run(self) -> Columns:
         """Ask the oracle."""
         worlds = suite(self.suite, self.suite_seed)
-        found = [solve(worlds.world(k, self.speed_mps), self.speed_mps) for k in self.worlds]
+        scenarios = [worlds.world(k, self.speed_mps) for k in self.worlds]
+        found = [solve(scenario, self.speed_mps) for scenario in scenarios]
         return {
             "world": list(self.worlds),
             "certificate": [solution.certificate.value for solution in found],
             "optimum_m": [solution.length_m for solution in found],
+            "survivability": [survivability(s, self.speed_mps).share for s in scenarios],
         }
 
 

@@ -61,4 +61,5 @@ def _look(brain: object, run: Run, setting: Setting) -> Look:
     # The paper's planner reads bits alone, and they are the same without circles beside them.
     if isinstance(brain, Planner) and setting.perception == "known":
         return look
-    return setting.look(run.seed)
+    # A planner that never reads the sectors may say so, and is spared what they cost.
+    return setting.look(run.seed, sectors=getattr(brain, "reads_sectors", True))
