@@ -4,6 +4,7 @@
 import csv
 import io
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,10 +19,11 @@ from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.metrics import assess
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.oracle import solve
-from mfba_planner.sweep import keeper, parts
+from mfba_planner.sweep import parts
 from mfba_planner.sweep.columns import COLUMNS, TIMINGS
+from mfba_planner.sweep.keeper import Keeper, Lost, each
 from mfba_planner.sweep.order import Order, Run, Setting, read_run
-from mfba_planner.sweep.parts import parts_of
+from mfba_planner.sweep.parts import make, parts_of
 from mfba_planner.sweep.run import Swept, dask_executor, open_store, sweep
 from mfba_planner.sweep.summary import comparisons, standings, versus
 from mfba_planner.sweep.table import sorted_hash, to_csv, to_parquet, write
@@ -69,10 +71,10 @@ def test_a_row_is_what_the_core_says_of_the_run(small: Swept) -> None:
     for name in conduct.__slots__:
         assert row[name] == getattr(conduct, name), name
     optimum = solve(scenario, 0.8)
-    assert row["optimum_m"] == optimum.length_m
+    assert row["optimum_m"] == round(optimum.length_m, 6)
     assert row["certificate"] == optimum.certificate.value
     assert row["survivability"] == survivability(scenario, 0.8).share
-    assert row["gap"] == result.length_m / optimum.length_m - 1.0
+    assert row["gap"] == result.length_m / row["optimum_m"] - 1.0
     assert row["spl"] == pytest.approx(1.0 / (1.0 + row["gap"]))
     assert row["barn"] == 0.5
     assert (row["obstacles"], row["encounters"]) == (3, len(result.encounters))
@@ -198,12 +200,13 @@ def test_one_that_hangs_or_dies_costs_its_run(
         assert rows[k]["length_m"] == plain[k]["length_m"], "the others are what they always were"
 
 
-def test_what_is_wrong_with_us_is_no_planner_s_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_wrong_with_us_is_no_planner_s_fault() -> None:
     run_of_no_suite = Run("random-4", 0, "straight", 0)
     with pytest.raises(ConfigError, match="no such suite"):
-        list(keeper.rows([run_of_no_suite], Setting()))
-    rows = list(keeper.rows([Run("random-3", 0, "straight", 0)], Setting()))
-    assert rows[0][0]["outcome"] == "goal_reached", "the next one is made as if nothing was"
+        list(each(make, [run_of_no_suite], Setting(), 60.0))
+    (row,) = each(make, [Run("random-3", 0, "straight", 0)], Setting(), 60.0)
+    assert not isinstance(row, Lost)
+    assert row["outcome"] == "goal_reached", "the next one is made as if nothing was"
 
 
 # --- what is said of it -----------------------------------------------------------------------
@@ -358,3 +361,22 @@ def test_parts_do_not_depend_on_who_computes_them() -> None:
     assert names[-3:] == [
         "random-3-straight-0-100", "random-3-straight-100-100", "random-3-straight-200-50",
     ]  # fmt: skip
+
+
+def environment(name: str, _: None) -> str | None:
+    """A variable as the processes see it that work is done in."""
+    return os.environ.get(name)
+
+
+def test_work_is_done_by_one_thread_whatever_the_workers_are_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Several would add up in another order: dask tells its workers to use one, others do not."""
+    names = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"]
+    for name in names:
+        monkeypatch.setenv(name, "2")
+    child = Keeper()
+    try:
+        assert list(child.ask(environment, tuple(names), None, 60.0)) == ["1", "1", "1"]
+    finally:
+        child.end()

@@ -1,23 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The process that runs are made in; started by keeper.py, spoken to through a pipe."""
+"""The process that work is done in; started by keeper.py, spoken to through a pipe."""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from time import perf_counter
+from typing import Any
 
 from ..leash import end_with_parent
-from .columns import made_row, timing_row
-from .order import Run, Setting
-from .play import play
 
 
 def main(descriptor: int) -> None:
-    """Make the runs asked for until the pipe is closed."""
+    """Do what is asked for until the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is the parent's matter
     end_with_parent(int(os.environ["MFBA_PARENT"]))
     # Whoever has heard enough closes the pipe.
@@ -27,16 +25,16 @@ def main(descriptor: int) -> None:
             _answer(pipe, *pipe.recv())
 
 
-def _answer(pipe: Connection, runs: tuple[Run, ...], setting: Setting) -> None:
-    for run in runs:
-        begun = perf_counter()
+def _answer(
+    pipe: Connection, work: Callable[[Any, Any], Any], items: tuple[Any, ...], shared: Any
+) -> None:
+    for item in items:
         try:
-            played = play(run, setting)
-        except Exception as error:  # ours, not the planner's
+            answer = work(item, shared)
+        except Exception as error:
             pipe.send(error)
             return
-        wall_ms = 1e3 * (perf_counter() - begun)
-        pipe.send((made_row(run, played), timing_row(played.times_ns, wall_ms)))
+        pipe.send(answer)
 
 
 if __name__ == "__main__":

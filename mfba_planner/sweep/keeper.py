@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs in a child process: one that hangs or dies costs its run, not the sweep."""
+"""Work in a child process: an item that hangs or dies costs itself, not the sweep."""
 
 from __future__ import annotations
 
@@ -7,30 +7,41 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Pipe
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 from ..core.errors import MfbaError
-from .columns import Row, lost_row
-from .order import Run, Setting
 
 START_S = 120.0  # a busy machine may take its time to start a process
+# With other numbers of threads, sums are added up in another order: other last bits.
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LOCAL = threading.local()  # each thread has a child of its own
 
+T = TypeVar("T")
+Work = Callable[[Any, Any], T]  # of an item and what all items share; module level
 
-def rows(runs: Sequence[Run], setting: Setting) -> Iterator[tuple[Row, Row]]:
-    """Make runs, one after the other, and yield (row, timing) of each."""
-    left = list(runs)
+
+class Lost(NamedTuple):
+    """What stands for the result of an item whose process hung or died."""
+
+    why: str
+
+
+def each(
+    work: Work[T], items: Sequence[Any], shared: Any, patience_s: float
+) -> Iterator[T | Lost]:
+    """Yield work(item, shared) of each item, all of it done in a child process.
+
+    An error inside is raised here as it was there; an item that takes longer than patience_s, or
+    ends its process, is Lost.
+    """
+    left = list(items)
     while left:
-        keeper = _keeper()
-        for answer in keeper.ask(tuple(left), setting):
-            run = left.pop(0)
-            if isinstance(answer, str):  # why the child is gone
-                yield lost_row(run, answer), {}
-            else:
-                yield answer
+        for answer in _keeper().ask(work, tuple(left), shared, patience_s):
+            del left[0]
+            yield answer
 
 
 def _keeper() -> Keeper:
@@ -47,13 +58,14 @@ class Keeper:
         """Start the child. Raises MfbaError when it does not start."""
         self._pipe, theirs = Pipe()
         paths = os.pathsep.join(path for path in sys.path if path)
+        told = {"PYTHONPATH": paths, "MFBA_PARENT": str(os.getpid()), **_ONE_THREAD}
         with theirs:
             self._child = subprocess.Popen(
                 [sys.executable, "-m", f"{__package__}.child", str(theirs.fileno())],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # planners may print what they like
-                env={**os.environ, "PYTHONPATH": paths, "MFBA_PARENT": str(os.getpid())},
+                env={**os.environ, **told},
             )
         if self._heard(START_S) is not True:
             self.end()
@@ -66,21 +78,22 @@ class Keeper:
         """Whether it can be asked."""
         return self._child.poll() is None and not self._pipe.closed
 
-    def ask(self, runs: tuple[Run, ...], setting: Setting) -> Iterator[Any]:
-        """Yield (row, timing) of each run; a text, and no more, where the child hung or died.
+    def ask(
+        self, work: Work[T], items: tuple[Any, ...], shared: Any, patience_s: float
+    ) -> Iterator[T | Lost]:
+        """Yield the result of each item; Lost, and no more, where the child hung or died.
 
-        An error that is not the planner's is raised here as it was there. Whoever stops
-        listening before the end gets another child the next time.
+        Whoever stops listening before the end gets another child the next time.
         """
         finished = False
         try:
-            self._pipe.send((runs, setting))
-            for _ in runs:
-                answer = self._heard(setting.patience_s)
+            self._pipe.send((work, items, shared))
+            for _ in items:
+                answer = self._heard(patience_s)
                 if isinstance(answer, Exception):
                     raise answer
                 if answer is None:
-                    yield self._last_words(setting)
+                    yield Lost(self._last_words(patience_s))
                     return
                 yield answer
             finished = True
@@ -95,12 +108,12 @@ class Keeper:
         except (EOFError, OSError):
             return None
 
-    def _last_words(self, setting: Setting) -> str:
+    def _last_words(self, patience_s: float) -> str:
         try:
             # A child that died has closed its end of the pipe, and is gone in no time.
             code = self._child.wait(timeout=0.5)
         except subprocess.TimeoutExpired:
-            return f"hung: no end after {setting.patience_s:g} s of wall time"
+            return f"hung: no end after {patience_s:g} s of wall time"
         reason = f"signal {-code}" if code < 0 else f"exit code {code}"
         return f"its process died ({reason})"
 
