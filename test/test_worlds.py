@@ -2,6 +2,7 @@
 """Suites: the same world whatever else is made, fit for every other command, as hard as told."""
 
 import math
+import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -91,6 +92,14 @@ def test_worlds_differ_in_k_and_seed(name: str) -> None:
     worlds = [suite(name).world(k).obstacles for k in range(5)]
     worlds += [suite(name, seed=1).world(k).obstacles for k in range(5)]
     assert len(set(worlds)) == 10
+
+
+@pytest.mark.parametrize("name", suite_names())
+def test_suites_travel_between_processes(name: str) -> None:
+    one = suite(name, seed=3)
+    again = pickle.loads(pickle.dumps(one))
+    assert (again.name, again.seed) == (one.name, 3)
+    assert again.world(4) == one.world(4)
 
 
 def test_suites_do_not_share_their_obstacles() -> None:

@@ -202,7 +202,7 @@ class Search:
         on = np.flatnonzero(leg >= 0)
         outside[on, leg[on]] = False
         slack = self.v**2 - legs.vx**2 - legs.vy**2
-        parts = []
+        parts: list[tuple[np.ndarray, ...]] = []
         for s in (1, -1):
             tx = (dx * reach + s * dy * self.edge) / np.maximum(d2, 1e-9)
             ty = (dy * reach - s * dx * self.edge) / np.maximum(d2, 1e-9)

@@ -110,7 +110,7 @@ def _place(
 def _turns(
     params: CrowdParams, heading_rad: float, rng: np.random.Generator
 ) -> tuple[Turn, ...]:
-    turns = []
+    turns: list[Turn] = []
     t = 0.0
     while True:
         t += params.turn_every_s * rng.uniform(0.5, 1.5)

@@ -34,6 +34,10 @@ class Suite:
     distinct: int | None = None  # how many differ; None: all
     seed: int = 0
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel to another process by name: how worlds are made cannot be pickled."""
+        return suite, (self.name, self.seed)
+
     def world(self, k: int, speed_mps: float = SPEED_MPS) -> Scenario:
         """World k for a robot of this speed (only hostile worlds depend on it).
 
