@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from ..leash import end_with_parent
+from . import parts as _parts  # noqa: F401  # now: later it would be taken for slow work
 
 
 def main(descriptor: int) -> None:

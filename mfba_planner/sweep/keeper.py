@@ -92,30 +92,30 @@ class Keeper:
                 answer = self._heard(patience_s)
                 if isinstance(answer, Exception):
                     raise answer
-                if answer is None:
-                    yield Lost(self._last_words(patience_s))
-                    return
                 yield answer
+                if isinstance(answer, Lost):
+                    return
             finished = True
         finally:
             if not finished:
                 self.end()
 
     def _heard(self, timeout_s: float) -> Any:
-        """What the child says next, None for nothing in time or never again."""
+        """What the child says next; Lost for nothing in time, or never again."""
         try:
-            return self._pipe.recv() if self._pipe.poll(timeout_s) else None
+            if self._pipe.poll(timeout_s):
+                return self._pipe.recv()
         except (EOFError, OSError):
-            return None
+            return Lost(f"its process died ({self._code()})")
+        return Lost(f"hung: no end after {timeout_s:g} s of wall time")
 
-    def _last_words(self, patience_s: float) -> str:
+    def _code(self) -> str:
+        """How the child ended, whose end of the pipe is closed already."""
         try:
-            # A child that died has closed its end of the pipe, and is gone in no time.
-            code = self._child.wait(timeout=0.5)
+            code = self._child.wait(timeout=START_S)
         except subprocess.TimeoutExpired:
-            return f"hung: no end after {patience_s:g} s of wall time"
-        reason = f"signal {-code}" if code < 0 else f"exit code {code}"
-        return f"its process died ({reason})"
+            return "it is still there"
+        return f"signal {-code}" if code < 0 else f"exit code {code}"
 
     def end(self) -> None:
         """Kill the child."""
