@@ -56,11 +56,13 @@ setup(
     ],
     # Not tests_require: with it `colcon test` runs no test and stays green.
     extras_require={
+        "orca": ["pyrvo>=0.4"],
         "parquet": ["pyarrow>=15"],
         "test": [
             "hypothesis>=6.100",
             "pyarrow>=15",
             "pybag-sdk>=0.13",
+            "pyrvo>=0.4",
             "pytest>=8",
             "pytest-cov>=6",
             "pytest-xdist>=3.6",

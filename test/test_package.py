@@ -43,7 +43,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "watched": ({"core", "paper", "study"}, {"rich"}),
     "statistics": (set(), {"numpy", "scipy"}),
     "study": ({"core", "outputs", "study"}, {"numpy"}),
-    "planners": ({"core", "planners"}, {"numpy"}),
+    "planners": ({"core", "planners"}, {"numpy", "pyrvo"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
     "messages": ({"core"}, {"numpy"}),
     "run_config": ({"core", "scenarios"}, {"numpy"}),

@@ -11,7 +11,11 @@ from ..core.errors import ConfigError
 from ..core.options import did_you_mean
 from ..core.planner import PathPlanner, Planner, PlannerParams
 from ..core.sensing import SensorParams
+from .apf import PotentialField
+from .dwa import DynamicWindow
+from .orca import Orca
 from .straight import Straight
+from .vfh import VectorFieldHistogram
 
 Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]
 
@@ -32,6 +36,10 @@ PLANNERS: dict[str, Factory] = {
     "ba": _with(Algorithm.BA),
     "mfba": _with(Algorithm.MFBA),
     "straight": Straight,
+    "apf": PotentialField,
+    "vfh": VectorFieldHistogram,
+    "dwa": DynamicWindow,
+    "orca": Orca,
 }
 
 
