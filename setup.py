@@ -57,12 +57,14 @@ setup(
     # Not tests_require: with it `colcon test` runs no test and stays green.
     extras_require={
         "dask": ["distributed>=2024.1"],
+        "orca": ["pyrvo>=0.4"],
         "parquet": ["pyarrow>=15"],
         "test": [
             "distributed>=2024.1",
             "hypothesis>=6.100",
             "pyarrow>=15",
             "pybag-sdk>=0.13",
+            "pyrvo>=0.4",
             "pytest>=8",
             "pytest-cov>=6",
             "pytest-xdist>=3.6",

@@ -50,7 +50,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"distributed", "numpy", "pyarrow"},
     ),
     "study": ({"core", "outputs", "study"}, {"numpy"}),
-    "planners": ({"core", "planners"}, {"numpy"}),
+    "planners": ({"core", "planners"}, {"numpy", "pyrvo"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
     "worlds": ({"core", "scenarios", "worlds"}, {"numpy"}),
     "oracle": ({"core", "oracle"}, {"numpy", "scipy"}),

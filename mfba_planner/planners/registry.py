@@ -11,8 +11,12 @@ from ..core.errors import ConfigError
 from ..core.options import did_you_mean
 from ..core.planner import PathPlanner, Planner, PlannerParams
 from ..core.sensing import SensorParams
+from .apf import PotentialField
+from .dwa import DynamicWindow
+from .orca import Orca
 from .predictive import Predictive
 from .straight import Straight
+from .vfh import VectorFieldHistogram
 
 Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]
 
@@ -34,6 +38,10 @@ PLANNERS: dict[str, Factory] = {
     "mfba": _with(Algorithm.MFBA),
     "straight": Straight,
     "predictive": Predictive,
+    "apf": PotentialField,
+    "vfh": VectorFieldHistogram,
+    "dwa": DynamicWindow,
+    "orca": Orca,
 }
 
 

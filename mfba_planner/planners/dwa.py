@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Dynamic window: sampled velocities, simulated on, the best admissible one (Fox 1997)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..core.geometry import Point
+from ..core.planner import NANO, Event, Observation
+from .steering import Move, Steering
+from .surroundings import discs
+
+HEADINGS, SPEEDS = 36, (1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0)
+HORIZON_S = 2.0
+PROGRESS, CLEARANCE = 1.0, 0.15  # weights of metres towards the goal and of 1 / clearance
+NEAREST_M = 0.05  # clearance below which a velocity is admissible only if nothing is better
+
+
+class DynamicWindow(Steering):
+    """Velocities of an omnidirectional robot, held for HORIZON_S among circles that move on.
+
+    The window is the whole disc of speeds: this robot has no limit of acceleration. Objective:
+    PROGRESS times the way gained towards the goal, minus CLEARANCE over the smallest gap.
+    """
+
+    def __init__(self, *args: object) -> None:
+        """Prepare the samples."""
+        super().__init__(*args)  # type: ignore[arg-type]
+        angles = np.arange(HEADINGS) * (2.0 * math.pi / HEADINGS)
+        ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        self._samples = self.params.speed_mps * np.concatenate(
+            [share * ring for share in SPEEDS if share] + [np.zeros((1, 2))]
+        )
+
+    def move(self, obs: Observation, goal: Point) -> Move:
+        """The sample of the best objective."""
+        ahead = self.straight(obs.pose.position, goal, self.params.speed_mps)
+        around = discs(obs)
+        if not around.size:
+            return Move(velocity=ahead, reason="nothing within SR")
+        samples = np.concatenate([self._samples, [ahead]])
+        gap = _smallest_gap(around, samples, HORIZON_S)
+        gx, gy = goal[0] - obs.pose.x, goal[1] - obs.pose.y
+        left = math.hypot(gx, gy)
+        lasts = max(min(HORIZON_S, left / self.params.speed_mps), self.params.tick_ns * NANO)
+        gained = left - np.hypot(gx - samples[:, 0] * lasts, gy - samples[:, 1] * lasts)
+        value = PROGRESS * gained - CLEARANCE / np.maximum(gap, NEAREST_M)
+        value[gap < NEAREST_M] = -1e6 + gap[gap < NEAREST_M]
+        best = int(value.argmax())
+        safe = gap[best] >= NEAREST_M
+        return Move(
+            velocity=(float(samples[best, 0]), float(samples[best, 1])),
+            reason=f"{len(around)} in range: smallest gap {gap[best]:.2f} m within the horizon",
+            event=Event.OBSTACLE if safe else Event.NO_GAP,
+        )
+
+
+def _smallest_gap(around: np.ndarray, samples: np.ndarray, horizon_s: float) -> np.ndarray:
+    """Smallest distance to any enlarged edge within the horizon, per sample; (m,), metres."""
+    x, y, vx, vy, radius = around.T[:, :, None]
+    wx, wy = vx - samples[:, 0], vy - samples[:, 1]
+    t = np.clip(-(x * wx + y * wy) / np.maximum(wx * wx + wy * wy, 1e-12), 0.0, horizon_s)
+    gap: np.ndarray = (np.hypot(x + t * wx, y + t * wy) - radius).min(axis=0)
+    return gap

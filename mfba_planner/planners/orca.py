@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ORCA through pyrvo: the velocity nearest to the wanted one that avoids all for tau seconds."""
+
+from __future__ import annotations
+
+from ..core.errors import ConfigError
+from ..core.geometry import Point
+from ..core.planner import NANO, Event, Observation, PlannerParams
+from ..core.sensing import SensorParams
+from .steering import Move, Steering
+
+HORIZON_S = 2.0
+MARGIN_M = 0.02
+# ORCA asks each of two agents for half of the evasion. Obstacles do not do their half: the robot
+# asks again from the velocity it got, until nothing is left to evade.
+ROUNDS = 6
+
+
+class Orca(Steering):
+    """One agent among others that keep their velocities; needs known circles."""
+
+    def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
+        """Raise ConfigError where pyrvo is not installed."""
+        try:
+            from pyrvo import RVOSimulator
+        except ImportError:
+            raise ConfigError(
+                "planner 'orca': needs pyrvo; pip install 'mfba_planner[orca]'"
+            ) from None
+        self._simulator = RVOSimulator
+        super().__init__(params, sensor, seed)
+
+    def forget(self) -> None:
+        """Stand still before the first tick."""
+        self._velocity: Point = (0.0, 0.0)
+
+    def move(self, obs: Observation, goal: Point) -> Move:
+        """The velocity of ORCA; InputError where only a scan is known."""
+        wanted = self.straight(obs.pose.position, goal, self.params.speed_mps)
+        circles = obs.circles or ()
+        if not circles:
+            self._velocity = wanted
+            return Move(velocity=wanted, reason="nothing within SR")
+        speed = self.params.speed_mps
+        simulator = self._simulator(
+            self.params.tick_ns * NANO, 1e3, len(circles), HORIZON_S, HORIZON_S, MARGIN_M, speed
+        )
+        robot = simulator.add_agent((0.0, 0.0))
+        px, py = obs.pose.position
+        others = []
+        for circle in circles:
+            place = (circle.center_m[0] - px, circle.center_m[1] - py)
+            number = simulator.add_agent(place)
+            simulator.set_agent_radius(number, circle.radius_m)
+            others.append((number, place, circle.velocity_mps))
+        velocity = self._velocity
+        for _ in range(ROUNDS):
+            simulator.set_agent_position(robot, (0.0, 0.0))
+            simulator.set_agent_velocity(robot, velocity)
+            simulator.set_agent_pref_velocity(robot, wanted)
+            for number, place, keeps in others:
+                simulator.set_agent_position(number, place)
+                simulator.set_agent_velocity(number, keeps)
+                simulator.set_agent_pref_velocity(number, keeps)
+            simulator.do_step()
+            velocity = simulator.get_agent_velocity(robot).to_tuple()
+        self._velocity = velocity
+        return Move(velocity=velocity, reason=f"ORCA among {len(circles)}", event=Event.OBSTACLE)

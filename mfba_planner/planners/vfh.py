@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A vector field histogram: masked headings, and the free one of least cost (VFH+ 1998)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..core.geometry import Point, bearing
+from ..core.planner import Event, Observation
+from .steering import Move, Steering
+from .surroundings import discs
+
+HEADINGS = 72
+MARGIN_M = 0.2  # added to every circle: it moves while the robot passes
+TO_GOAL, TO_LAST = 5.0, 2.0  # weights of the turn away from the goal and from the last heading
+
+
+class VectorFieldHistogram(Steering):
+    """Chooses among free headings; a heading is masked within the tangents of a circle in range.
+
+    Circles stand still for it, as in VFH+; cost: TO_GOAL turn to the goal + TO_LAST turn to the
+    heading before.
+    """
+
+    def forget(self) -> None:
+        """No heading before the first."""
+        self._last: float | None = None
+
+    def move(self, obs: Observation, goal: Point) -> Move:
+        """Full speed along the cheapest free heading."""
+        target = bearing(obs.pose.position, goal)
+        around = discs(obs)
+        if not around.size:
+            self._last = target
+            velocity = self.straight(obs.pose.position, goal, self.params.speed_mps)
+            return Move(velocity=velocity, reason="nothing within SR")
+        headings = np.append(np.arange(HEADINGS) * (2.0 * math.pi / HEADINGS), target)
+        away = np.hypot(around[:, 0], around[:, 1])
+        directions = np.arctan2(around[:, 1], around[:, 0])
+        half = np.arcsin(np.minimum((around[:, 4] + MARGIN_M) / np.maximum(away, 1e-9), 1.0))
+        off = np.abs(_turn(headings[:, None], directions))
+        masked = (off < half).any(axis=1)
+        if masked.all():
+            return Move(velocity=(0.0, 0.0), reason="every heading is masked", event=Event.NO_GAP)
+        last = target if self._last is None else self._last
+        cost = TO_GOAL * np.abs(_turn(headings, target)) + TO_LAST * np.abs(_turn(headings, last))
+        cost[masked] = np.inf
+        heading = float(headings[int(cost.argmin())])
+        self._last = heading
+        speed = self.params.speed_mps
+        return Move(
+            velocity=(speed * math.cos(heading), speed * math.sin(heading)),
+            reason=f"{int(masked.sum())} of {masked.size} headings masked",
+            event=Event.OBSTACLE,
+        )
+
+
+def _turn(a: np.ndarray, b: np.ndarray | float) -> np.ndarray:
+    """Signed smallest angle from b to a."""
+    turn: np.ndarray = np.remainder(a - b + math.pi, 2.0 * math.pi) - math.pi
+    return turn
