@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.episode import World, look
+from ..core.episode import World, sense
 from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D
 from ..core.options import did_you_mean
@@ -39,7 +39,7 @@ class Perception:
     first ticks see tick 0's), and Observation.sensed tells stamp and pose they belong to; the
     pose itself is the present one. The paper's sector ranges come with all of them, without
     noise and latency where circles are known, from the scan where there is one; sectors=False
-    spares a scan that cost for planners that do not read them.
+    spares that cost for planners that do not read them.
     """
 
     def __init__(
@@ -74,20 +74,19 @@ class Perception:
         self._past.append((world.stamp_ns, world.pose, self._sense(world, sensor)))
         stamp_ns, pose, (circles, scan) = self._past[0]
         late = stamp_ns != world.stamp_ns
-        if scan is None:
-            seen = look(world, sensor)
-            if circles is None:
-                return seen
-            return replace(seen, circles=circles, sensed=(stamp_ns, pose) if late else None)
         ranges: Ranges = ()
         if self._sectors:
-            ranges = sense_scan(scan, 0.0, world.scenario.robot_radius_m, sensor)
+            if scan is None:
+                ranges = sense(world, sensor)
+            else:
+                ranges = sense_scan(scan, 0.0, world.scenario.robot_radius_m, sensor)
         return Observation(
             stamp_ns=world.stamp_ns,
             pose=world.pose,
             ranges_m=ranges,
             goal=world.scenario.goal_m,
             now_ns=world.stamp_ns,
+            circles=circles,
             scan=scan,
             sensed=(stamp_ns, pose) if late else None,
         )
@@ -102,10 +101,12 @@ class Perception:
     def _circles(self, world: World, sensor: SensorParams) -> tuple[Circle, ...]:
         scenario, t_s = world.scenario, world.time_s
         circles = []
-        for obstacle, ((x, y), radius) in zip(scenario.obstacles, scenario.enlarged(t_s)):
-            if _near(world.pose.position, (x, y), radius + sensor.sensing_range_m):
+        for obstacle in scenario.obstacles:
+            center = center_at(obstacle, t_s, scenario.walls)
+            radius = scenario.enlarged_radius(obstacle)
+            if _near(world.pose.position, center, radius + sensor.sensing_range_m):
                 velocity = velocity_at(obstacle, t_s, scenario.walls)
-                circles.append(Circle(center_m=(x, y), radius_m=radius, velocity_mps=velocity))
+                circles.append(Circle(center_m=center, radius_m=radius, velocity_mps=velocity))
         if not self.noise_m or not circles:
             return tuple(circles)
         offsets = self._noise(world.stamp_ns, 2 * len(circles)).reshape(-1, 2).tolist()

@@ -11,6 +11,7 @@ from ..core.errors import ConfigError
 from ..core.options import did_you_mean
 from ..core.planner import PathPlanner, Planner, PlannerParams
 from ..core.sensing import SensorParams
+from .predictive import Predictive
 from .straight import Straight
 
 Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]
@@ -32,6 +33,7 @@ PLANNERS: dict[str, Factory] = {
     "ba": _with(Algorithm.BA),
     "mfba": _with(Algorithm.MFBA),
     "straight": Straight,
+    "predictive": Predictive,
 }
 
 

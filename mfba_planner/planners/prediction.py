@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a way through a waypoint would cost among circles that keep their velocities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core.geometry import Point, towards
+from ..core.options import check, option
+from ..core.planner import Circle
+from ..core.sensing import Ranges
+
+_ROUNDING = 1.0 - 1e-9
+_TINY = 1e-12
+_Row = tuple[float, float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RiskParams:
+    """How predicted contacts, close passes and waiting weigh against metres of way."""
+
+    horizon_s: float = option(
+        3.0, "tau, beyond which nothing is predicted", unit="s", minimum=0.1, maximum=60.0
+    )
+    contact_m: float = option(
+        3.0, "weight of a contact, however far off", unit="m", minimum=0.0, maximum=1e6
+    )
+    urgent_m: float = option(
+        100.0, "weight of a contact within moments", unit="m", minimum=0.0, maximum=1e6
+    )
+    close_m: float = option(
+        0.3, "weight of a pass without clearance", unit="m", minimum=0.0, maximum=1e6
+    )
+    margin_m: float = option(
+        0.01, "clearance below which a pass is close", unit="m", minimum=1e-6, maximum=10.0
+    )
+    margin_ticks: float = option(
+        1.0, "ticks of an obstacle's own motion added to it", minimum=0.0, maximum=100.0
+    )
+    waiting: float = option(
+        0.5, "what a second of waiting counts, in seconds of driving", minimum=0.0, maximum=100.0
+    )
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+class Prediction:
+    """Circles around one position, each moving on as it does now.
+
+    A circle that turns is noticed a tick later: hence margins that grow with its speed. Plain
+    floats, since few circles are near and most ways are refused by their length or by the
+    first circle: arrays cost more than they spare.
+    """
+
+    def __init__(
+        self, position: Point, circles: Sequence[Circle], params: RiskParams, tick_s: float
+    ) -> None:
+        """Take the circles as they are now."""
+        self.params = params
+        px, py = position
+        self._rows: list[_Row] = []
+        for circle in circles:
+            (x, y), (vx, vy), r = circle.center_m, circle.velocity_mps, circle.radius_m
+            margin = params.margin_m + params.margin_ticks * tick_s * math.sqrt(vx * vx + vy * vy)
+            self._rows.append((x - px, y - py, vx, vy, r, margin, (r + margin) ** 2))
+        # The nearest first: it refuses most.
+        self._rows.sort(key=lambda row: row[0] * row[0] + row[1] * row[1] - row[6])
+
+    def closed(self, ux: np.ndarray, uy: np.ndarray) -> np.ndarray:
+        """Bits (m,): 1 where a robot with velocity (ux, uy) comes too close within tau."""
+        x, y, vx, vy, _, _, outer = np.array(self._rows).T[:, :, None]
+        wx, wy = vx - ux, vy - uy
+        b = x * wx
+        b += y * wy
+        a = wx * wx
+        a += wy * wy
+        a += _TINY
+        t = np.minimum(np.maximum(-b / a, 0.0), self.params.horizon_s)
+        away = x * x + y * y
+        closest = (a * t + 2.0 * b) * t + away
+        near: np.ndarray = (closest < np.minimum(away, outer) * _ROUNDING).any(axis=0)
+        return near.astype(int)
+
+    def cost(
+        self, way: Point, t1: float, to_goal: Point, speed: float, bound: float = math.inf
+    ) -> float:
+        """Eq. 1 through a waypoint (relative, like the goal), plus waiting and risk, in metres.
+
+        The robot is at the waypoint after t1 > 0 seconds and goes on straight to the goal at
+        full speed. Where the cost is not below the bound, a smaller number may be returned
+        that is not below it either.
+        """
+        p, tau = self.params, self.params.horizon_s
+        (qx, qy), (gx, gy) = way, to_goal
+        rx, ry = gx - qx, gy - qy
+        first, second = math.sqrt(qx * qx + qy * qy), math.sqrt(rx * rx + ry * ry)
+        total = first + second + p.waiting * (speed * t1 - first)
+        if total >= bound:
+            return total
+        left = bound - total
+        risk = self._leg(0.0, 0.0, 0.0, qx / t1, qy / t1, min(t1, tau), left)
+        if risk < left and t1 < tau and second > 0.0:
+            ux, uy = rx * speed / second, ry * speed / second
+            lasts = min(second / speed, tau - t1)
+            risk = max(risk, self._leg(qx, qy, t1, ux, uy, lasts, left))
+        return total + risk
+
+    def _leg(
+        self, qx: float, qy: float, t0: float, ux: float, uy: float, lasts: float, bound: float
+    ) -> float:
+        """The worst risk of a leg from (qx, qy) at t0, or one that is not below the bound.
+
+        With x = 1 - t/tau, a contact at t costs contact_m x^2 + urgent_m x^8, a closest
+        approach at t costs close_m x times the share of the margin that is missing. Who is
+        within a margin already may leave it in any direction, but not go deeper.
+        """
+        p, worst = self.params, 0.0
+        tau, close, contact, urgent = p.horizon_s, p.close_m, p.contact_m, p.urgent_m
+        for x, y, vx, vy, r, margin, outer in self._rows:
+            dx, dy, wx, wy = x + vx * t0 - qx, y + vy * t0 - qy, vx - ux, vy - uy
+            b = dx * wx + dy * wy
+            if b >= 0.0:
+                continue
+            a = wx * wx + wy * wy
+            t = -b / a
+            if t > lasts:
+                t = lasts
+            away = dx * dx + dy * dy
+            c = (a * t + 2.0 * b) * t + away
+            if c >= outer or c >= away * _ROUNDING:
+                continue
+            missing = 1.0 - (math.sqrt(c) - r) / margin if c > 0.0 else 1.0
+            if missing > 1.0:
+                missing = 1.0
+            risk = missing * close * (1.0 - (t0 + t) / tau)
+            if c < r * r:
+                t -= math.sqrt((r * r - c) / a)
+                late = 1.0 - (t0 + t) / tau if t > 0.0 else 1.0 - t0 / tau
+                late *= late
+                risk += late * (contact + urgent * late * late * late)
+            if risk > worst:
+                worst = risk
+                if worst >= bound:
+                    break
+        return worst
+
+
+def moved(circles: Sequence[Circle], dt: float) -> Sequence[Circle]:
+    """The circles dt seconds later, at constant velocity."""
+    if dt == 0.0:
+        return circles
+    return [
+        replace(c, center_m=(c.center_m[0] + dt * vx, c.center_m[1] + dt * vy))
+        for c in circles
+        for vx, vy in [c.velocity_mps]
+    ]
+
+
+def from_sectors(position: Point, ranges_m: Ranges, radius_m: float) -> list[Circle]:
+    """A circle at rest for every set sector, its edge at the range along the middle."""
+    width = 2.0 * math.pi / max(len(ranges_m), 1)
+    return [
+        Circle(center_m=towards(position, (i + 0.5) * width, r + radius_m), radius_m=radius_m)
+        for i, r in enumerate(ranges_m)
+        if math.isfinite(r)
+    ]

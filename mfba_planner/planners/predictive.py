@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's architecture with prediction: bits, gaps, the nearest ones, bats for the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..core.bat import BatSwarm
+from ..core.geometry import Point, distance
+from ..core.options import check, option
+from ..core.planner import NANO, Circle, Event, Observation, PlannerParams, stream
+from ..core.region import Disc
+from ..core.sensing import Bits, SensorParams
+from .prediction import Prediction, RiskParams, from_sectors, moved
+from .steering import Move, Steering
+from .tracking import Tracker, TrackingParams
+
+LENGTHS = (0.25, 0.5, 0.75, 1.0)  # of a gap's waypoints, in reaches
+WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
+SPEEDS = (1e-6, 0.5)  # while waiting, in full speeds; not 0, so that it has a direction
+SHUT = 12  # headings weighed when every one is closed
+_FREE_M = 1e-9
+_NEAR_S = 1e-3  # before this, a waypoint has been reached
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictiveParams:
+    """What the predictive planner has beside the paper's options."""
+
+    headings: int = option(72, "headings, one bit each", minimum=12, maximum=3600)
+    reach_m: float = option(1.5, "farthest waypoint", unit="m", minimum=0.01, maximum=100.0)
+    search_m: float = option(
+        0.3, "radius of the disc the bats search", unit="m", minimum=0.001, maximum=100.0
+    )
+    robot_radius_m: float = option(
+        0.3, "radius of the robot, which enlarges what scans show", unit="m", minimum=0.0,
+        maximum=10.0,
+    )  # fmt: skip
+    sector_radius_m: float = option(
+        0.3, "radius of what stands for a set sector", unit="m", minimum=0.01, maximum=10.0
+    )
+    tracking: TrackingParams = field(default_factory=TrackingParams)
+    risk: RiskParams = field(default_factory=RiskParams)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+def preset(params: PlannerParams | None = None) -> PlannerParams:
+    """The given options with the step and the swarm that the predictive planner is made for.
+
+    A step of 0.08 m is 0.1 s at 0.8 m/s: what an obstacle may do unseen stays small.
+    """
+    params = params or PlannerParams()
+    bat = replace(params.bat, population=5, iterations=2)
+    return replace(params, step_length_m=0.08, bat=bat)
+
+
+class Predictive(Steering):
+    """Straight while that is free; else the best of the nearest gaps, refined by bats.
+
+    A heading's bit is set when it leads too close to a circle within tau at full speed. The
+    waypoints weighed lie in the nearest free gaps on either side of the goal's direction (in
+    every sixth heading when all are closed: the least risk), and straight on after waiting at
+    rest or at half speed. The bats then search a disc around the best. All are measured by
+    Prediction.cost: eq. 1 through the waypoint, plus waiting, plus risk.
+    """
+
+    def __init__(
+        self,
+        params: PlannerParams,
+        sensor: SensorParams,
+        seed: int,
+        options: PredictiveParams | None = None,
+    ) -> None:
+        """Start idle; ConfigError for a negative seed."""
+        self.options = options or PredictiveParams()
+        n = self.options.headings
+        angles = 2.0 * math.pi / n * np.arange(1, n + 1)
+        self._cos, self._sin = np.cos(angles), np.sin(angles)
+        self._waypoint: Point | None = None
+        self._tracker = Tracker(self.options.tracking)
+        super().__init__(params, sensor, seed)
+
+    def move(self, obs: Observation, goal: Point) -> Move:
+        """Choose waypoint and speed; nothing is searched while the straight way is free."""
+        here, speed = obs.pose.position, self.params.speed_mps
+        straight = self.straight(here, goal, speed)
+        before, self._waypoint = self._waypoint, None
+        circles = self._circles(obs)
+        if not circles:
+            return Move(velocity=straight, reason="no obstacle within SR")
+        tick_s = self.params.tick_ns * NANO
+        (x, y), (gx, gy) = here, goal
+        to_goal, left = (gx - x, gy - y), distance(here, goal)
+        world = Prediction(here, circles, self.options.risk, tick_s)
+        share = min(1.0, speed * tick_s / left)
+        ahead, t_ahead = (to_goal[0] * share, to_goal[1] * share), share * left / speed
+        direct = world.cost(ahead, t_ahead, to_goal, speed)
+        if direct <= left + _FREE_M:
+            return Move(velocity=straight, reason="the straight way is free")
+        vs: Bits = tuple(world.closed(self._cos * speed, self._sin * speed).tolist())
+        gaps = self._nearest(vs, to_goal)
+        way, lasts, least = ahead, t_ahead, direct
+        for q, t1 in self._waypoints(gaps, to_goal, left):
+            cost = world.cost(q, t1, to_goal, speed, least)
+            if cost < least:
+                way, lasts, least = q, t1, cost
+        if before is not None:
+            q = (before[0] - x, before[1] - y)
+            t1 = distance((0.0, 0.0), q) / speed
+            cost = world.cost(q, t1, to_goal, speed, least) if t1 > _NEAR_S else least
+            if cost < least:
+                way, lasts, least = q, t1, cost
+        swarm = self._fly(world, way, to_goal, least, obs.stamp_ns)
+        if swarm.best_value < least:
+            (qx, qy), least = swarm.best_x, swarm.best_value
+            way = (qx, qy)
+            lasts = math.sqrt(qx * qx + qy * qy) / speed
+        if distance((0.0, 0.0), way) > 0.999 * lasts * speed:
+            self._waypoint = (x + way[0], y + way[1])
+        scale = 1.0 / max(lasts, distance((0.0, 0.0), way) / speed)
+        u = (way[0] * scale, way[1] * scale)
+        gap = self._gap(way)
+        why = f"the straight way closes; {least - left:.3g} m longer"
+        if all(vs):
+            why, gap = f"every heading closes; the least risk costs {least - left:.3g} m", 0
+        elif vs[gap - 1]:
+            gap = 0
+        return Move(
+            velocity=u,
+            reason=f"{why}, at {1e2 * distance((0.0, 0.0), u) / speed:.0f} % speed",
+            event=Event.OBSTACLE,
+            vs=vs,
+            vg=vs,  # a heading is as narrow as a gap: it stands for both
+            gap=gap,
+            waypoint=(x + way[0], y + way[1]),
+            candidates=tuple((x + dx, y + dy) for dx, dy in swarm.candidates),
+        )
+
+    def forget(self) -> None:
+        """Drop the last waypoint and all tracks."""
+        self._waypoint = None
+        self._tracker = Tracker(self.options.tracking)
+
+    def _circles(self, obs: Observation) -> Sequence[Circle]:
+        """The circles as they are now: told, tracked from scans, or a stand-in per sector."""
+        stamp_ns, pose = obs.sensed or (obs.stamp_ns, obs.pose)
+        if obs.circles is not None:
+            return moved(obs.circles, (obs.stamp_ns - stamp_ns) * NANO)
+        if obs.scan is not None:
+            self._tracker.update(stamp_ns, pose, obs.scan)
+            return self._tracker.circles(obs.stamp_ns, self.options.robot_radius_m)
+        return from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
+
+    def _nearest(self, closed: Bits, to_goal: Point) -> list[int]:
+        """The free headings nearest to the goal's on either side; a few when none is free."""
+        n = len(closed)
+        below = math.floor(math.atan2(to_goal[1], to_goal[0]) * n / (2.0 * math.pi)) - 1
+        right = next(((below - k) % n for k in range(n) if not closed[(below - k) % n]), None)
+        if right is None:
+            return list(range(0, n, n // SHUT))
+        left = next((below + k) % n for k in range(1, n + 1) if not closed[(below + k) % n])
+        return [left, right] if left != right else [left]
+
+    def _gap(self, way: Point) -> int:
+        """Number (from 1) of the heading nearest to a waypoint; the last one is +x."""
+        n = self.options.headings
+        return (round(math.atan2(way[1], way[0]) * n / (2.0 * math.pi)) - 1) % n + 1
+
+    def _waypoints(
+        self, gaps: list[int], to_goal: Point, left: float
+    ) -> list[tuple[Point, float]]:
+        """Waypoints and the time they are reached after."""
+        speed, reach = self.params.speed_mps, self.options.reach_m
+        ways = []
+        for k in gaps:
+            c, s = float(self._cos[k]), float(self._sin[k])
+            for share in LENGTHS:
+                ways.append(((c * share * reach, s * share * reach), share * reach / speed))
+        ex, ey = to_goal[0] / left * speed, to_goal[1] / left * speed
+        for share in SPEEDS:
+            for t in WAITS_S:
+                ways.append(((ex * share * t, ey * share * t), t))
+        return ways
+
+    def _fly(
+        self, world: Prediction, center: Point, to_goal: Point, bound: float, stamp_ns: int
+    ) -> BatSwarm:
+        """Bats around the best waypoint so far; what cannot be below the bound is not weighed."""
+        bat, speed = self.params.bat, self.params.speed_mps
+        disc = Disc(self.options.search_m, center)
+        swarm = BatSwarm(bat, disc, stream(self.seed, stamp_ns), ahead=bat.iterations)
+        for _ in range(bat.iterations + 1):
+            values = []
+            for qx, qy in swarm.ask():
+                t1 = math.sqrt(qx * qx + qy * qy) / speed + 1e-9
+                values.append(world.cost((qx, qy), t1, to_goal, speed, bound))
+            swarm.tell(values)
+            bound = min(bound, swarm.best_value)
+        return swarm

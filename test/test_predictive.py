@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The predictive planner: what it avoids, what it leaves alone, and what it never does."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mfba_planner.core.digest import digest
+from mfba_planner.core.episode import Episode, run
+from mfba_planner.core.geometry import Point, Pose2D, distance
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.planner import Circle, Mode, Observation, PlannerParams
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.core.world import Obstacle, Scenario, Walls
+from mfba_planner.planners.perception import Perception
+from mfba_planner.planners.prediction import Prediction, RiskParams, from_sectors, moved
+from mfba_planner.planners.predictive import Predictive, PredictiveParams, preset
+from mfba_planner.planners.registry import make
+from mfba_planner.scenarios import load_scenario
+
+PARAMS = preset(PlannerParams(speed_mps=0.8))
+SENSOR = SensorParams()
+STRAIGHT_M = 12.0 * math.sqrt(2.0)
+GOAL = (9.0, 8.0)
+HERE = Pose2D(1.0, 2.0)
+
+
+def planner(seed: int = 0) -> Predictive:
+    return Predictive(PARAMS, SENSOR, seed)
+
+
+def drive(scenario: Scenario, seed: int = 0, name: str = "known", **kw: float) -> Episode:
+    look = Perception(name, sectors=False, seed=seed, **kw)  # type: ignore[arg-type]
+    return run(scenario, planner=PARAMS, brain=planner(seed), seed=seed, look=look)
+
+
+def seeing(*circles: Circle, stamp_ns: int = 10**9, goal: Point = GOAL) -> Observation:
+    return Observation(
+        stamp_ns=stamp_ns, now_ns=stamp_ns, pose=HERE, ranges_m=(), goal=goal, circles=circles
+    )
+
+
+def mirrored(scenario: Scenario) -> Scenario:
+    """The scenario with x and y exchanged: start and goal on the diagonal stay."""
+    return replace(
+        scenario,
+        obstacles=tuple(
+            replace(
+                o,
+                center_m=(o.center_m[1], o.center_m[0]),
+                heading_rad=math.pi / 2.0 - o.heading_rad,
+            )
+            for o in scenario.obstacles
+        ),
+    )
+
+
+def crowd(seed: int, count: int) -> Scenario:
+    rng = np.random.default_rng(seed)
+    obstacles: list[Obstacle] = []
+    while len(obstacles) < count:
+        x, y = rng.uniform(0.3, 11.7, 2).tolist()
+        if min(math.hypot(x, y), math.hypot(12.0 - x, 12.0 - y)) > 0.7:
+            speed, heading = rng.uniform(0.1, 0.3), rng.uniform(-math.pi, math.pi)
+            obstacles.append(
+                Obstacle(center_m=(x, y), radius_m=0.3, speed_mps=speed, heading_rad=heading)
+            )
+    return Scenario(
+        name=f"crowd-{seed}",
+        start_m=(0.0, 0.0),
+        goal_m=(12.0, 12.0),
+        obstacles=tuple(obstacles),
+        walls=Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 12.0)),
+    )
+
+
+circles = st.builds(
+    lambda bearing, d, speed, heading: Circle(
+        center_m=(HERE.x + d * math.cos(bearing), HERE.y + d * math.sin(bearing)),
+        radius_m=0.6,
+        velocity_mps=(speed * math.cos(heading), speed * math.sin(heading)),
+    ),
+    st.floats(-math.pi, math.pi),
+    st.floats(0.0, 1.4),
+    st.floats(0.0, 1.0),
+    st.floats(-math.pi, math.pi),
+)
+
+
+@given(seen=st.lists(circles, max_size=12), seed=st.integers(0, 2**32))
+@settings(max_examples=60)
+def test_whatever_it_sees_it_keeps_to_the_speed_and_to_numbers(
+    seen: list[Circle], seed: int
+) -> None:
+    decision = planner(seed).plan(seeing(*seen))
+    assert math.hypot(*decision.velocity) <= PARAMS.speed_mps * (1.0 + 1e-9)
+    assert all(map(math.isfinite, (*decision.velocity, *decision.waypoint)))
+    assert decision == planner(seed).plan(seeing(*seen))
+
+
+@given(seen=st.lists(circles, min_size=1, max_size=5))
+@settings(max_examples=60)
+def test_a_straight_way_that_is_free_is_taken(seen: list[Circle]) -> None:
+    off = math.pi / 2.0
+    toward = math.atan2(GOAL[1] - HERE.y, GOAL[0] - HERE.x)
+    behind = [
+        c
+        for c in seen
+        if math.cos(math.atan2(c.center_m[1] - HERE.y, c.center_m[0] - HERE.x) - toward) < -0.1
+        and math.hypot(*c.velocity_mps) < 0.3
+        and distance(c.center_m, HERE.position) > 0.8
+    ]
+    decision = planner().plan(seeing(*behind))
+    assert math.remainder(math.atan2(*decision.velocity[::-1]) - toward, 4.0 * off) == (
+        pytest.approx(0.0, abs=1e-9)
+    )
+    assert math.hypot(*decision.velocity) == pytest.approx(PARAMS.speed_mps)
+    assert decision.mode is Mode.PATH_GENERATION
+
+
+@pytest.mark.parametrize("name", ["known", "scan-360", "scan-12"])
+@pytest.mark.parametrize("aside_m", [0.0, 0.2, -0.4])
+def test_who_comes_head_on_is_passed(name: str, aside_m: float) -> None:
+    scenario = Scenario(
+        name="head-on",
+        start_m=(0.0, 0.0),
+        goal_m=(8.0, 0.0),
+        obstacles=(
+            Obstacle(center_m=(6.0, aside_m), radius_m=0.3, speed_mps=0.3, heading_rad=math.pi),
+        ),
+    )
+    result = evaluate(drive(scenario, name=name))
+    assert result.success
+    assert result.length_m < 8.0 * (1.1 if name == "scan-12" else 1.06)
+
+
+def test_who_stands_still_is_run_into_by_nobody_when_closed_in() -> None:
+    ring = [
+        Circle(center_m=(HERE.x + 0.75 * math.cos(k), HERE.y + 0.75 * math.sin(k)), radius_m=0.6)
+        for k in np.arange(0.0, 2.0 * math.pi, math.pi / 6.0)
+    ]
+    decision = planner().plan(seeing(*ring))
+    assert all(decision.vs)
+    assert decision.reason.startswith("every heading closes; the least risk")
+    dt = PARAMS.tick_ns * 1e-9
+    x, y = (HERE.x + decision.velocity[0] * dt, HERE.y + decision.velocity[1] * dt)
+    assert min(distance((x, y), c.center_m) for c in ring) > 0.6
+
+
+def test_closed_in_by_movers_it_flees_where_contact_is_latest() -> None:
+    left = Circle(center_m=(HERE.x - 0.7, HERE.y), radius_m=0.6, velocity_mps=(0.3, 0.0))
+    right = Circle(center_m=(HERE.x + 0.9, HERE.y), radius_m=0.6, velocity_mps=(-0.3, 0.0))
+    velocity = planner().plan(seeing(left, right)).velocity
+    assert abs(velocity[1]) > 0.5 * PARAMS.speed_mps
+
+
+@pytest.mark.parametrize(
+    ("case", "longest_m"), [("case1", 1.005 * 16.9706), ("case2", 1.01 * 17.008)]
+)
+def test_the_paper_s_cases_at_nearly_the_optimum(case: str, longest_m: float) -> None:
+    for seed in range(3):
+        result = evaluate(drive(load_scenario(case), seed))
+        assert result.success
+        assert result.length_m < longest_m
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_crowds_are_crossed_unharmed_and_so_is_their_mirror_image(seed: int) -> None:
+    scenario = crowd(seed, 15)
+    lengths = []
+    for world in (scenario, mirrored(scenario)):
+        result = evaluate(drive(world, seed))
+        assert result.success
+        lengths.append(result.length_m / STRAIGHT_M)
+    assert max(lengths) < 1.15
+
+
+def test_the_same_seed_decides_the_same_and_another_one_differs() -> None:
+    world = crowd(3, 15)
+    first = digest(drive(world, 1, "scan-360", noise_m=0.02, latency_ticks=1).ticks)
+    again = digest(drive(world, 1, "scan-360", noise_m=0.02, latency_ticks=1).ticks)
+    assert first == again
+    assert digest(drive(world, 1).ticks) != digest(drive(world, 2).ticks)
+
+
+def test_a_reset_forgets() -> None:
+    blocking = Circle(center_m=(2.0, 2.8), radius_m=0.6)
+    brain = planner()
+    first = brain.plan(seeing(blocking))
+    brain.plan(seeing(blocking, stamp_ns=2 * 10**9))
+    brain.reset()
+    assert brain.plan(seeing(blocking)) == first
+
+
+def test_without_circles_and_scan_the_sectors_must_do() -> None:
+    scenario = Scenario(
+        name="post",
+        start_m=(0.0, 0.0),
+        goal_m=(6.0, 6.0),
+        obstacles=(Obstacle(center_m=(3.0, 3.1), radius_m=0.3),),
+    )
+    result = evaluate(run(scenario, planner=PARAMS, brain=planner(), look=Perception("sectors")))
+    assert result.success
+    (circle,) = from_sectors((1.0, 1.0), (math.inf, 0.5, math.inf, math.inf), 0.3)
+    s = 0.8 / math.sqrt(2.0)
+    assert circle.center_m == pytest.approx((1.0 - s, 1.0 + s))
+
+
+def test_late_circles_are_moved_on() -> None:
+    (circle,) = moved([Circle(center_m=(1.0, 1.0), radius_m=0.6, velocity_mps=(0.2, -0.1))], 0.5)
+    assert circle.center_m == pytest.approx((1.1, 0.95))
+
+
+@given(
+    x=st.floats(-2.0, 2.0), y=st.floats(-2.0, 2.0), vx=st.floats(-0.5, 0.5),
+    vy=st.floats(-0.5, 0.5), heading=st.floats(-math.pi, math.pi), t1=st.floats(0.1, 2.5),
+)  # fmt: skip
+@settings(max_examples=200)
+def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
+    x: float, y: float, vx: float, vy: float, heading: float, t1: float
+) -> None:
+    risk = RiskParams()
+    circle = Circle(center_m=(x, y), radius_m=0.6, velocity_mps=(vx, vy))
+    if math.hypot(x, y) < 0.7:
+        return
+    margin = risk.margin_m + risk.margin_ticks * 0.1 * math.hypot(vx, vy)
+    way = (0.8 * t1 * math.cos(heading), 0.8 * t1 * math.sin(heading))
+    goal = (9.0, 1.0)
+    cost = Prediction((0.0, 0.0), [circle], risk, 0.1).cost(way, t1, goal, 0.8)
+    rest = distance(way, goal)
+    length = 0.8 * t1 + rest
+    smallest = math.inf
+    for t in np.linspace(0.0, risk.horizon_s, 3001).tolist():
+        if t <= t1:
+            here = (way[0] * t / t1, way[1] * t / t1)
+        else:
+            share = min(1.0, 0.8 * (t - t1) / rest)
+            here = (way[0] + share * (goal[0] - way[0]), way[1] + share * (goal[1] - way[1]))
+        smallest = min(smallest, distance(here, (x + vx * t, y + vy * t)) - 0.6)
+    if smallest > margin + 1e-3:
+        assert cost == pytest.approx(length)
+    elif smallest < margin - 2e-3:
+        assert cost > length
+    if smallest < -2e-3:
+        assert cost > length + 1e-6
+
+
+def test_the_preset_changes_step_and_swarm_only() -> None:
+    changed = preset(PlannerParams(speed_mps=0.7))
+    assert changed.tick_ns == round(0.08 / 0.7 * 1e9)
+    assert replace(changed, step_length_m=0.3, bat=PlannerParams().bat) == (
+        PlannerParams(speed_mps=0.7)
+    )
+    assert isinstance(make("predictive", changed, SENSOR, 1), Predictive)
+    assert PredictiveParams().headings == 72
