@@ -53,6 +53,7 @@ def lattice_ways(
         left = np.array(goal) - here
         rest = np.hypot(left[:, 0], left[:, 1]) / speed_mps
         home = left / np.maximum(rest, 1e-9)[:, None]
+        inner = _during(inner, t, math.inf)
         for n in np.flatnonzero(_free(here, home, t, t + rest, inner)).tolist():
             arrivals.append((t + float(rest[n]), layer, n))
             limit_s = min(limit_s, t + float(rest[n]) + params.slack_s)
@@ -66,7 +67,8 @@ def lattice_ways(
         cells = np.floor(there[order] / params.cell_m).astype(np.int64)
         # edges first: the best place of a cell may be out of reach
         end = np.full(len(order), t + params.step_s)
-        free = _free(here[origin[order]], velocity[order], t, end, inner)
+        now = _during(inner, t, t + params.step_s)
+        free = _free(here[origin[order]], velocity[order], t, end, now)
         order, cells = order[free], cells[free]
         _, first = np.unique(cells, axis=0, return_index=True)
         order = order[np.sort(first)]
@@ -74,6 +76,12 @@ def lattice_ways(
         parents.append(origin[order])
         t += params.step_s
     return [_way(places, parents, one, goal) for one in sorted(arrivals)[: params.ways]]
+
+
+def _during(legs: Legs, begin_s: float, end_s: float) -> Legs:
+    """The legs that last at some time of an interval."""
+    keep = (legs.t1 >= begin_s) & (legs.t0 <= end_s)
+    return Legs(*(column[keep] for column in legs))
 
 
 def _free(
