@@ -36,13 +36,13 @@ class RiskParams:
         0.3, "weight of a pass without clearance", unit="m", minimum=0.0, maximum=1e6
     )
     margin_m: float = option(
-        0.01, "clearance below which a pass is close", unit="m", minimum=1e-6, maximum=10.0
+        0.015, "clearance below which a pass is close", unit="m", minimum=1e-6, maximum=10.0
     )
     margin_ticks: float = option(
-        1.0, "ticks of an obstacle's own motion added to it", minimum=0.0, maximum=100.0
+        1.5, "ticks of an obstacle's own motion added to it", minimum=0.0, maximum=100.0
     )
     waiting: float = option(
-        0.5, "what a second of waiting counts, in seconds of driving", minimum=0.0, maximum=100.0
+        0.2, "what a second of waiting counts, in seconds of driving", minimum=0.0, maximum=100.0
     )
 
     def __post_init__(self) -> None:
@@ -104,20 +104,29 @@ class Prediction:
         if total >= bound:
             return total
         left = bound - total
-        risk = self._leg(0.0, 0.0, 0.0, qx / t1, qy / t1, min(t1, tau), left)
-        if risk < left and t1 < tau and second > 0.0:
+        risk = self._leg(0.0, 0.0, 0.0, 0.0, qx / t1, qy / t1, min(t1, tau), left)
+        driven = first / speed  # what is put off by waiting is no less of a risk
+        if risk < left and driven < tau and second > 0.0:
             ux, uy = rx * speed / second, ry * speed / second
-            lasts = min(second / speed, tau - t1)
-            risk = max(risk, self._leg(qx, qy, t1, ux, uy, lasts, left))
+            lasts = min(second / speed, tau - driven)
+            risk = max(risk, self._leg(qx, qy, t1, driven, ux, uy, lasts, left))
         return total + risk
 
     def _leg(
-        self, qx: float, qy: float, t0: float, ux: float, uy: float, lasts: float, bound: float
+        self,
+        qx: float,
+        qy: float,
+        t0: float,
+        s0: float,
+        ux: float,
+        uy: float,
+        lasts: float,
+        bound: float,
     ) -> float:
-        """The worst risk of a leg from (qx, qy) at t0, or one that is not below the bound.
+        """The worst risk of a leg from (qx, qy) at t0, s0 of it driven; or one not below bound.
 
-        With x = 1 - t/tau, a contact at t costs contact_m x^2 + urgent_m x^8, a closest
-        approach at t costs close_m x times the share of the margin that is missing. Who is
+        With x = 1 - s/tau, a contact after s of driving costs contact_m x^2 + urgent_m x^8, a
+        closest approach costs close_m x times the share of the margin that is missing. Who is
         within a margin already may leave it in any direction, but not go deeper.
         """
         p, worst = self.params, 0.0
@@ -138,10 +147,10 @@ class Prediction:
             missing = 1.0 - (math.sqrt(c) - r) / margin if c > 0.0 else 1.0
             if missing > 1.0:
                 missing = 1.0
-            risk = missing * close * (1.0 - (t0 + t) / tau)
+            risk = missing * close * (1.0 - (s0 + t) / tau)
             if c < r * r:
                 t -= math.sqrt((r * r - c) / a)
-                late = 1.0 - (t0 + t) / tau if t > 0.0 else 1.0 - t0 / tau
+                late = 1.0 - (s0 + t) / tau if t > 0.0 else 1.0 - s0 / tau
                 late *= late
                 risk += late * (contact + urgent * late * late * late)
             if risk > worst:
