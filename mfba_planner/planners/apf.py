@@ -12,7 +12,7 @@ from ..core.planner import Event, Observation
 from .steering import Move, Steering
 from .surroundings import discs
 
-REPULSION = 0.12  # of the pull, at the distance where 1/d - 1/SR is 1 per metre
+REPULSION = 0.3  # of the pull, at the distance where 1/d - 1/SR is 1 per metre
 NEAREST_M = 0.02  # gaps below this push no harder
 
 

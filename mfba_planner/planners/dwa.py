@@ -14,7 +14,7 @@ from .surroundings import discs
 
 HEADINGS, SPEEDS = 36, (1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0)
 HORIZON_S = 2.0
-PROGRESS, CLEARANCE = 1.0, 0.15  # weights of metres towards the goal and of 1 / clearance
+PROGRESS, CLEARANCE = 1.0, 0.005  # weights of metres towards the goal and of 1 / clearance
 NEAREST_M = 0.05  # clearance below which a velocity is admissible only if nothing is better
 
 

@@ -9,11 +9,11 @@ from ..core.planner import NANO, Event, Observation, PlannerParams
 from ..core.sensing import SensorParams
 from .steering import Move, Steering
 
-HORIZON_S = 2.0
-MARGIN_M = 0.02
+HORIZON_S = 3.0
+MARGIN_M = 0.06
 # ORCA asks each of two agents for half of the evasion. Obstacles do not do their half: the robot
 # asks again from the velocity it got, until nothing is left to evade.
-ROUNDS = 6
+ROUNDS = 4
 
 
 class Orca(Steering):

@@ -13,7 +13,7 @@ from .steering import Move, Steering
 from .surroundings import discs
 
 HEADINGS = 72
-MARGIN_M = 0.2  # added to every circle: it moves while the robot passes
+MARGIN_M = 0.3  # added to every circle: it moves while the robot passes
 TO_GOAL, TO_LAST = 5.0, 2.0  # weights of the turn away from the goal and from the last heading
 
 
