@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lockstep under stress: every recorded run must have the digest of the core driver's.
 
-Runs of both case studies and of random worlds, with random readings, algorithms, sensors and
+Runs of both case studies and of random worlds, with random readings, methods, sensors and
 seeds. Most go through the in-process driver; the others as a process per node, started in a
 random order with random delays. Some run while every core is kept busy by other processes.
 The digest is taken from the bag, and `mfba verify` must agree.
@@ -28,12 +28,12 @@ import numpy as np
 from by_hand import ALL, ByHand
 
 from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import run
 from mfba_planner.core.options import override
 from mfba_planner.core.sensing import SensorParams
 from mfba_planner.core.world import Obstacle, Scenario, Walls
 from mfba_planner.launcher.domain import private_domain
 from mfba_planner.paper import readings
+from mfba_planner.planners.method import simulate
 from mfba_planner.ros.in_process import run_in_process
 from mfba_planner.run_config import Driver, RunConfig
 from mfba_planner.scenarios import load_scenario
@@ -68,10 +68,11 @@ def random_config(rng: np.random.Generator, driver: Driver) -> RunConfig:
     names = list(readings.PLANNERS)
     planner = readings.planner(names[int(rng.integers(len(names)))])
     algorithm = ("mfba", "ba")[int(rng.integers(2))]
+    method = ("paper", "paper", "paper", "predictive")[int(rng.integers(4))]
     sensor = SensorParams(sectors=(12, 24, 36)[int(rng.integers(3))])
     return replace(
         RunConfig(scenario=scenario),
-        planner=override(planner, {"bat.algorithm": algorithm}),
+        planner=override(planner, {"bat.algorithm": algorithm, "method": method}),
         sensor=sensor,
         seed=int(rng.integers(2**31)),
         driver=driver,
@@ -95,7 +96,9 @@ def one(seed: int, driver: Driver) -> tuple[str, int]:
     rng = np.random.default_rng(seed)
     config = random_config(rng, driver)
     expected = digest(
-        run(config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed).ticks
+        simulate(
+            config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed
+        ).ticks
     )
     with tempfile.TemporaryDirectory() as root:
         bag = Path(root) / "bag"

@@ -18,9 +18,10 @@ from mfba_planner.core.episode import (
     sense,
     stamp_of,
 )
+from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.metrics import Result, evaluate, tick_clearances
-from mfba_planner.core.planner import Mode, Observation, Planner, PlannerParams
+from mfba_planner.core.planner import Method, Mode, Observation, Planner, PlannerParams
 from mfba_planner.core.sensing import SensorParams, sense_circles
 from mfba_planner.core.world import Obstacle, Scenario
 from mfba_planner.scenarios import load_scenario
@@ -260,6 +261,12 @@ def test_to_touch_is_not_to_collide() -> None:
 def test_success_needs_the_goal(outcome: Outcome) -> None:
     result = evaluate(trip([(0.0, 0.0), (1.0, 0.0)], outcome=outcome))
     assert (result.success, result.outcome) == (False, outcome)
+
+
+def test_the_core_alone_knows_the_papers_method_only() -> None:
+    params = PlannerParams(method=Method.PREDICTIVE)
+    with pytest.raises(ConfigError, match="method=predictive: not the core's own"):
+        run(load_scenario("case1"), planner=params)
 
 
 def test_encounters_in_order_of_time() -> None:

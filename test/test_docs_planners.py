@@ -19,11 +19,23 @@ def test_every_planner_has_its_line() -> None:
     assert "`mfba` and `ba` are it" in PAGE
 
 
+def commands() -> list[str]:
+    blocks = re.findall(r"^```sh\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    return [line.removeprefix("mfba ") for block in blocks for line in block.splitlines()]
+
+
+def test_the_other_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run, simulate, _ = commands()
+    assert cli.main([*shlex.split(run), "--driver", "core"]) == 0
+    assert cli.main(shlex.split(simulate.replace("100", "3"))) == 0
+
+
 def test_the_planner_of_one_s_own_runs_in_a_sweep(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-    (command,) = re.findall(r"^```sh\nmfba (.*?)\n```$", PAGE, re.MULTILINE | re.DOTALL)
+    command = commands()[-1]
     assert len(code.splitlines()) <= 40
     (tmp_path / "skirt.py").write_text(code)
     monkeypatch.chdir(tmp_path)

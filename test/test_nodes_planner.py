@@ -104,6 +104,22 @@ def mode(message: Any) -> Mode:
     return Mode(fields(message)["mode"])
 
 
+def test_the_method_can_be_changed_while_it_drives(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    ranges = (INF,) * 3 + (0.3,) + (INF,) * 8
+
+    def who(stamp: int) -> str:
+        told: str = fields(talk.answer(odom(stamp, 0.0, 0.0), sectors(stamp, ranges)))["algorithm"]
+        return told
+
+    assert who(1) == "mfba"
+    assert graph.set_parameter("planner", "method", "predictive") == ""
+    assert who(2) == "predictive"
+    assert "method='other'" in graph.set_parameter("planner", "method", "other")
+    assert graph.set_parameter("planner", "method", "paper") == ""
+    assert who(3) == "mfba"
+
+
 @pytest.mark.parametrize(
     "params",
     [

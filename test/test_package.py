@@ -62,14 +62,14 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"core", "messages", "recording", "scenarios"},
         {"mcap", "mcap_ros2", "yaml", "zstandard"},
     ),
-    "verification": ({"core", "messages", "recording", "verification"}, set()),
+    "verification": ({"core", "messages", "planners", "recording", "verification"}, set()),
     "report": (
         {"core", "outputs", "paper", "report", "statistics", "sweep"},
         {"matplotlib", "numpy", "rich"},
     ),
     "ros": (
         {"arguments", "core", "messages", "outputs", "recording", "ros", "run_config"}
-        | {"node_settings", "scenarios"},
+        | {"node_settings", "planners", "scenarios"},
         {"numpy"} | ROS,
     ),
     "launcher": ({"*"}, {"rich", "yaml"} | ROS),

@@ -9,11 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..arguments import Parser
-from ..core.episode import run
 from ..core.errors import ConfigError, MfbaError
 from ..core.metrics import Result, evaluate
 from ..launcher.conclusion import show, why_no_success
 from ..launcher.options import Order, add_world_arguments, read_config
+from ..planners.method import simulate
 from ..run_config import Driver, RunConfig
 
 _DESCRIPTION = "Simulate episodes without ROS: the decisions of `mfba run`, but no bag."
@@ -51,7 +51,9 @@ def _check(found: argparse.Namespace) -> None:
 
 
 def _one(config: RunConfig) -> int:
-    episode = run(config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed)
+    episode = simulate(
+        config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed
+    )
     result = evaluate(episode)
     show(episode, result)
     if not result.success:
@@ -63,7 +65,7 @@ def _many(configs: list[RunConfig]) -> int:
     print(_HEAD)
     results = []
     for config in configs:
-        episode = run(
+        episode = simulate(
             config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed
         )
         results.append(evaluate(episode))

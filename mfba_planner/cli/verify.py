@@ -7,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..arguments import Parser
-from ..core.episode import Episode, run
+from ..core.episode import Episode
 from ..core.errors import BagError, ConfigError
 from ..launcher.options import add_set_argument, with_settings
 from ..outputs import bag_in
+from ..planners.method import simulate
 from ..recording.reader import BagReader
 from ..verification.check import Report, verify
 from ..verification.compare import Divergence, first_divergence, side_by_side
@@ -83,7 +84,7 @@ def _verdict(report: Report) -> str:
 def _again(recorded: Episode, settings: list[str]) -> Episode:
     planner, sensor = with_settings(recorded.planner, recorded.sensor, settings)
     last = recorded.ticks[-1].stamp_ns
-    again = run(
+    again = simulate(
         recorded.scenario,
         planner=planner,
         sensor=sensor,

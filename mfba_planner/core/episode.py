@@ -9,9 +9,10 @@ from enum import Enum
 
 import numpy as np
 
+from .errors import ConfigError
 from .geometry import Point, Pose2D, distance
 from .motion import Motion
-from .planner import NANO, Decision, Observation, PathPlanner, Planner, PlannerParams
+from .planner import NANO, Decision, Method, Observation, PathPlanner, Planner, PlannerParams
 from .sensing import Ranges, SensorParams, sense_circles
 from .world import Scenario
 
@@ -147,7 +148,12 @@ def run(
     planner = planner or PlannerParams()
     sensor = sensor or SensorParams()
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m)
-    brain = brain or Planner(planner, seed)
+    if brain is None:
+        if planner.method is not Method.PAPER:
+            raise ConfigError(
+                f"method={planner.method.value}: not the core's own; use planners.method.simulate"
+            )
+        brain = Planner(planner, seed)
     ticks = [brain.plan(look(world, sensor))]
     while (outcome := world.outcome()) is None and go_on(world):
         world.step(ticks[-1].velocity)

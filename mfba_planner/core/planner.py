@@ -75,10 +75,18 @@ class Swarm(Enum):
     PERSISTENT = "persistent"
 
 
+class Method(Enum):
+    """Who decides on sectors: Algorithm 1, or the planner that predicts (planners/)."""
+
+    PAPER = "paper"
+    PREDICTIVE = "predictive"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannerParams:
     """The reading `section6` of Algorithm 1 and section 6.2."""
 
+    method: Method = option(Method.PAPER, "Algorithm 1, or our planner that predicts")
     speed_mps: float = option(0.785, "robot speed", unit="m/s", minimum=0.01, maximum=100.0)
     step_length_m: float = option(
         0.3, "longest goal step, in both modes", unit="m", minimum=0.001, maximum=100.0
@@ -96,6 +104,12 @@ class PlannerParams:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range."""
         check(self)
+
+    @property
+    def label(self) -> str:
+        """Who decides, for people: the law of beta in Algorithm 1, or the other method."""
+        paper = self.method is Method.PAPER
+        return self.bat.algorithm.value if paper else self.method.value
 
     @property
     def tick_ns(self) -> int:

@@ -14,9 +14,10 @@ from ..arguments import Parser
 from ..core.bat import Algorithm
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean, override, walk
-from ..core.planner import PlannerParams
+from ..core.planner import Method, PlannerParams
 from ..core.sensing import SensorParams
 from ..paper import readings
+from ..planners.predictive import preset
 from ..run_config import NODES, Driver, RunConfig
 from ..scenarios import load_scenario
 
@@ -113,6 +114,13 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
         f"{', '.join(readings.PLANNERS)} (default: %(default)s)",
     )
     parser.add_argument(
+        "--planner",
+        choices=[method.value for method in Method],
+        default=Method.PAPER.value,
+        help="who decides: Algorithm 1 (default), or our planner that predicts, with its own "
+        "step and swarm",
+    )
+    parser.add_argument(
         "--swarm",
         metavar="NAME",
         help=f"how the paper's eq. 3-10 are read: {', '.join(readings.SWARMS)}",
@@ -140,6 +148,8 @@ def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
         planner = replace(planner, bat=readings.swarm(found.swarm))
     if found.algorithm:
         planner = override(planner, {"bat.algorithm": found.algorithm})
+    if found.planner == Method.PREDICTIVE.value:
+        planner = preset(replace(planner, method=Method.PREDICTIVE))
     planner, sensor = with_settings(planner, SensorParams(), found.settings)
     return RunConfig(
         scenario=load_scenario(found.scenario),

@@ -6,9 +6,9 @@ from __future__ import annotations
 import sys
 from contextlib import closing, suppress
 
-from ..core import episode as core_driver
 from ..core.episode import Episode
 from ..core.errors import BagError, MfbaError
+from ..planners.method import simulate
 from ..run_config import Driver
 from .attempt import Attempt
 from .conclusion import conclude
@@ -57,7 +57,7 @@ def _drive(attempt: Attempt) -> Episode | None:
         _run_in_process(attempt)
         return None
     attempt.begin()
-    episode = core_driver.run(
+    episode = simulate(
         config.scenario,
         planner=config.planner,
         sensor=config.sensor,

@@ -11,7 +11,7 @@ from rclpy.serialization import serialize_message
 
 from ..core.episode import Episode, Outcome
 from ..core.planner import Decision
-from ..core.sensing import sense_circles
+from ..core.sensing import sense_circles, sensory_vector
 from ..recording.configuration import attach_configuration
 from ..recording.writer import BagWriter
 from ..run_config import Driver, RunConfig, node_parameters, run_facts
@@ -91,9 +91,9 @@ def _tick_messages(
         topics.SECTORS,
         convert.sectors_msg(ranges, episode.sensor, scenario.robot_radius_m, stamp, _FRAME),
     )
-    yield topics.SENSORY_VECTOR, convert.sensory_vector_msg(tick.vs)
+    yield topics.SENSORY_VECTOR, convert.sensory_vector_msg(sensory_vector(ranges))
     yield topics.PLAN, convert.plan_msg(tick, _FRAME)
-    law = episode.planner.bat.algorithm.value
+    law = episode.planner.label
     yield topics.DECISION, convert.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
     yield topics.GOAL_STEP, convert.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
     yield topics.CMD_VEL, convert.twist_msg(tick)

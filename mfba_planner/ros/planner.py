@@ -10,22 +10,23 @@ from geometry_msgs.msg import TwistStamped
 
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner import NANO, Decision, Mode, Planner, PlannerParams, observe
+from ..core.planner import NANO, Decision, Mode, PlannerParams, observe
 from ..messages import goal_point, robot_pose, sector_ranges, stamp_ns
 from ..node_settings import PlannerSettings, names
+from ..planners.method import brain
 from . import convert, markers, params, topics
 from .inputs import Lockstep, Newest, Ready
 from .runtime import GraphNode, Refusals, spin_node
 
 
 class PlannerNode(GraphNode):
-    """Algorithm 1 as a node: convert, decide, convert."""
+    """Algorithm 1, or another method, as a node: convert, decide, convert."""
 
     def __init__(self, **kwargs: Any) -> None:
         """Raise ConfigError for a parameter that cannot be accepted."""
         super().__init__(topics.PLANNER, **kwargs)
         self.settings = s = params.declare(self, PlannerSettings(), read_only=True)
-        self.brain = Planner(params.declare(self, PlannerParams()), s.seed)
+        self.brain = brain(params.declare(self, PlannerParams()), seed=s.seed)
         params.follow(self, lambda: self.brain.params, self._set_params)
         self._refusals = Refusals(self)
         self._goal: Point | None = None
@@ -53,6 +54,8 @@ class PlannerNode(GraphNode):
         return super().missing() or ("no goal_pose yet" if self._peers and not self._goal else "")
 
     def _set_params(self, changed: PlannerParams) -> None:
+        if changed.method is not self.brain.params.method:
+            self.brain = brain(changed, seed=self.settings.seed)
         self.brain.params = changed
 
     def _start_afresh(self) -> None:
@@ -116,7 +119,7 @@ class PlannerNode(GraphNode):
         """What the world waits for first, everything about the decision while it moves on."""
         self._move(decision)
         s, stamp = self.settings, decision.stamp_ns
-        who, algorithm = self.get_fully_qualified_name(), self.brain.params.bat.algorithm.value
+        who, algorithm = self.get_fully_qualified_name(), self.brain.params.label
         self._plan.publish(convert.plan_msg(decision, s.odom_frame))
         reason = convert.decision_msg(decision, algorithm, self._refusals.count, who)
         self._decision.publish(reason)

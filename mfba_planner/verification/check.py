@@ -12,10 +12,11 @@ from typing import Any
 from ..core.digest import digest
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner import Decision, Mode, Planner, observe
+from ..core.planner import Decision, Mode, observe
 from ..core.sensing import sense_circles, sensory_vector
 from ..messages import decision as read_decision
 from ..messages import obstacle_centers, robot_pose, rotated, sector_ranges, velocity
+from ..planners.method import brain
 from ..recording.episode import Setup, read_setup
 from ..recording.integrity import check_data
 from ..recording.reader import BagReader
@@ -71,7 +72,7 @@ def verify(path: str | Path) -> Report:
 
 def _check(setup: Setup, evidence: Evidence) -> Report:
     faults, notes = [*evidence.faults], [*evidence.notes]
-    brain = Planner(setup.planner, setup.seed)
+    planner = brain(setup.planner, setup.sensor, setup.seed)
     goals = deque(evidence.goals)
     goal: Point | None = None
     pose = Pose2D(0.0, 0.0)
@@ -106,7 +107,7 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         observation = observe(tick.stamp_ns, seen, ranges, goal, pose)
         pose = observation.pose
         recorded.append(was)
-        decided.append(brain.plan(observation))
+        decided.append(planner.plan(observation))
         faults += _contradictions(setup, tick, was)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
@@ -149,7 +150,7 @@ def _intensities_agree(sectors: Any, was: Decision) -> bool:
 
 
 def _vector_agrees(vector: Any, was: Decision) -> bool:
-    return tuple(vector.data) == was.vs
+    return tuple(vector.data) == sensory_vector(was.ranges_m)
 
 
 def _step_agrees(step: Any, was: Decision) -> bool:

@@ -12,9 +12,10 @@ from typing import Any
 from ..core.digest import digest
 from ..core.errors import BagError, InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner import Decision, Planner, PlannerParams, Refused, observe
+from ..core.planner import Decision, PlannerParams, Refused, observe
 from ..core.sensing import Ranges, SensorParams, sense_scan
 from ..messages import goal_point, laser_scan, robot_pose, stamp_ns
+from ..planners.method import brain
 from ..recording.integrity import check_data
 from ..recording.reader import BagReader
 
@@ -143,7 +144,7 @@ class _Decider:
         self._poses = poses
         self._goals = goals
         self._faults = faults
-        self._brain = Planner(robot.planner, robot.seed)
+        self._brain = brain(robot.planner, robot.sensor, robot.seed)
         self._pose = Pose2D(0.0, 0.0)
         self._counts: Counter[str] = Counter()
 

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The planner that the parameters name, as the nodes run it: on sectors alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..core.episode import Episode, World, run
+from ..core.planner import Method, Planner, PlannerParams
+from ..core.sensing import SensorParams
+from ..core.world import Scenario
+from .predictive import Predictive
+
+
+def brain(
+    params: PlannerParams, sensor: SensorParams | None = None, seed: int = 0
+) -> Planner | Predictive:
+    """A fresh planner of params.method. Raises ConfigError for a negative seed."""
+    if params.method is Method.PREDICTIVE:
+        return Predictive(params, sensor or SensorParams(), seed)
+    return Planner(params, seed)
+
+
+def simulate(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams,
+    sensor: SensorParams,
+    seed: int,
+    go_on: Callable[[World], bool] = lambda _: True,
+) -> Episode:
+    """core.episode.run with the planner of planner.method."""
+    return run(
+        scenario,
+        planner=planner,
+        sensor=sensor,
+        seed=seed,
+        go_on=go_on,
+        brain=brain(planner, sensor, seed),
+    )
