@@ -263,8 +263,20 @@ def test_a_goal_that_is_not_finite_is_no_goal(graph: Graph, bad: float) -> None:
     assert mode(talk.answer(goal(*GOAL), odom(3), sectors(3))) is Mode.PATH_GENERATION
 
 
-def test_without_a_goal_it_is_idle(graph: Graph) -> None:
+def test_in_lockstep_it_waits_for_a_goal_that_somebody_gives(graph: Graph) -> None:
+    """A planner that was restarted must not answer a tick before it knows the goal."""
     talk = Talk(graph, LOCKSTEP, at=None)
+    pair = odom(1), sectors(1)
+    assert talk.answers(*pair) == []
+    assert mode(talk.answer(goal(*GOAL), *pair)) is Mode.PATH_GENERATION
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_without_a_goal_it_is_idle(graph: Graph, lockstep: bool) -> None:
+    talk = Talk(graph, {"lockstep": lockstep}, at=None)
+    if lockstep:
+        graph.probe.destroy_publisher(talk.goal)
+        graph.until(lambda: not graph.probe.count_publishers(topics.GOAL_POSE.name))
     answer = talk.answer(odom(1), sectors(1, NORTH_EAST))
     assert (mode(answer), fields(answer)["reason"]) == (Mode.IDLE, "no goal given")
     assert talk.velocity == (0.0, 0.0)

@@ -30,6 +30,7 @@ class PlannerNode(GraphNode):
         params.follow(self, lambda: self.brain.params, self._set_params)
         self._refusals = Refusals(self)
         self._goal: Point | None = None
+        self._heard_goal = False
         self._pose = Pose2D(0.0, 0.0)  # the last that could be used
         self._last: Decision | None = None
         self._goal_step = self.advertise(topics.GOAL_STEP)
@@ -66,7 +67,7 @@ class PlannerNode(GraphNode):
 
     def _on_goal(self, message: Any) -> None:
         self.brain.reset()
-        self._goal = None
+        self._goal, self._heard_goal = None, True
         frame, ours = message.header.frame_id, self.settings.odom_frame
         if frame not in ("", ours):
             self.get_logger().warning(f"goal_pose is in frame {frame!r}: taken as {ours!r}")
@@ -107,6 +108,8 @@ class PlannerNode(GraphNode):
         if self.settings.lockstep and self._last and self._last.stamp_ns == stamp:
             self._move(self._last)  # asked again: that answer got lost, or is on its way
             return
+        if self.settings.lockstep and self._goal_is_under_way():
+            return  # restarted: the world asks again
         seen = observe(stamp, pose, ranges, self._goal, self._pose, round(age_s / NANO))
         self._pose = seen.pose
         decision = self.brain.plan(seen)
@@ -114,6 +117,10 @@ class PlannerNode(GraphNode):
             self.get_logger().warning(decision.reason, throttle_duration_sec=1.0)
         self._last = decision
         self._publish(decision)
+
+    def _goal_is_under_way(self) -> bool:
+        """Whether somebody gives goals, of which a planner this young has not heard the last."""
+        return not self._heard_goal and self.count_publishers(topics.GOAL_POSE.name) > 0
 
     def _publish(self, decision: Decision) -> None:
         """What the world waits for first, everything about the decision while it moves on."""
