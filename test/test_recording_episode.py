@@ -86,6 +86,16 @@ def test_a_garbled_decision_is_refused(bag: Path, tmp_path: Path, key: str, valu
         read_episode(edited(bag, tmp_path / "garbled", with_value(key, value)))
 
 
+def test_a_bag_older_than_an_option_was_made_with_its_default(bag: Path, tmp_path: Path) -> None:
+    def configure(content: Any) -> Any:
+        content = json.loads(json.dumps(content))
+        del content["nodes"]["planner"]["method"]
+        return content
+
+    older = read_episode(edited(bag, tmp_path / "older", keep, configure))
+    assert older == read_episode(bag)
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [

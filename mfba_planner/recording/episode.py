@@ -23,6 +23,9 @@ from .reader import BagReader
 
 T = TypeVar("T")
 
+# Options younger than the oldest bags: what they default to is what was done then.
+LATER = {"method"}
+
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
     """The Episode a bag of ours holds; `salvage` also reads one that was never closed.
@@ -104,7 +107,8 @@ def read_setup(reader: BagReader) -> Setup:
 
 def _only(defaults: T, values: dict[str, Any]) -> T:
     """The options of one dataclass out of all parameters of a node."""
-    return override(defaults, {name: values[name] for name in flatten(defaults)})
+    told = [name for name in flatten(defaults) if name in values or name not in LATER]
+    return override(defaults, {name: values[name] for name in told})
 
 
 def _outcome(scenario: Scenario, params: PlannerParams, ticks: tuple[Decision, ...]) -> Outcome:
