@@ -56,8 +56,10 @@ setup(
     ],
     # Not tests_require: with it `colcon test` runs no test and stays green.
     extras_require={
+        "dask": ["distributed>=2024.1"],
         "parquet": ["pyarrow>=15"],
         "test": [
+            "distributed>=2024.1",
             "hypothesis>=6.100",
             "pyarrow>=15",
             "pybag-sdk>=0.13",

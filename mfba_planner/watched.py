@@ -6,25 +6,33 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from .core.errors import ConfigError
 from .paper.study.chunk import Chunk
-from .paper.study.run import MAX_WORKERS, Sample, run_plan
-from .paper.study.store import Store
+from .paper.study.run import Sample, run_plan
+from .study.compute import check_workers
+from .study.part import Part
+from .study.store import Store
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Size, workers, first seed, output."""
     parser.add_argument("--quick", action="store_true", help="few runs: seconds, wide intervals")
     parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="first seed of every sample (default: 0)"
+    )
+    add_work_arguments(parser)
+
+
+def add_work_arguments(parser: argparse.ArgumentParser) -> None:
+    """Workers and output."""
+    parser.add_argument(
         "--workers", type=int, default=_cores(), metavar="N",
         help="processes (default: one per core); the results do not depend on it",
     )  # fmt: skip
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="first seed of every sample (default: 0)"
-    )
     parser.add_argument(
         "--out", type=Path, metavar="DIR",
         help="directory to create, or to go on in (default: a new one below runs/)",
@@ -35,12 +43,23 @@ def check(found: argparse.Namespace) -> None:
     """Raise ConfigError for numbers that cannot be."""
     if not 0 <= found.seed < 2**62:
         raise ConfigError(f"--seed={found.seed}: out of range; give a whole number from 0 up")
-    if not 1 <= found.workers <= MAX_WORKERS:
-        raise ConfigError(f"--workers={found.workers}: out of range; give 1 to {MAX_WORKERS}")
+    check_workers(found.workers)
 
 
 def run_watched(chunks: Sequence[Chunk], workers: int, store: Store) -> dict[str, Sample]:
-    """Run the plan under a progress bar, where somebody watches; tell how to go on later."""
+    """Run the plan under a progress bar."""
+    with progress(chunks, store.directory) as done:
+        return run_plan(chunks, workers=workers, store=store, done=done, say=say)
+
+
+def say(line: str) -> None:
+    """A word to whoever watches."""
+    print(line, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def progress(parts: Sequence[Part], directory: Path) -> Iterator[Callable[[Part], None]]:
+    """A progress bar, where somebody watches; tells how to go on after an interrupt."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -49,16 +68,11 @@ def run_watched(chunks: Sequence[Chunk], workers: int, store: Store) -> dict[str
     try:
         with Progress(
             *columns, console=console, transient=True, disable=not console.is_terminal
-        ) as progress:
-            task = progress.add_task("running", total=sum(chunk.cost for chunk in chunks))
-            return run_plan(
-                chunks,
-                workers=workers,
-                store=store,
-                done=lambda chunk: progress.advance(task, chunk.cost),
-            )
+        ) as bar:
+            task = bar.add_task("running", total=sum(part.cost for part in parts))
+            yield lambda part: bar.advance(task, part.cost)
     except (KeyboardInterrupt, SystemExit):
-        print(f"interrupted; go on with --out {store.directory}", file=sys.stderr)
+        say(f"interrupted; go on with --out {directory}")
         raise
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from trips import post, trip
 
 from mfba_planner.core.bat import Algorithm, BatParams
 from mfba_planner.core.episode import (
@@ -17,21 +18,15 @@ from mfba_planner.core.episode import (
     sense,
     stamp_of,
 )
-from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.metrics import Result, evaluate, tick_clearances
-from mfba_planner.core.planner import Decision, Mode, Observation, Planner, PlannerParams
+from mfba_planner.core.planner import Mode, Observation, Planner, PlannerParams
 from mfba_planner.core.sensing import SensorParams, sense_circles
 from mfba_planner.core.world import Obstacle, Scenario
 from mfba_planner.scenarios import load_scenario
 
 STRAIGHT = 12.0 * math.sqrt(2.0)  # 16.9706 m
-# One metre, one second per tick.
-SECOND = PlannerParams(speed_mps=1.0, step_length_m=1.0)
 TASK: dict[str, Any] = {"name": "x", "start_m": (0.0, 0.0), "goal_m": (4.0, 0.0)}
-
-
-def post(center: Point, radius: float = 0.5) -> Obstacle:
-    return Obstacle(center_m=center, radius_m=radius)
 
 
 # --- the world ------------------------------------------------------------------------------
@@ -181,41 +176,6 @@ def test_a_run_can_be_ended_from_outside() -> None:
 # --- hand-made episodes ---------------------------------------------------------------------
 
 PG, OA = Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE
-
-
-def trip(
-    points: list[Point],
-    modes: list[Mode] | None = None,
-    obstacles: tuple[Obstacle, ...] = (),
-    **changes: Any,
-) -> Episode:
-    """One point per second, whoever may have chosen them."""
-    stamps = [(k + 1) * SECOND.tick_ns for k in range(len(points))]
-    ticks = tuple(
-        Decision(
-            stamp_ns=stamp,
-            mode=mode,
-            reason="",
-            pose=Pose2D(*point),
-            goal=None,
-            ranges_m=(),
-            vs=(),
-            vg=(),
-            gap=0,
-            waypoint=point,
-            velocity=(0.0, 0.0),
-        )
-        for stamp, mode, point in zip(stamps, modes or [PG] * len(points), points)
-    )
-    plain: dict[str, Any] = {
-        "scenario": Scenario(name="x", start_m=(9.0, 9.0), goal_m=(0.0, 9.0), obstacles=obstacles),
-        "planner": SECOND,
-        "seed": 0,
-        "driver": "hand",
-        "ticks": ticks,
-        "outcome": Outcome.GOAL_REACHED,
-    }
-    return Episode(**{**plain, **changes})
 
 
 def test_a_trip_by_hand() -> None:

@@ -2,6 +2,7 @@
 """Closed-form motion against stepwise motion, and contact against dense sampling."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -14,10 +15,12 @@ from mfba_planner.core.geometry import Point
 from mfba_planner.core.world import (
     Obstacle,
     Scenario,
+    Turn,
     Walls,
     bounce_times,
     center_at,
     step_clearances,
+    velocity_at,
 )
 
 ROOM = Walls(lower_m=(-2.0, 1.0), upper_m=(4.0, 6.0))
@@ -207,6 +210,103 @@ def test_at_a_bounce_the_obstacle_touches_a_wall(
         assert min(gaps) == pytest.approx(0.0, abs=1e-6)
 
 
+# --- turns ----------------------------------------------------------------------------------
+
+TURNS = st.lists(
+    st.tuples(st.floats(0.01, 30.0), SPEEDS, HEADINGS),
+    min_size=1,
+    max_size=5,
+    unique_by=lambda row: row[0],
+).map(lambda rows: tuple(Turn(at_s=t, speed_mps=v, heading_rad=h) for t, v, h in sorted(rows)))
+
+
+def turner() -> Obstacle:
+    """East, then north twice as fast from 2 s on, at rest between 3 and 5 s, then west."""
+    return Obstacle(
+        center_m=(0.0, 2.0),
+        radius_m=0.5,
+        speed_mps=1.0,
+        turns=(
+            Turn(at_s=2.0, speed_mps=2.0, heading_rad=math.pi / 2.0),
+            Turn(at_s=3.0, speed_mps=0.0),
+            Turn(at_s=5.0, speed_mps=1.0, heading_rad=math.pi),
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ("t", "place"),
+    [
+        (0.0, (0.0, 2.0)),
+        (-1.0, (-1.0, 2.0)),
+        (2.0, (2.0, 2.0)),
+        (2.5, (2.0, 3.0)),
+        (3.0, (2.0, 4.0)),
+        (4.0, (2.0, 4.0)),
+        (6.5, (0.5, 4.0)),
+    ],
+)
+def test_turns_by_hand(t: float, place: Point) -> None:
+    assert center_at(turner(), t) == pytest.approx(place)
+    assert turner().top_speed_mps == 2.0
+
+
+def test_a_turn_after_a_bounce_has_its_own_heading() -> None:
+    # at the wall x = 3.5 after 1 s, back at 2.5 after 2 s; then east again
+    obstacle = Obstacle(
+        center_m=(2.5, 2.0), radius_m=0.5, speed_mps=1.0, turns=(Turn(at_s=2.0, speed_mps=1.0),)
+    )
+    assert center_at(obstacle, 2.5, ROOM) == pytest.approx((3.0, 2.0))
+    assert center_at(obstacle, 3.5, ROOM) == pytest.approx((3.0, 2.0))
+    assert bounce_times(obstacle, 0.0, 4.0, ROOM) == pytest.approx([1.0, 2.0, 3.0])
+
+
+def test_turns_are_kinks_between_the_ends() -> None:
+    assert bounce_times(turner(), 0.0, 9.0, None) == [2.0, 3.0, 5.0]
+    assert bounce_times(turner(), 2.0, 5.0, None) == [3.0]
+    assert bounce_times(turner(), 2.5, 5.5, ROOM) == pytest.approx([3.0, 5.0])
+
+
+@given(walled(), TURNS, st.booleans(), TIMES, st.floats(0.0, 20.0))
+def test_between_two_kinks_motion_is_straight_and_joined(
+    plain: Obstacle, turns: tuple[Turn, ...], closed: bool, t0: float, duration: float
+) -> None:
+    obstacle = replace(plain, turns=turns)
+    walls = ROOM if closed else None
+    times = bounce_times(obstacle, t0, t0 + duration, walls)
+    assert all(t0 < t < t0 + duration for t in times)
+    assert {turn.at_s for turn in turns if t0 < turn.at_s < t0 + duration} <= set(times)
+    for ta, tb in pairwise([t0, *times, t0 + duration]):
+        a, m, b = (center_at(obstacle, t, walls) for t in (ta, (ta + tb) / 2.0, tb))
+        assert m == pytest.approx(((a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0), abs=1e-6)
+        if tb - ta > 1e-3:
+            vx, vy = velocity_at(obstacle, (ta + tb) / 2.0, walls)
+            expected = ((b[0] - a[0]) / (tb - ta), (b[1] - a[1]) / (tb - ta))
+            assert (vx, vy) == pytest.approx(expected, abs=1e-6)
+
+
+def test_at_a_wall_or_a_turn_the_velocity_is_the_one_that_follows() -> None:
+    east, west = mover((0.0, 2.0), 0.0), mover((0.0, 2.0), 180.0)
+    assert velocity_at(east, 3.5, ROOM) == pytest.approx((-1.0, 0.0))
+    assert velocity_at(west, 1.5, ROOM) == pytest.approx((1.0, 0.0))
+    assert velocity_at(east, 3.5) == (1.0, 0.0)
+    assert velocity_at(turner(), 2.0) == pytest.approx((0.0, 2.0))
+    assert velocity_at(turner(), 3.0) == (0.0, 0.0)
+    tight = Walls(lower_m=(0.0, 0.0), upper_m=(1.0, 9.0))
+    assert velocity_at(mover((0.5, 2.0), 45.0), 0.0, tight)[0] == 0.0
+
+
+def test_a_contact_just_at_a_turn_is_noticed() -> None:
+    # comes to within 0.1 m of the robot's centre line at 2 s and leaves again
+    obstacle = Obstacle(
+        center_m=(0.0, 0.0), radius_m=0.5, speed_mps=1.0, turns=(
+            Turn(at_s=2.0, speed_mps=1.0, heading_rad=math.pi),
+        )
+    )
+    gap = step_clearances(world(obstacle), 0.0, 4.0, (2.1, 0.0), (2.1, 0.0))
+    assert gap == pytest.approx([0.1 - 0.8])
+
+
 # --- contact --------------------------------------------------------------------------------
 
 
@@ -342,3 +442,15 @@ def test_obstacles_are_values(obstacle: Obstacle) -> None:
     assume(obstacle.speed_mps > 0.0)
     with pytest.raises(AttributeError):
         obstacle.speed_mps = 0.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("times", [(2.0, 1.0), (1.0, 1.0), (0.0,), (math.nan,)])
+def test_turns_out_of_order_are_refused(times: tuple[float, ...]) -> None:
+    post = Obstacle(
+        center_m=(3.0, 3.0),
+        radius_m=0.3,
+        turns=tuple(Turn(at_s=t, speed_mps=1.0) for t in times),
+    )
+    message = refusal(obstacles=(mover((3.0, 1.0), 0.0), post))
+    assert message.startswith("obstacle 2 turns: at_s=")
+    assert message.endswith("give the turns in order of time, the first after 0")

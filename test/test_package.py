@@ -40,18 +40,31 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "arguments": ({"core"}, set()),
     "entry": ({"core"}, set()),
     "figures": ({"core", "paper", "report", "scenarios"}, set()),
-    "watched": ({"core", "paper"}, {"rich"}),
+    "watched": ({"core", "paper", "study"}, {"rich"}),
+    "statistics": (set(), {"numpy", "scipy"}),
+    "leash": (set(), set()),
+    "sweep": (
+        {"core", "leash", "messages", "oracle", "outputs", "planners", "statistics", "study"}
+        | {"sweep", "worlds"},
+        {"distributed", "numpy", "pyarrow"},
+    ),
+    "study": ({"core", "outputs", "study"}, {"numpy"}),
     "planners": ({"core", "planners"}, {"numpy"}),
     "scenarios": ({"core", "resources"}, {"pydantic", "yaml"}),
+    "worlds": ({"core", "scenarios", "worlds"}, {"numpy"}),
+    "oracle": ({"core", "oracle"}, {"numpy", "scipy"}),
     "messages": ({"core"}, {"numpy"}),
     "run_config": ({"core", "scenarios"}, {"numpy"}),
-    "paper": ({"core", "outputs", "paper"}, {"numpy", "scipy"}),
+    "paper": ({"core", "paper", "statistics", "study"}, {"numpy", "scipy"}),
     "recording": (
         {"core", "messages", "recording", "scenarios"},
         {"mcap", "mcap_ros2", "yaml", "zstandard"},
     ),
     "verification": ({"core", "messages", "recording", "verification"}, set()),
-    "report": ({"core", "outputs", "paper", "report"}, {"matplotlib", "numpy", "rich"}),
+    "report": (
+        {"core", "outputs", "paper", "report", "statistics", "sweep"},
+        {"matplotlib", "numpy", "rich"},
+    ),
     "ros": (
         {"arguments", "core", "messages", "outputs", "recording", "ros", "run_config"}
         | {"scenarios"},

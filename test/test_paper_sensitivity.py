@@ -21,13 +21,13 @@ from mfba_planner.core.planner import PlannerParams
 from mfba_planner.core.sensing import SensorParams, sense_circles, sensory_vector
 from mfba_planner.paper import sensitivity
 from mfba_planner.paper.sensitivity import CASES, Reading, Row, Variation, turned
-from mfba_planner.paper.statistics import Interval
 from mfba_planner.paper.study.run import Sample
 from mfba_planner.report import style
 from mfba_planner.report.figures.sensitivity import draw
 from mfba_planner.report.sensitivity import to_csv, to_markdown, to_table
 from mfba_planner.report.sheet import to_bytes
 from mfba_planner.scenarios import load_scenario
+from mfba_planner.statistics import Interval
 
 SCENARIOS = {case: load_scenario(case) for case in CASES}
 BASE, *OTHERS = sensitivity.all_readings()

@@ -15,23 +15,21 @@ from mfba_planner.core.bat import Algorithm, BatParams, minimize
 from mfba_planner.core.episode import run
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.metrics import conduct, evaluate
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.core.world import Scenario
 from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.readings import PLANNERS
-from mfba_planner.paper.study import store as storing
 from mfba_planner.paper.study.chunk import (
     BENCHMARK_STREAM,
     Benchmark,
     Chunk,
     Trips,
     chunks,
-    turning,
 )
 from mfba_planner.paper.study.plan import FULL, QUICK, benchmark_plan, trip_plan
-from mfba_planner.paper.study.run import run_plan
-from mfba_planner.paper.study.store import Store
+from mfba_planner.paper.study.run import open_store, run_plan
+from mfba_planner.study import store as storing
 
 NEAR = Scenario(name="near", start_m=(0.0, 0.0), goal_m=(1.5, 1.0))
 SWARM = BatParams(population=6, iterations=10)
@@ -79,14 +77,15 @@ def test_a_trip_of_the_study_is_what_sim_tells_of_its_seed() -> None:
     assert found["length_m"][1] == result.length_m
     assert found["clearance_m"][1] == result.min_clearance_m
     assert found["reached"] == [1, 1]
-    assert found["turning_rad"][1] == turning(episode) > 0.0
+    assert found["turning_rad"][1] == conduct(episode).turning_rad > 0.0
 
 
 def test_turning_is_the_sum_of_all_turns() -> None:
     episode = run(NEAR, seed=1)
     corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.0, 2.0)]
     ticks = tuple(replace(episode.ticks[0], pose=Pose2D(*corner)) for corner in corners)
-    assert turning(replace(episode, ticks=ticks)) == pytest.approx(np.radians(90 + 45))
+    turned = conduct(replace(episode, ticks=ticks)).turning_rad
+    assert turned == pytest.approx(np.radians(90 + 45))
 
 
 @pytest.mark.parametrize(("workers", "size"), [(1, 3), (2, 4), (3, 100)])
@@ -134,9 +133,9 @@ def test_an_interrupted_study_goes_on_and_gives_the_same(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_plan(plan, store=Store(tmp_path / "out", plan, {}), done=interrupt)
+        run_plan(plan, store=open_store(tmp_path / "out", plan, {}), done=interrupt)
     kept, computed[:] = list(computed), []
-    again = run_plan(plan, store=Store(tmp_path / "out", plan, {}))
+    again = run_plan(plan, store=open_store(tmp_path / "out", plan, {}))
     assert plain(again) == whole
     assert len(kept) == 2
     assert sorted([*kept, *computed]) == sorted(chunk.name for chunk in plan)
@@ -156,19 +155,19 @@ def test_a_damaged_chunk_is_computed_again(
     damage: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = a_plan()
-    whole = plain(run_plan(plan, store=Store(tmp_path, plan, {})))
+    whole = plain(run_plan(plan, store=open_store(tmp_path, plan, {})))
     path = tmp_path / "chunks" / f"{plan[1].name}.json"
     text = path.read_text()
     path.write_text(damage(text))
     computed = counted(monkeypatch)
-    assert plain(run_plan(plan, store=Store(tmp_path, plan, {}))) == whole
+    assert plain(run_plan(plan, store=open_store(tmp_path, plan, {}))) == whole
     assert computed == [plan[1].name]
     assert path.read_text() == text
 
 
 def refusal(directory: Path, plan: list[Chunk], facts: dict[str, Any]) -> str:
     with pytest.raises(OutputError) as caught:
-        Store(directory, plan, facts)
+        open_store(directory, plan, facts)
     (line,) = str(caught.value).splitlines()
     assert line.startswith(f"{directory}: ")
     return line
@@ -179,7 +178,7 @@ def test_results_of_anything_else_are_refused(
 ) -> None:
     plan = a_plan()
     out = tmp_path / "out"
-    Store(out, plan, {"seed": 3})
+    open_store(out, plan, {"seed": 3})
     assert "(seed=3, now 4)" in refusal(out, plan, {"seed": 4})
     assert "(what is run differs)" in refusal(out, plan[:-1], {"seed": 3})
     other = [replace(c, work=Benchmark(function="F5", bat=replace(SWARM, rho=2.0))) for c in plan]
@@ -188,7 +187,7 @@ def test_results_of_anything_else_are_refused(
         patch.setattr(storing, "__version__", "9.9.9")
         assert "(mfba_planner='0.1.0', now '9.9.9')" in refusal(out, plan, {"seed": 3})
     with monkeypatch.context() as patch:
-        patch.setattr(storing, "code_digest", lambda: "changed")
+        patch.setattr(storing, "code_digest", lambda *_: "changed")
         assert "(the code has changed since)" in refusal(out, plan, {"seed": 3})
     (out / storing.MANIFEST).write_text('{"schema_version": 1, ')
     assert "cut short or not JSON; give another --out" in refusal(out, plan, {"seed": 3})
@@ -205,7 +204,7 @@ def test_other_people_s_directories_are_left_alone(tmp_path: Path) -> None:
 
 
 def test_the_manifest_says_what_was_run(tmp_path: Path) -> None:
-    Store(tmp_path / "deep/out", a_plan(), {"seed": 3})
+    open_store(tmp_path / "deep/out", a_plan(), {"seed": 3})
     found = json.loads((tmp_path / "deep/out/study.json").read_text())
     assert found["seed"] == 3
     assert found["numpy"] == np.__version__

@@ -12,7 +12,6 @@ from mfba_planner.core.world import Scenario
 from mfba_planner.paper import published
 from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.published import BENCHMARK_COLUMNS, BY_KEY
-from mfba_planner.paper.statistics import Interval
 from mfba_planner.paper.study.plan import (
     EXCEPTIONS,
     LAWS,
@@ -27,6 +26,7 @@ from mfba_planner.paper.tables.claims import claim_section
 from mfba_planner.paper.tables.model import Entry, Grid, Ours, Section, Verdict, inside
 from mfba_planner.paper.tables.trips import fitting_columns, printed_lengths, trip_section
 from mfba_planner.scenarios import load_scenario
+from mfba_planner.statistics import Interval
 
 RUNS = 60
 Samples = dict[str, Mapping[str, Any]]

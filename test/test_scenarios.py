@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mfba_planner.core.episode import Outcome, run
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.world import Obstacle, Scenario, Walls
+from mfba_planner.core.world import Obstacle, Scenario, Turn, Walls
 from mfba_planner.scenarios import (
     load_scenario,
     parse_scenario,
@@ -397,6 +397,11 @@ def test_no_data_at_all_raises_anything_else(data: Any) -> None:
 NUMBERS = st.floats(-1e6, 1e6)
 POSITIVE = st.floats(0.0, 1e6, exclude_min=True)
 POINTS = st.tuples(NUMBERS, NUMBERS)
+TURNS = st.lists(
+    st.builds(Turn, at_s=POSITIVE, speed_mps=st.floats(0.0, 1e6), heading_rad=NUMBERS),
+    max_size=3,
+    unique_by=lambda turn: turn.at_s,
+).map(lambda turns: tuple(sorted(turns, key=lambda turn: turn.at_s)))
 
 
 @st.composite
@@ -411,6 +416,7 @@ def scenarios(draw: st.DrawFn) -> Scenario:
                 radius_m=POSITIVE,
                 speed_mps=st.floats(0.0, 1e6),
                 heading_rad=NUMBERS,
+                turns=TURNS,
             ),
             max_size=3,
         )
@@ -475,3 +481,57 @@ def test_plain_data_is_plain() -> None:
     assert data["walls"] == {"lower_m": [0.0, 0.0], "upper_m": [12.0, 12.0]}
     assert data["obstacles"][0]["heading_rad"] == math.radians(80.0)
     assert "heading_deg" not in data["obstacles"][0]
+    assert "turns" not in data["obstacles"][0]
+
+
+# --- turns ----------------------------------------------------------------------------------
+
+WITH_TURNS = """name: x
+start_m: [0, 0]
+goal_m: [5, 5]
+obstacles:
+  - center_m: [3, 3]
+    radius_m: 0.3
+    speed_mps: 0.2
+    turns:
+      - {at_s: 2, speed_mps: 0.5, heading_deg: 90}
+      - {at_s: 4.5, speed_mps: 0}
+      - {at_s: 6, speed_mps: 1, heading_rad: 0.5}
+"""
+
+
+def test_obstacles_may_turn() -> None:
+    scenario = parse_scenario(WITH_TURNS, "x")
+    assert scenario.obstacles[0].turns == (
+        Turn(at_s=2.0, speed_mps=0.5, heading_rad=math.pi / 2.0),
+        Turn(at_s=4.5, speed_mps=0.0, heading_rad=0.0),
+        Turn(at_s=6.0, speed_mps=1.0, heading_rad=0.5),
+    )
+    assert load_scenario(scenario_to_json(scenario)) == scenario
+    assert len(scenario_to_dict(scenario)["obstacles"][0]["turns"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("turn", "message"),
+    [
+        ("at_s: 1", ": obstacles.1.turns.1.speed_mps: missing; add it"),
+        ("speed_mps: 1", ": obstacles.1.turns.1.at_s: missing; add it"),
+        ("at_s: -1, speed_mps: 1", ": obstacles.1.turns.1.at_s=-1: refused; give a number"),
+        ("at_s: 1, speed_mps: -1", ": obstacles.1.turns.1.speed_mps=-1: refused; give a number"),
+        (
+            "at_s: 1, speed_mps: 1, heading: 3",
+            ": obstacles.1.turns.1.heading: unknown key; did you mean 'heading_",
+        ),
+        (
+            "at_s: 1, speed_mps: 1, heading_deg: 3, heading_rad: 1",
+            ": heading_deg=3: heading_rad=1 is given as well; keep one of them",
+        ),
+        (
+            "at_s: 1, speed_mps: 1}, {at_s: 1, speed_mps: 2",
+            ": obstacle 1 turns: at_s=1 does not come after 1; give the turns in order of time",
+        ),
+    ],
+)
+def test_turns_that_make_no_sense_are_refused(turn: str, message: str) -> None:
+    found = refusal(with_obstacle(f"center_m: [4, 4], radius_m: 1, turns: [{{{turn}}}]"))
+    assert found.startswith(message)

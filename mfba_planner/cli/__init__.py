@@ -25,6 +25,8 @@ COMMANDS = {
     "sensitivity": "what hangs on what the paper does not say",
     "scenarios": "list the worlds that are shipped",
     "options": "list what --set can change",
+    "sweep": "planners in worlds without number: success, gap to the optimum, side by side",
+    "show": "explain a run of a sweep: picture, words, bag",
     "tables": "the paper's tables again, ours beside the printed, with verdicts",
 }
 

@@ -10,7 +10,7 @@ from ..arguments import Parser
 from ..figures import FORMATS
 from ..outputs import new_run_directory, write_same
 from ..paper import sensitivity
-from ..paper.study.store import Store
+from ..paper.study.run import open_store
 from ..scenarios import load_scenario
 from ..watched import add_arguments, check, run_watched
 
@@ -31,7 +31,7 @@ def main(args: list[str]) -> int:
     scenarios = {case: load_scenario(case) for case in sensitivity.CASES}
     chunks = sensitivity.plan(scenarios, found.quick, found.seed)
     facts = {"study": "sensitivity", "seed": found.seed, "quick": found.quick}
-    store = Store(directory, chunks, facts)
+    store = open_store(directory, chunks, facts)
     rows = sensitivity.rows(run_watched(chunks, found.workers, store), found.quick)
     seeds = sensitivity.QUICK_SEEDS if found.quick else sensitivity.SEEDS
     names = _write(directory, rows)

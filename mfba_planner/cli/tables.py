@@ -13,7 +13,7 @@ from ..core.errors import InputError, OutputError
 from ..figures import FIGURES, render
 from ..outputs import new_run_directory, write_new, write_same
 from ..paper.study.plan import FULL, QUICK
-from ..paper.study.store import Store
+from ..paper.study.run import open_store
 from ..paper.tables.build import SECTIONS, build, check_sections, plan
 from ..paper.tables.model import Section
 from ..report.tables import data, html, markdown
@@ -62,7 +62,9 @@ def _make(
 ) -> list[Section]:
     scenarios = {name: load_scenario(name) for name in ("case1", "case2")}
     chunks = plan(sections, scenarios, QUICK if quick else FULL, seed)
-    store = Store(directory, chunks, {"sections": list(sections), "seed": seed, "quick": quick})
+    store = open_store(
+        directory, chunks, {"sections": list(sections), "seed": seed, "quick": quick}
+    )
     samples = run_watched(chunks, workers, store)
     return build(sections, scenarios, samples, seed)
 

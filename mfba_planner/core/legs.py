@@ -40,5 +40,6 @@ def uniform_legs(scenario: Scenario, until_s: float) -> Legs:
             x1, y1 = center_at(obstacle, t1, scenario.walls)
             vx, vy = (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
             rows.append((t0, t1, x0, y0, vx, vy, radius, index))
-    table = np.array(rows, dtype=np.float64).reshape(-1, 8).T
-    return Legs(*table[:7], table[7].astype(np.intp))
+    table = np.array(rows, dtype=np.float64).reshape(-1, 8)
+    begin, end, x, y, speed_x, speed_y, radii, which = table.T
+    return Legs(begin, end, x, y, speed_x, speed_y, radii, which.astype(np.intp))

@@ -9,12 +9,16 @@ from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
+from .conduct import Conduct, Course, Passes
 from .episode import Episode, Outcome
 from .geometry import distance
+from .motion import Array, Motion
 from .planner import NANO, Decision, Mode
 from .world import step_clearances
 
-CONTACT_SLACK_M = 1e-9  # rounding of a tangential pass is not a collision
+BLOCK = 512  # ticks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,71 +51,125 @@ def evaluate(episode: Episode) -> Result:
     enlarged edge at some tick. mode_switches counts every change of mode, the one to ARRIVED
     included. success is: goal reached, no collision.
     """
+    return assess(episode)[0]
+
+
+def conduct(episode: Episode) -> Conduct:
+    """How the run went on its way."""
+    return assess(episode)[1]
+
+
+def assess(episode: Episode) -> tuple[Result, Conduct]:
+    """evaluate() and conduct() in one go."""
     tally = Tally(episode)
     for tick in episode.ticks:
         tally.add(tick)
-    return tally.result(episode.outcome)
+    return tally.result(episode.outcome), tally.conduct()
 
 
 class Tally:
-    """The figures of evaluate(), tick by tick: holds one tick, however long the run is."""
+    """The figures of evaluate(), tick by tick: holds BLOCK ticks, however long the run is.
+
+    Obstacles are looked at a block at a time, which is what makes it fast.
+    """
 
     def __init__(self, run: Episode) -> None:
         """Start before the first tick; of run, only what was run counts, not its ticks."""
         self._run = run
+        self._motion = Motion(run.scenario)
+        self._block: list[Decision] = []
+        self._looked = 0  # how many of the block have been looked at before: the first, or none
         self._first: Decision | None = None
-        self._last: Decision | None = None
         # fsum of all at the end: sum() itself rounds differently before and after Python 3.12
         self._steps_m = array("d")
         self._modes: Counter[Mode] = Counter()
-        self._switches = self._collisions = 0
-        self._min_clearance_m = math.inf
-        self._touching: list[bool] = []
+        self._switches = 0
+        self._passes = Passes()
+        self._course = Course()
         self._encounters: dict[int, None] = {}
 
     def add(self, tick: Decision) -> None:
         """Take the next tick."""
-        before = self._last
-        if before is None:
+        if self._first is None:
             self._first = tick
         else:
-            self._steps_m.append(distance(before.pose.position, tick.pose.position))
-            self._switches += before.mode is not tick.mode
-            self._pass(before, tick)
-        self._last = tick
+            self._switches += self._block[-1].mode is not tick.mode
         self._modes[tick.mode] += 1
-        self._encounters.update(dict.fromkeys(within_range(self._run, tick)))
+        self._block.append(tick)
+        if len(self._block) == BLOCK:
+            self._look()
 
     def result(self, outcome: Outcome) -> Result:
         """The figures of the ticks so far; a single tick has the clearance of standing there."""
-        first, last = self._first, self._last
-        if first is not None and first is last:
-            self._pass(first, first)
+        passes = self._told()
+        first, last = self._first, self._block[-1] if self._block else None
         length = math.fsum(self._steps_m)
+        collisions = passes.hits_moving + passes.hits_standing
         return Result(
             outcome=outcome,
-            success=outcome is Outcome.GOAL_REACHED and self._collisions == 0,
+            success=outcome is Outcome.GOAL_REACHED and collisions == 0,
             length_m=length,
             time_s=(last.stamp_ns - first.stamp_ns) * NANO if first and last else 0.0,
             ticks=self._modes.total(),
             fitness=1.0 / length if length > 0.0 else math.inf,
-            min_clearance_m=self._min_clearance_m,
-            collisions=self._collisions,
+            min_clearance_m=passes.min_gap_m,
+            collisions=collisions,
             mode_switches=self._switches,
             avoidance_ticks=self._modes[Mode.OBSTACLE_AVOIDANCE],
             blocked_ticks=self._modes[Mode.BLOCKED],
             stopped_ticks=self._modes[Mode.STOPPED],
-            encounters=tuple(self._encounters),
+            encounters=tuple(number + 1 for number in self._encounters),
         )
 
-    def _pass(self, before: Decision, tick: Decision) -> None:
-        """The obstacles during one step; a contact counts when it begins."""
-        gaps = _clearances(self._run, before, tick)
-        self._min_clearance_m = min([self._min_clearance_m, *gaps])
-        touching = [gap < -CONTACT_SLACK_M for gap in gaps]
-        were = self._touching or [False] * len(gaps)
-        self._collisions += sum(now and not was for was, now in zip(were, touching))
-        self._touching = touching
+    def conduct(self) -> Conduct:
+        """How it went on its way so far."""
+        passes = self._told()
+        tick_s = self._run.planner.tick_ns * NANO
+        length, turning = math.fsum(self._steps_m), self._course.turning_rad
+        return Conduct(
+            hits_moving=passes.hits_moving,
+            hits_standing=passes.hits_standing,
+            first_contact_with=passes.first_contact_with,
+            first_contact_s=passes.first_contact_s,
+            mean_clearance_m=passes.mean_gap_m,
+            min_ttc_s=passes.min_ttc_s,
+            turning_rad=turning,
+            curvature_radpm=turning / length if length > 0.0 else 0.0,
+            heading_changes=self._course.heading_changes,
+            jerk_mps3=self._course.jerk(tick_s),
+            avoidance_s=self._modes[Mode.OBSTACLE_AVOIDANCE] * tick_s,
+        )
+
+    def _told(self) -> Passes:
+        """What the obstacles did so far; to a single tick, what they do while it stands."""
+        self._look()
+        if self._modes.total() != 1:
+            return self._passes
+        standing = Passes()
+        times_s, positions_m = self._course_of([self._block[0]] * 2)
+        standing.add(self._motion.steps(times_s, positions_m), times_s, np.zeros(1))
+        return standing
+
+    def _look(self) -> None:
+        """Look at the ticks that were added since the last look; keep the last one."""
+        ticks = self._block
+        if len(ticks) == self._looked:
+            return
+        self._course.add([tick.pose.position for tick in ticks[self._looked :]])
+        times_s, positions_m = self._course_of(ticks)
+        steps = self._motion.steps(times_s, positions_m)
+        near = steps.distance_m - self._motion.radius_m <= self._run.sensor.sensing_range_m
+        self._encounters.update(dict.fromkeys(np.argwhere(near)[:, 1].tolist()))
+        dx, dy = np.diff(positions_m)
+        moved_m = np.sqrt(dx * dx + dy * dy)
+        self._steps_m.extend(moved_m.tolist())
+        self._passes.add(steps, times_s[:-1], moved_m)
+        self._block, self._looked = [ticks[-1]], 1
+
+    def _course_of(self, ticks: list[Decision]) -> tuple[Array, Array]:
+        """Times (K,) and positions (2, K) of some ticks."""
+        times_s = [self._run.time_s(tick.stamp_ns) for tick in ticks]
+        return np.array(times_s), np.array([tick.pose.position for tick in ticks]).T
 
 
 def tick_clearances(episode: Episode) -> list[list[float]]:

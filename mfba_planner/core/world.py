@@ -122,7 +122,7 @@ def _check_turns(number: int, obstacle: Obstacle) -> None:
 
 
 @lru_cache(maxsize=4096)
-def _stretches(obstacle: Obstacle, walls: Walls | None) -> tuple[tuple[float, Obstacle], ...]:
+def stretches_of(obstacle: Obstacle, walls: Walls | None) -> tuple[tuple[float, Obstacle], ...]:
     """The motion cut at its turns: since when (s), and an obstacle that starts there then."""
     at_s, now = 0.0, replace(obstacle, turns=())
     stretches = [(at_s, now)]
@@ -141,7 +141,7 @@ def _stretches(obstacle: Obstacle, walls: Walls | None) -> tuple[tuple[float, Ob
 def _stretch(obstacle: Obstacle, t_s: float, walls: Walls | None) -> tuple[float, Obstacle]:
     """The stretch under way at time t; a turn's own moment belongs to what follows."""
     number = sum(turn.at_s <= t_s for turn in obstacle.turns)
-    return _stretches(obstacle, walls)[number]
+    return stretches_of(obstacle, walls)[number]
 
 
 def center_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
@@ -226,7 +226,7 @@ def bounce_times(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | No
 
 
 def _kinks(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:
-    stretches = _stretches(obstacle, walls)
+    stretches = stretches_of(obstacle, walls)
     times = {since_s for since_s, _ in stretches[1:] if t0_s < since_s < t1_s}
     ends = [*(since_s for since_s, _ in stretches[1:]), math.inf]
     starts = [-math.inf, *ends[:-1]]  # before t = 0 the first stretch goes on backwards
@@ -246,22 +246,28 @@ def step_clearances(
     Continuous in time, not only at the ends, and exact through bounces and turns: between two
     of them both motions are uniform. Negative means contact.
     """
-    clearances = []
-    for obstacle in scenario.obstacles:
-        times = [t0_s, *bounce_times(obstacle, t0_s, t1_s, scenario.walls), t1_s]
-        smallest = math.inf
-        duration = t1_s - t0_s
-        for ta, tb in pairwise(times):
-            sa, sb = ((t - t0_s) / duration if duration else 0.0 for t in (ta, tb))
-            gap = closest_approach(
-                _between(start, end, sa),
-                _between(start, end, sb),
-                center_at(obstacle, ta, scenario.walls),
-                center_at(obstacle, tb, scenario.walls),
-            )
-            smallest = min(smallest, gap)
-        clearances.append(smallest - scenario.enlarged_radius(obstacle))
-    return clearances
+    return [
+        clearance(scenario, obstacle, t0_s, t1_s, start, end) for obstacle in scenario.obstacles
+    ]
+
+
+def clearance(
+    scenario: Scenario, obstacle: Obstacle, t0_s: float, t1_s: float, start: Point, end: Point
+) -> float:
+    """step_clearances, for one obstacle."""
+    times = [t0_s, *bounce_times(obstacle, t0_s, t1_s, scenario.walls), t1_s]
+    smallest = math.inf
+    duration = t1_s - t0_s
+    for ta, tb in pairwise(times):
+        sa, sb = ((t - t0_s) / duration if duration else 0.0 for t in (ta, tb))
+        gap = closest_approach(
+            _between(start, end, sa),
+            _between(start, end, sb),
+            center_at(obstacle, ta, scenario.walls),
+            center_at(obstacle, tb, scenario.walls),
+        )
+        smallest = min(smallest, gap)
+    return smallest - scenario.enlarged_radius(obstacle)
 
 
 def _between(a: Point, b: Point, s: float) -> Point:

@@ -18,7 +18,7 @@ LAST_LINES = 8
 _BOOT = """\
 import sys
 sys.path[:] = {path!r}
-from mfba_planner.launcher.leash import end_with_parent
+from mfba_planner.leash import end_with_parent
 end_with_parent({parent})
 from mfba_planner import entry
 sys.exit(entry.{program}())

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .. import statistics
 from ..core.bat import Algorithm
 from ..core.episode import Episode, run
 from ..core.geometry import Point, bearing, distance, towards
@@ -17,7 +18,7 @@ from ..core.options import Scalar, flatten, override
 from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
 from ..core.world import Obstacle, Scenario
-from . import published, readings, statistics
+from . import published, readings
 from .study.chunk import Chunk, Trips, chunks
 from .study.run import Sample
 

@@ -3,18 +3,16 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from ...core.bat import BatParams
 from ...core.batch import BatchResult, minimize_batch
-from ...core.episode import Episode, run
-from ...core.geometry import bearing, distance, wrap_angle
-from ...core.metrics import evaluate
+from ...core.episode import run
+from ...core.metrics import assess
 from ...core.options import Scalar, flatten
 from ...core.planner import PlannerParams
 from ...core.world import Scenario
@@ -23,7 +21,6 @@ from ..functions import FUNCTIONS
 Columns = dict[str, list[float]]
 
 BENCHMARK_STREAM = 2  # spawn key of these runs' SeedSequence children, beside the planner's
-STANDSTILL_M = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,14 +80,13 @@ class Trips:
         return {name: [row[name] for row in rows] for name in rows[0]}
 
     def _row(self, seed: int) -> dict[str, float]:
-        episode = run(self.scenario, planner=self.planner, seed=seed)
-        result = evaluate(episode)
+        result, conduct = assess(run(self.scenario, planner=self.planner, seed=seed))
         return {
             "length_m": result.length_m,
             "clearance_m": result.min_clearance_m,
             "collisions": result.collisions,
             "reached": int(result.outcome.value == "goal_reached"),
-            "turning_rad": turning(episode),
+            "turning_rad": conduct.turning_rad,
             "encounters": sum(1 << number for number in result.encounters),
         }
 
@@ -114,6 +110,10 @@ class Chunk:
         """Time it takes, in about milliseconds, for a progress bar."""
         return self.count * self.work.cost
 
+    def facts(self) -> Mapping[str, Any]:
+        """What decides the numbers, as plain values."""
+        return {"sample": self.sample, **self.work.facts()}
+
     def run(self) -> Columns:
         """Compute it."""
         return self.work.run(range(self.first, self.first + self.count))
@@ -126,13 +126,6 @@ def chunks(sample: str, work: Benchmark | Trips, first: int, runs: int, size: in
         Chunk(sample=sample, work=work, first=start, count=min(size, last - start))
         for start in range(first, last, size)
     ]
-
-
-def turning(episode: Episode) -> float:
-    """How much the path turns in all, radians: 0 for a straight one (less is smoother)."""
-    points = [tick.pose.position for tick in episode.ticks]
-    headings = [bearing(a, b) for a, b in pairwise(points) if distance(a, b) > STANDSTILL_M]
-    return math.fsum(abs(wrap_angle(b - a)) for a, b in pairwise(headings))
 
 
 def _number(name: str) -> int:

@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from ... import statistics as stats
+from ...statistics import Array, Interval
 from .. import published
-from .. import statistics as stats
 from ..functions import FUNCTIONS
 from ..published import BENCHMARK_COLUMNS, BENCHMARK_RUNS, BY_KEY
-from ..statistics import Array, Interval
 from ..study.plan import (
     EXCEPTION_FUNCTIONS,
     EXCEPTIONS,

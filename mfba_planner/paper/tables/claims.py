@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ... import statistics as stats
 from ...core.geometry import distance
 from ...core.world import Scenario, step_clearances
+from ...statistics import Array, Comparison
 from .. import published
-from .. import statistics as stats
 from ..readings import PLANNERS
-from ..statistics import Array, Comparison
 from ..study.plan import LAWS, PLANNER_READINGS, trip_sample
 from ..study.run import Sample
 from .model import Entry, Ours, Section, Verdict

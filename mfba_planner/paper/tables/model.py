@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
+from ...statistics import Interval
 from .. import doubts
 from ..published import Printed
-from ..statistics import Interval
 
 Cell = str | int | float | Interval | None
 

@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from ... import statistics as stats
+from ...statistics import Array
 from .. import published
-from .. import statistics as stats
 from ..published import TRIP_RUNS, TRIP_TABLES, Printed
 from ..readings import PLANNERS
-from ..statistics import Array
 from ..study.plan import LAWS, PLANNER_READINGS, trip_sample
 from ..study.run import Sample
 from .model import Cell, Entry, Grid, Ours, Section, Verdict, entry, inside

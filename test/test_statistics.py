@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.paper import statistics as stats
+from mfba_planner import statistics as stats
 
 NAMES = ("best", "worst", "mean", "sd")
 
@@ -152,3 +152,61 @@ def test_a_statistic_that_never_varies_forgives_nothing() -> None:
     found = stats.consistency(draws, [-0.8, 0.0, -0.1, 0.2], NAMES)
     assert found.p < 0.01
     assert found.outside == ("best", "mean", "sd")
+
+
+def test_a_rate_has_wilson_s_interval() -> None:
+    # 10 of 10: Wilson's lower end is n / (n + z^2)
+    z = 1.959963984540054
+    found = stats.rate(10, 10)
+    assert (found.middle, found.high) == (1.0, 1.0)
+    assert found.low == pytest.approx(10.0 / (10.0 + z * z))
+    half = stats.rate(50, 100)
+    assert (half.low, half.high) == pytest.approx((0.4038315, 0.5961685), abs=1e-6)
+    assert stats.rate(0, 5).low == 0.0
+
+
+def test_a_mean_s_interval_holds_the_truth_nineteen_times_in_twenty() -> None:
+    rng = np.random.default_rng(0)
+    held = 0
+    for k in range(200):
+        found = stats.mean(rng.exponential(2.0, 100), stats.generator(k), 400)
+        held += 2.0 in found
+    assert 175 <= held <= 199
+
+
+def test_a_mean_s_resampling_in_pieces_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    sample = np.random.default_rng(1).normal(size=50)
+    whole = stats.mean(sample, stats.generator(3))
+    monkeypatch.setattr(stats, "DRAWN", 120)  # two resamples at a time
+    assert stats.mean(sample, stats.generator(3)) == whole
+    assert stats.mean(np.array([4.0]), stats.generator(3)) == stats.Interval(4.0, 4.0, 4.0)
+
+
+def test_pairs_that_are_all_won() -> None:
+    ours, other = np.arange(10.0), np.arange(10.0) + np.linspace(0.1, 1.0, 10)
+    found = stats.paired(ours, other, stats.generator(1))
+    assert (found.n, found.wins, found.losses, found.ties) == (10, 10, 0, 0)
+    assert found.difference.middle == pytest.approx(-0.55)
+    assert found.difference.high < 0.0
+    assert found.sign_p == pytest.approx(2.0 / 2**10), "both tails of ten heads in a row"
+    assert found.rank_p < 0.01
+
+
+def test_ties_say_nothing_either_way() -> None:
+    other = np.zeros(6)
+    found = stats.paired(np.array([0.0, 0.0, 0.0, -1.0, -1.0, 1.0]), other, stats.generator(1))
+    assert (found.wins, found.losses, found.ties) == (2, 1, 3)
+    assert found.sign_p == 1.0
+    same = stats.paired(other, other, stats.generator(1))
+    assert (same.sign_p, same.rank_p, same.difference.low) == (1.0, 1.0, 0.0)
+
+
+def test_chance_alone_is_rarely_significant() -> None:
+    rng = np.random.default_rng(2)
+    small = [
+        stats.paired(rng.normal(size=40), rng.normal(size=40), stats.generator(k))
+        for k in range(100)
+    ]
+    assert sum(found.sign_p < 0.05 for found in small) <= 10
+    assert sum(found.rank_p < 0.05 for found in small) <= 12
+    assert sum(0.0 not in found.difference for found in small) <= 14

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 LEVEL = 0.95
 RESAMPLES = 10_000
 RIDGE = 1e-6
+DRAWN = 2**20  # resampled values held at once
 
 
 def generator(*key: int) -> np.random.Generator:
@@ -65,6 +66,60 @@ def estimate(
     """
     found = statistic(np.asarray(sample)[None, :])[0]
     return interval(statistic(resample(sample, len(sample), rng, count)), float(found))
+
+
+def rate(count: int, n: int) -> Interval:
+    """A share of n independent cases with Wilson's 95 % interval; n >= 1."""
+    return Interval(count / n, *share_interval(count, n))
+
+
+def mean(sample: Array, rng: np.random.Generator, count: int = 2000) -> Interval:
+    """Mean with its bootstrap interval (percentiles); memory does not grow with the sample."""
+    values = np.asarray(sample, dtype=float)
+    batch = max(1, DRAWN // len(values))
+    means = [
+        resample(values, len(values), rng, min(batch, count - begin)).mean(1)
+        for begin in range(0, count, batch)
+    ]
+    return interval(np.concatenate(means), float(values.mean()))
+
+
+@dataclass(frozen=True, slots=True)
+class Paired:
+    """Two planners on the same cases, lower is better: who wins how often, and by how much.
+
+    difference is the mean of ours - other with its bootstrap interval over the cases; sign_p is
+    the exact sign test's p (ties left out), rank_p Wilcoxon's, both two-sided.
+    """
+
+    n: int
+    wins: int
+    losses: int
+    difference: Interval
+    sign_p: float
+    rank_p: float
+
+    @property
+    def ties(self) -> int:
+        """Cases in which both are equal."""
+        return self.n - self.wins - self.losses
+
+
+def paired(ours: Array, other: Array, rng: np.random.Generator) -> Paired:
+    """Compare values of the same cases in the same order, at least one."""
+    from scipy.stats import binomtest, wilcoxon
+
+    difference = np.asarray(ours, dtype=float) - np.asarray(other, dtype=float)
+    wins, losses = int((difference < 0.0).sum()), int((difference > 0.0).sum())
+    decided = wins + losses
+    return Paired(
+        n=len(difference),
+        wins=wins,
+        losses=losses,
+        difference=mean(difference, rng),
+        sign_p=float(binomtest(wins, decided).pvalue) if decided else 1.0,
+        rank_p=_probability(wilcoxon(difference, method="asymptotic").pvalue) if decided else 1.0,
+    )
 
 
 def mean_difference(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Children that do not outlive the launcher, not even its kill -9."""
+"""Children that do not outlive their parent, not even its kill -9."""
 
 from __future__ import annotations
 

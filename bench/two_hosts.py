@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba sweep` on two hosts: a dask worker in each of two network namespaces (needs root).
+
+The namespaces share a veth pair and nothing else of the network; scheduler and client are in the
+first. Prints who computed how much, and whether the table is the one of local processes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+HOSTS = {"mfba-a": "10.77.0.1", "mfba-b": "10.77.0.2"}
+ADDRESS = f"tcp://{HOSTS['mfba-a']}:8786"
+MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
+COUNT = """
+from collections import Counter
+from distributed import Client
+with Client({address!r}) as client:
+    client.wait_for_workers(2, timeout=60)
+    counts = client.run(lambda dask_worker: len(dask_worker.state.log))
+    for address, events in counts.items():
+        print("  worker", address, "events", events)
+"""
+
+
+def ip(*words: str) -> None:
+    """Run the command of that name."""
+    subprocess.run(["ip", *words], check=True)
+
+
+@contextmanager
+def hosts() -> Iterator[None]:
+    """Two namespaces with an address each; removed afterwards, with all that is in them."""
+    with ExitStack() as stack:
+        for name in HOSTS:
+            ip("netns", "add", name)
+            stack.callback(ip, "netns", "del", name)
+        first, second = HOSTS
+        ip(
+            "link",
+            "add",
+            "veth0",
+            "netns",
+            first,
+            "type",
+            "veth",
+            "peer",
+            "veth0",
+            "netns",
+            second,
+        )
+        for name, address in HOSTS.items():
+            ip("-n", name, "addr", "add", f"{address}/24", "dev", "veth0")
+            ip("-n", name, "link", "set", "veth0", "up")
+            ip("-n", name, "link", "set", "lo", "up")
+        yield
+
+
+def inside(host: str, *words: str) -> list[str]:
+    """A command of this Python in a namespace."""
+    return ["ip", "netns", "exec", host, sys.executable, *words]
+
+
+@contextmanager
+def daemon(host: str, *words: str) -> Iterator[None]:
+    """A quiet process in a namespace."""
+    with tempfile.TemporaryDirectory() as scratch:
+        process = subprocess.Popen(
+            inside(host, "-m", *words), cwd=scratch,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            yield
+        finally:
+            process.terminate()
+            process.wait()
+
+
+def swept(command: list[str]) -> str:
+    """The sorted hash that a sweep prints."""
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    found = re.search(r"^sorted hash (\w+)$", done.stdout, re.MULTILINE)
+    assert found, done.stdout
+    return found.group(1)
+
+
+def main() -> None:
+    """Sweep on both hosts and here."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--worlds", type=int, default=400)
+    options = parser.parse_args()
+    order = ["sweep", "random-10", "--planner", "paper", "--planner", "straight"]
+    order += ["--worlds", str(options.worlds)]
+    with tempfile.TemporaryDirectory() as root, ExitStack() as stack:
+        stack.enter_context(hosts())
+        first = next(iter(HOSTS))
+        stack.enter_context(
+            daemon(
+                first, "distributed.cli.dask_scheduler", "--host", HOSTS[first], "--no-dashboard"
+            )
+        )
+        for name, address in HOSTS.items():
+            worker = ["distributed.cli.dask_worker", ADDRESS, "--host", address]
+            stack.enter_context(daemon(name, *worker, "--nthreads", "1", "--no-dashboard"))
+        wait = COUNT.format(address=ADDRESS)
+        subprocess.run(inside(first, "-c", wait), check=True, stdout=subprocess.DEVNULL)
+        out = str(Path(root) / "hosts")
+        there = swept(inside(first, "-c", MFBA, *order, "--scheduler", ADDRESS, "--out", out))
+        subprocess.run(inside(first, "-c", wait), check=True)
+        here = swept([sys.executable, "-c", MFBA, *order, "--out", str(Path(root) / "here")])
+    print(f"two hosts {there}\nhere      {here}\n{'identical' if there == here else 'DIFFERENT'}")
+    sys.exit(there != here)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba show`: any run of a sweep again, as a picture, in words and as a bag."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from ..arguments import Parser
+from ..core.errors import InputError
+from ..oracle import solve
+from ..outputs import new_run_directory, refuse_existing, write_new
+from ..sweep.columns import Row, made_row
+from ..sweep.explain import contact_index, explain
+from ..sweep.guard import HungError
+from ..sweep.order import Order, Run, Setting, read_run
+from ..sweep.play import Played, play
+from ..sweep.read import ReadSweep, read_sweep
+
+_DESCRIPTION = """Make a run of a sweep again and tell what became of it, and why.
+
+RUN is SUITE/WORLD/PLANNER/SEED or, with a directory of `mfba sweep`, also the number of a row of
+its table (from 0); without RUN the runs that failed are listed. Without a directory the run is
+made as `mfba sweep` makes it when nothing else is said."""
+LISTED = 20
+
+
+def main(args: list[str]) -> int:
+    """Show a run, or list those that failed."""
+    parser = Parser(prog="mfba show", description=_DESCRIPTION)
+    parser.add_argument("what", nargs="+", metavar="DIR | RUN", help="directory, run, or both")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="directory to create (default: below runs/)"
+    )
+    parser.add_argument("--no-bag", action="store_true", help="write no bag, which takes rclpy")
+    found = parser.parse(args)
+    words = list(found.what)
+    swept = read_sweep(Path(words.pop(0))) if _is_directory(words[0]) else None
+    if len(words) > 1:
+        raise InputError(f"{words[1]}: one argument too many; give a directory and one run")
+    if swept is not None and not words:
+        return _list_failures(swept)
+    return _show(swept, words[0], found.out, bag=not found.no_bag)
+
+
+def _is_directory(word: str) -> bool:
+    return Path(word).is_dir() or (word.count("/") != 3 and not word.isdecimal())
+
+
+def _list_failures(swept: ReadSweep) -> int:
+    failed = [(k, row) for k, row in enumerate(swept.rows) if not row["success"]]
+    print(f"{len(failed)} of {len(swept.rows)} runs without success")
+    for k, row in failed[:LISTED]:
+        print(f"{k:>7}  {Run(*(row[n] for n in Run._fields))}  {_why(row)}")
+    if len(failed) > LISTED:
+        print(f"{'...':>7}  and {len(failed) - LISTED} more")
+    return 0
+
+
+def _why(row: Row) -> str:
+    if row["failure"]:
+        return str(row["failure"])
+    return f"{row['outcome']}, {row['collisions']} collisions"
+
+
+def _show(swept: ReadSweep | None, word: str, out: Path | None, *, bag: bool) -> int:
+    run, row = _chosen(swept, word)
+    setting = swept.order.setting if swept else Setting()
+    Order(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)  # or it raises
+    directory = refuse_existing(out or new_run_directory(stem="show"))
+    with _patience(setting.patience_s):
+        played = play(run, setting)
+    lines = [str(run), *explain(played), *_oracle(played, setting)]
+    if swept is not None and swept.code_changed:
+        lines.append("note: the code has changed since the sweep; its run may have gone otherwise")
+    if row is not None and not _same(row, made_row(run, played)):
+        lines.append("note: the sweep's run went otherwise; see the row of its table")
+    print("\n".join(lines))
+    names = _write(directory, run, played, lines, bag=bag)
+    print(f"wrote {directory}: {', '.join(names)}")
+    return 0
+
+
+def _chosen(swept: ReadSweep | None, word: str) -> tuple[Run, Row | None]:
+    """The run, and its row where there is one."""
+    if swept is None:
+        return read_run(word), None
+    if word.isdecimal():
+        if int(word) >= len(swept.rows):
+            raise InputError(f"{word}: the table has {len(swept.rows)} rows; give 0 or more")
+        row = swept.rows[int(word)]
+        return Run(*(row[name] for name in Run._fields)), row
+    run = read_run(word)
+    for row in swept.rows:
+        if run == tuple(row[name] for name in Run._fields):
+            return run, row
+    raise InputError(f"{word}: not a run of this sweep; give one of its table, or no directory")
+
+
+def _same(row: Row, made: Row) -> bool:
+    return all(repr(row.get(name)) == repr(value) for name, value in made.items())
+
+
+@contextmanager
+def _patience(patience_s: float) -> Iterator[None]:
+    """A planner that hangs is interrupted; one that hangs in machine code takes a Ctrl-C."""
+
+    def interrupt(*_: Any) -> None:
+        raise HungError(f"hung: no end after {patience_s:g} s of wall time")
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, patience_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _oracle(played: Played, setting: Setting) -> Iterator[str]:
+    solution = solve(played.episode.scenario, setting.params.speed_mps)
+    way = f", {solution.length_m:.3f} m" if solution.waypoints else ""
+    yield f"oracle: {solution.certificate.value} at {solution.speed_mps:g} m/s{way}"
+
+
+def _write(directory: Path, run: Run, played: Played, lines: list[str], *, bag: bool) -> list[str]:
+    episode = played.episode
+    directory.mkdir(parents=True)
+    names = ["explanation.txt"]
+    write_new(directory / names[0], ("\n".join(lines) + "\n").encode())
+    if not episode.ticks:
+        return names
+    from ..report.figure import draw_run
+    from ..report.moment import moment_png
+
+    draw_run(episode, directory / "run.png")
+    index = contact_index(episode)
+    index = len(episode.ticks) - 1 if index is None else index
+    write_new(directory / "moment.png", moment_png(episode, index, str(run), lines[1:2]))
+    names += ["run.png", "moment.png"]
+    if bag:
+        from ..ros.episode_bag import write_episode_bag
+
+        write_episode_bag(episode, directory / "bag", {"planner": run.planner})
+        names.append("bag")
+    return names

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba sweep`: a suite of worlds x planners x seeds -> one table and a report; needs no ROS."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..arguments import Parser
+from ..core.options import flatten
+from ..core.planner import PlannerParams
+from ..core.sensing import SensorParams
+from ..launcher.options import add_set_argument, with_settings
+from ..outputs import new_run_directory, write_same
+from ..planners.registry import PLANNERS
+from ..study.compute import check_workers
+from ..sweep.columns import COLUMNS, TIMINGS
+from ..sweep.order import PATIENCE_S, PERCEPTIONS, Order, Setting
+from ..sweep.parts import parts_of
+from ..sweep.run import Swept, dask_executor, open_store, sweep
+from ..sweep.table import write
+from ..watched import add_work_arguments, progress, say
+from ..worlds import suite_names
+from ..worlds.suites import SPEED_MPS
+
+_DESCRIPTION = """Run planners in the worlds of a suite and tell how good they are.
+
+Everything goes into a directory: the table (a row per run), timings.csv (what the clock said; all
+else is the same whoever computes it), report.md, and the finished parts of the runs, so that an
+interrupted command goes on where it was when called again with --out. `mfba show` explains a run.
+"""
+
+
+def main(args: list[str]) -> int:
+    """Make the sweep."""
+    found = _parser().parse(args)
+    check_workers(found.workers)
+    order = _order(found)
+    directory = found.out or new_run_directory(stem="sweep")
+    store = open_store(directory, order)
+    with _executor(found.scheduler) as executor, progress(parts_of(order), directory) as done:
+        swept = sweep(
+            order, workers=found.workers, executor=executor, store=store, done=done, say=say
+        )
+    names = [f"table.{found.format}", "timings.csv"]
+    write(directory / names[0], swept.rows, COLUMNS)
+    write(directory / names[1], swept.timings, TIMINGS)
+    _report(swept, directory)
+    print(f"wrote {directory}: {', '.join([*names, 'report.md'])}")
+    print(f"sorted hash {swept.hash}")
+    return 0
+
+
+def _parser() -> Parser:
+    lines = [f"  {name:<19} {meaning}" for name, (_, meaning) in {**COLUMNS, **TIMINGS}.items()]
+    parser = Parser(
+        prog="mfba sweep",
+        description=_DESCRIPTION,
+        epilog="columns of the table, and of timings.csv:\n" + "\n".join(lines),
+    )
+    parser.add_argument("suite", metavar="SUITE", help=f"one of {', '.join(suite_names())}")
+    parser.add_argument(
+        "--planner", action="append", default=[], metavar="NAME", dest="planners",
+        help=f"one of {', '.join(PLANNERS)}, or MODULE:NAME; may be repeated (default: paper)",
+    )  # fmt: skip
+    for name, default, what in (
+        ("--worlds", 100, "how many worlds"),
+        ("--first", 0, "first of them"),
+        ("--seeds", 1, "seeds per world and planner"),
+        ("--suite-seed", 0, "seed of all worlds"),
+        ("--latency", 0, "age of what is perceived, ticks"),
+    ):
+        parser.add_argument(
+            name, type=int, default=default, metavar="N", help=f"{what} (default: {default})"
+        )
+    parser.add_argument(
+        "--perception", choices=PERCEPTIONS, default="known",
+        help="known: circles within SR with velocities; scan-N: N beams (default: known)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--noise", type=float, default=0.0, metavar="M", help="its standard deviation, m"
+    )
+    parser.add_argument(
+        "--no-oracle", action="store_true", help="leave out the optimum, gap, SPL and BARN score"
+    )
+    parser.add_argument(
+        "--patience", type=float, default=PATIENCE_S, metavar="S",
+        help="wall time after which a run counts as hanging (default: 60)",
+    )  # fmt: skip
+    add_set_argument(parser)
+    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="tcp://HOST:PORT of a dask.distributed scheduler"
+    )
+    add_work_arguments(parser)
+    return parser
+
+
+def _order(found: argparse.Namespace) -> Order:
+    params, sensor = with_settings(
+        PlannerParams(speed_mps=SPEED_MPS), SensorParams(), found.settings
+    )
+    return Order(
+        suite=found.suite,
+        planners=tuple(found.planners or ["paper"]),
+        worlds=found.worlds,
+        first=found.first,
+        seeds=found.seeds,
+        oracle=not found.no_oracle,
+        setting=Setting(
+            params=params,
+            sensor=sensor,
+            perception=found.perception,
+            noise_m=found.noise,
+            latency_ticks=found.latency,
+            suite_seed=found.suite_seed,
+            patience_s=found.patience,
+        ),
+    )
+
+
+@contextmanager
+def _executor(scheduler: str | None) -> Iterator[Executor | None]:
+    if scheduler is None:
+        yield None
+        return
+    with dask_executor(scheduler) as executor:
+        yield executor
+
+
+def command(order: Order) -> str:
+    """The command that makes this sweep, however it was typed."""
+    one, plain = order.setting, Setting()
+    words = ["mfba", "sweep", order.suite]
+    for planner in order.planners:
+        words += ["--planner", planner]
+    words += ["--worlds", str(order.worlds)]
+    for name, value, default in (
+        ("--first", order.first, 0),
+        ("--seeds", order.seeds, 1),
+        ("--suite-seed", one.suite_seed, 0),
+        ("--perception", one.perception, plain.perception),
+        ("--noise", one.noise_m, 0.0),
+        ("--latency", one.latency_ticks, 0),
+        ("--patience", one.patience_s, PATIENCE_S),
+    ):
+        if value != default:
+            words += [name, str(value)]
+    words += [] if order.oracle else ["--no-oracle"]
+    for group, mine, theirs in (
+        ("planner", one.params, plain.params),
+        ("sensor", one.sensor, plain.sensor),
+    ):
+        usual = flatten(theirs)
+        for name, value in flatten(mine).items():
+            if value != usual[name]:
+                words += ["--set", f"{group}.{name}={value}"]
+    return shlex.join(words)
+
+
+def _report(swept: Swept, directory: Path) -> None:
+    from rich.console import Console
+
+    from ..report.console import print_encodable
+    from ..report.sweep import tables, to_markdown
+    from ..sweep.summary import comparisons, standings
+
+    order = swept.order
+    found, pairs = standings(swept.rows, swept.timings), comparisons(swept.rows)
+    title = f"{order.suite}: {order.worlds} worlds from {order.first} on, {order.seeds} seeds each"
+    facts = [f"`{command(order)}`", f"sorted hash of the table `{swept.hash}`"]
+    write_same(directory / "report.md", to_markdown(found, pairs, title, facts).encode())
+    console = Console()
+    for table in tables(found, pairs, title):
+        print_encodable(console, lambda encodable, table=table: encodable.print(table))  # type: ignore[misc]

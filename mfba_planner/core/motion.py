@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All obstacles of a scenario at many moments at once: world.py's motion on arrays, same bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .world import Scenario, clearance, stretches_of
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """K steps past N obstacles.
+
+    gap_m (K, N) is the smallest distance of robot and obstacle edges during a step, as
+    step_clearances gives it; contact_s (K, N) the time from its begin until contact if both
+    went on as during the step, 0 in contact, inf for never; distance_m (K + 1, N) is the
+    distance of the centres before each step and after the last.
+    """
+
+    gap_m: Array
+    contact_s: Array
+    distance_m: Array
+
+
+class Motion:
+    """The obstacles of one scenario, ready to be asked for many moments."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take the scenario's numbers apart, once: a row for each stretch between two turns."""
+        self._scenario = scenario
+        obstacles, walls = scenario.obstacles, scenario.walls
+        self.radius_m = np.array([scenario.enlarged_radius(o) for o in obstacles])
+        stretches = [stretches_of(o, walls) if o.turns else ((0.0, o),) for o in obstacles]
+        rows = [row for stretch in stretches for row in stretch]
+        self._since = np.array([since_s for since_s, _ in rows])
+        self._center = _pairs([plain.center_m for _, plain in rows])
+        self._velocity = _pairs([plain.velocity for _, plain in rows])
+        counts = [len(stretch) for stretch in stretches]
+        self._first = np.cumsum([0, *counts[:-1]]) if counts else np.zeros(0, dtype=np.int64)
+        self._turning = [(i, [since for since, _ in s[1:]]) for i, s in enumerate(stretches)]
+        self._turning = [(i, since) for i, since in self._turning if since]
+        self._box: tuple[Array, Array] | None = None
+        if walls is not None:
+            radius = np.array([o.radius_m for o in obstacles])
+            low = np.array(walls.lower_m)[:, None, None] + radius
+            self._box = low, np.array(walls.upper_m)[:, None, None] - radius
+
+    def centers(self, times_s: Array) -> Array:
+        """Centres (2, K, N) in metres at times (K,), bit by bit as center_at gives them."""
+        return self._folded(self._unfolded(times_s, self._rows(times_s)))
+
+    def steps(self, times_s: Array, positions_m: Array) -> Steps:
+        """The robot at positions (2, K + 1) at times (K + 1,), uniform between them."""
+        rows = self._rows(times_s)
+        unfolded = self._unfolded(times_s, rows)
+        centers = self._folded(unfolded)
+        start, end = positions_m[:, :-1, None], positions_m[:, 1:, None]
+        p = centers[:, :-1] - start  # from the robot to the obstacle
+        q = centers[:, 1:] - (start + (end - start)) - p
+        square = q[0] * q[0] + q[1] * q[1]
+        along = p[0] * q[0] + p[1] * q[1]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            s = np.where(square == 0.0, 0.0, -along / square)
+            s = np.minimum(1.0, np.where(s > 0.0, s, 0.0))
+            d = p + s * q
+            nearest = np.sqrt(d[0] * d[0] + d[1] * d[1])
+            dx, dy = centers - positions_m[:, :, None]
+            distance = np.sqrt(dx * dx + dy * dy)
+            contact = self._contact(square, along, distance[:-1], np.diff(times_s)[:, None])
+        # A pose that is not finite was refused; it has no gap.
+        gap = np.where(np.isnan(nearest), np.inf, nearest) - self.radius_m
+        for k, i in np.argwhere(self._may_kink(unfolded, rows)).tolist():
+            (x0, x1), (y0, y1) = positions_m[:, k : k + 2].tolist()
+            t0, t1 = times_s[k : k + 2].tolist()
+            obstacle = self._scenario.obstacles[i]
+            gap[k, i] = clearance(self._scenario, obstacle, t0, t1, (x0, y0), (x1, y1))
+        return Steps(gap, contact, distance)
+
+    def _rows(self, times_s: Array) -> Array:
+        """The stretch that each obstacle is in at each time, (K, N) or (1, N) row numbers."""
+        if not self._turning:
+            return self._first[None, :]
+        rows = np.repeat(self._first[None, :], len(times_s), axis=0)
+        for i, since_s in self._turning:
+            rows[:, i] += np.searchsorted(since_s, times_s, side="right")
+        return rows
+
+    def _unfolded(self, times_s: Array, rows: Array) -> Array:
+        """Where they would be without walls, (2, K, N)."""
+        times = times_s[:, None] - self._since[rows]
+        return self._center[:, rows] + self._velocity[:, rows] * times
+
+    def _folded(self, x: Array) -> Array:
+        """Reflect unbounded coordinates (2, K, N) into the walls, as world.py does."""
+        if self._box is None:
+            return x
+        low, high = self._box
+        length = high - low
+        with np.errstate(invalid="ignore"):  # a room without room: dealt with below
+            offset = np.fmod(x - low, 2.0 * length)
+        offset = np.where(offset < 0.0, offset + 2.0 * length, offset)
+        folded = np.minimum(high, low + np.where(offset <= length, offset, 2.0 * length - offset))
+        folded = np.where(length <= 0.0, low, folded)
+        return np.where((low <= x) & (x <= high), x, folded)
+
+    def _may_kink(self, unfolded: Array, rows: Array) -> Array:
+        """Who may meet a wall or turn between two successive times, (K, N)."""
+        kinks = np.zeros((unfolded.shape[1] - 1, unfolded.shape[2]), dtype=bool)
+        if len(rows) > 1:
+            kinks |= rows[:-1] != rows[1:]
+        if self._box is not None:
+            low, high = self._box
+            with np.errstate(divide="ignore", invalid="ignore"):
+                u = (unfolded - low) / (high - low)
+            u0, u1 = np.minimum(u[:, :-1], u[:, 1:]), np.maximum(u[:, :-1], u[:, 1:])
+            kinks |= np.any(np.ceil(u0) <= np.floor(u1), axis=0)
+        return kinks
+
+    def _contact(self, square: Array, along: Array, distance: Array, duration_s: Array) -> Array:
+        """Seconds until |p + s q| is the enlarged radius: 0 inside, inf when it never is."""
+        excess = distance * distance - self.radius_m * self.radius_m
+        root = along * along - square * excess
+        s = (-along - np.sqrt(root)) / square
+        comes = (along < 0.0) & (root >= 0.0)
+        return np.where(excess < 0.0, 0.0, np.where(comes, s * duration_s, np.inf))
+
+
+def _pairs(rows: list[tuple[float, float]]) -> Array:
+    return np.array(rows, dtype=float).reshape(-1, 2).T

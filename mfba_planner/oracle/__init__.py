@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The oracle: the shortest collision-free trajectory with full knowledge, and certificates."""
+
+from .check import Fault, inspect
+from .solution import Certificate, Solution
+from .solve import solve
+
+__all__ = ["Certificate", "Fault", "Solution", "inspect", "solve"]

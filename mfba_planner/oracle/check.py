@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The independent check: nothing here shares a formula with core's motion or contact.
+
+Obstacles are followed from event to event (a wall hit turns a velocity round, a turn replaces
+it) where core folds; contact is the sign of a quadratic where core projects onto a leg.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from ..core.world import Obstacle, Scenario, Walls
+from .solution import Waypoint
+
+Fault = str
+Piece = tuple[float, float, float, float, float, float]  # begin, end, x, y, vx, vy
+
+SLACK = 1e-9
+
+
+def pieces(obstacle: Obstacle, walls: Walls | None, until_s: float) -> Iterator[Piece]:
+    """The obstacle's motion in [0, until_s], event by event; metres, seconds."""
+    (x, y), (vx, vy) = obstacle.center_m, _polar(obstacle.speed_mps, obstacle.heading_rad)
+    t = 0.0
+    due = list(obstacle.turns)
+    while t < until_s:
+        if walls is not None:
+            r = obstacle.radius_m
+            x, vx = _inwards(x, vx, walls.lower_m[0] + r, walls.upper_m[0] - r)
+            y, vy = _inwards(y, vy, walls.lower_m[1] + r, walls.upper_m[1] - r)
+        end = min(until_s, due[0].at_s if due else math.inf)
+        if walls is not None:
+            end = min(
+                end,
+                t + _until_wall(x, vx, walls.lower_m[0] + r, walls.upper_m[0] - r),
+                t + _until_wall(y, vy, walls.lower_m[1] + r, walls.upper_m[1] - r),
+            )
+        if end > t:
+            yield t, end, x, y, vx, vy
+        x, y, t = x + vx * (end - t), y + vy * (end - t), end
+        while due and due[0].at_s <= t:
+            turn = due.pop(0)
+            vx, vy = _polar(turn.speed_mps, turn.heading_rad)
+
+
+def _polar(speed: float, heading: float) -> tuple[float, float]:
+    return speed * math.cos(heading), speed * math.sin(heading)
+
+
+def _inwards(value: float, speed: float, low: float, high: float) -> tuple[float, float]:
+    """At a wall the speed points away from it; no room at all means no motion."""
+    if high <= low:
+        return low, 0.0
+    if value <= low + SLACK * 1e-3:
+        return max(value, low), abs(speed)
+    if value >= high - SLACK * 1e-3:
+        return min(value, high), -abs(speed)
+    return value, speed
+
+
+def _until_wall(value: float, speed: float, low: float, high: float) -> float:
+    if speed == 0.0:
+        return math.inf
+    return ((high if speed > 0.0 else low) - value) / speed
+
+
+def clearance(scenario: Scenario, waypoints: Sequence[Waypoint]) -> float:
+    """Smallest gap (m) to any enlarged circle along straight legs; negative in contact."""
+    smallest = math.inf
+    for obstacle in scenario.obstacles:
+        radius = obstacle.radius_m + scenario.robot_radius_m
+        for piece in pieces(obstacle, scenario.walls, waypoints[-1].t_s):
+            for a, b in pairwise(waypoints):
+                begin, end = max(piece[0], a.t_s), min(piece[1], b.t_s)
+                if begin <= end and a.t_s < b.t_s:
+                    smallest = min(smallest, _apart(a, b, piece, begin, end) - radius)
+    return smallest
+
+
+def _apart(a: Waypoint, b: Waypoint, piece: Piece, begin: float, end: float) -> float:
+    """Smallest distance in [begin, end]: the least value of A t^2 + B t + C, rooted."""
+    since, _, x, y, vx, vy = piece
+    ux, uy = (b.x - a.x) / (b.t_s - a.t_s), (b.y - a.y) / (b.t_s - a.t_s)
+    gx = (a.x + ux * (begin - a.t_s)) - (x + vx * (begin - since))
+    gy = (a.y + uy * (begin - a.t_s)) - (y + vy * (begin - since))
+    A = (ux - vx) ** 2 + (uy - vy) ** 2
+    B = 2.0 * (gx * (ux - vx) + gy * (uy - vy))
+    C = gx * gx + gy * gy
+    span = end - begin
+    least = min(C, (A * span + B) * span + C)
+    if B < 0.0 and 2.0 * A * span > -B:
+        least = C - B * B / (4.0 * A)
+    return math.sqrt(max(0.0, least))
+
+
+def inspect(
+    scenario: Scenario, waypoints: Sequence[Waypoint], speed_mps: float
+) -> tuple[float, Fault]:
+    """Smallest clearance (m) and what is wrong with a trajectory, "" for nothing.
+
+    It has to lead from start to goal, from t = 0 on, at speed_mps on every leg (to 1e-6 of
+    it), within the scenario's time limit and without contact.
+    """
+    if len(waypoints) < 2 or waypoints[0] != (0.0, *scenario.start_m):
+        return -math.inf, "does not begin at start_m at t = 0"
+    if waypoints[-1].point != scenario.goal_m:
+        return -math.inf, "does not end at goal_m"
+    if waypoints[-1].t_s > scenario.time_limit_s:
+        return -math.inf, f"ends after the time limit of {scenario.time_limit_s:g} s"
+    for a, b in pairwise(waypoints):
+        way, time = math.hypot(b.x - a.x, b.y - a.y), b.t_s - a.t_s
+        if time < 0.0 or abs(way - speed_mps * time) > 1e-6 * speed_mps * time + SLACK:
+            return -math.inf, f"moves {way:.9g} m in {time:.9g} s at t = {a.t_s:.9g} s"
+    smallest = clearance(scenario, waypoints)
+    if smallest < 0.0:
+        return smallest, f"touches an enlarged circle ({-smallest:.3g} m inside)"
+    return smallest, ""

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many trajectories at once: straight legs at constant speed against legs of obstacles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.legs import Legs
+from ..core.world import Walls
+
+FAR_M = 9.0  # gap reported for a pair that never moves at the same time
+
+
+def lengths(points: np.ndarray) -> np.ndarray:
+    """Length (b,) of every polyline; points (b, p, 2) in metres."""
+    step = points[:, 1:] - points[:, :-1]
+    return np.sqrt((step * step).sum(axis=2)).sum(axis=1)
+
+
+def gaps(points: np.ndarray, speed_mps: float, legs: Legs) -> np.ndarray:
+    """Smallest gap (b, p - 1, m) in metres of every robot leg to every obstacle leg."""
+    step = points[:, 1:] - points[:, :-1]
+    way = np.sqrt((step * step).sum(axis=2))
+    end = np.cumsum(way, axis=1) / speed_mps
+    begin = end - way / speed_mps
+    u = step * (speed_mps / np.maximum(way, 1e-12))[:, :, None]
+    return edge_gaps(
+        points[:, :-1, 0, None],
+        points[:, :-1, 1, None],
+        begin[:, :, None],
+        end[:, :, None],
+        u[:, :, 0, None],
+        u[:, :, 1, None],
+        legs,
+    )
+
+
+def edge_gaps(
+    x: np.ndarray,
+    y: np.ndarray,
+    begin: np.ndarray,
+    end: np.ndarray,
+    ux: np.ndarray,
+    uy: np.ndarray,
+    legs: Legs,
+) -> np.ndarray:
+    """Smallest gap of robot legs (from x, y at begin, velocity u, until end) to obstacle legs.
+
+    The robot's arrays have a last axis of 1, over which the m obstacle legs are broadcast.
+    """
+    low = np.maximum(begin, legs.t0)
+    span = np.minimum(end, legs.t1) - low
+    qx, qy = ux - legs.vx, uy - legs.vy
+    since = low - legs.t0
+    ahead = low - begin
+    px = x + ux * ahead - legs.x - legs.vx * since
+    py = y + uy * ahead - legs.y - legs.vy * since
+    qq = np.maximum(qx * qx + qy * qy, 1e-300)
+    s = np.minimum(np.maximum(-(px * qx + py * qy) / qq, 0.0), span)
+    px += qx * s
+    py += qy * s
+    gap: np.ndarray = np.sqrt(px * px + py * py) - legs.radius
+    gap[span < 0.0] = FAR_M
+    return gap
+
+
+def within(area: Walls | None, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Which points lie in a rectangle; all when there is none."""
+    if area is None:
+        return np.ones(np.shape(x), dtype=bool)
+    (x0, y0), (x1, y1) = area.lower_m, area.upper_m
+    inside: np.ndarray = (x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1)
+    return inside

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Proof that a goal cannot be reached: a sweep of all places where the robot might be.
+
+The sweep errs on the robot's side in everything: a cell counts as free unless it lies wholly
+inside a circle, circles are looked at only at the ticks of the time grid, every step is
+rounded up to whole cells, speeds from 0 to the robot's own are allowed, and whoever leaves
+the area may come back anywhere at any later time. What it cannot reach, nobody can.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.legs import Legs
+from ..core.world import Scenario
+
+GOAL_TOLERANCE_M = 0.05  # more than any planner of ours is granted
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReachParams:
+    """The grid of the proof."""
+
+    cell_m: float = 0.075
+    step_s: float = 0.25
+    border_m: float = 3.0  # beyond start, goal and walls
+
+
+def unreachable(
+    scenario: Scenario, speed_mps: float, legs: Legs, params: ReachParams | None = None
+) -> str:
+    """Why no trajectory at up to speed_mps can reach the goal, "" when that is not proven.
+
+    legs must cover the scenario's time limit.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    p = params or ReachParams()
+    xs, ys = _axes(scenario, p)
+    half = p.cell_m / math.sqrt(2.0)
+    gx, gy = scenario.goal_m
+    goal = np.hypot(xs[:, None] - gx, ys[None, :] - gy) <= half + GOAL_TOLERANCE_M
+    sx, sy = scenario.start_m
+    reached = np.hypot(xs[:, None] - sx, ys[None, :] - sy) <= half + 1e-9
+    edge = np.zeros_like(reached)
+    edge[[0, -1], :] = edge[:, [0, -1]] = True
+    # from anywhere in one cell to anywhere in another: centres apart by the way and a diagonal
+    stride = (speed_mps * p.step_s + 2.0 * half) / p.cell_m + 1e-9
+    outside = False
+    for tick in range(1, math.ceil(scenario.time_limit_s / p.step_s) + 1):
+        before_s, now_s = (tick - 1) * p.step_s, tick * p.step_s
+        outside = outside or bool((reached & edge).any())
+        reached = distance_transform_edt(~reached) <= stride
+        if outside:
+            reached |= edge
+        if (reached & goal).any() and not _shut(scenario, legs, before_s, now_s):
+            return ""
+        reached &= ~_covered(xs, ys, legs, now_s, half)
+        if not reached.any():
+            return f"contact cannot be avoided beyond t = {now_s:g} s"
+    return f"goal_m cannot be reached within the time limit of {scenario.time_limit_s:g} s"
+
+
+def _shut(scenario: Scenario, legs: Legs, begin_s: float, end_s: float) -> bool:
+    """Whether one circle holds the goal, tolerance included, all the time in between.
+
+    The distance to uniform motion is convex in t: it is largest at the ends of each leg.
+    """
+    gx, gy = scenario.goal_m
+    meanwhile = (legs.t0 <= end_s) & (legs.t1 >= begin_s)
+    furthest = np.zeros(len(legs.t0))
+    for t in (np.maximum(legs.t0, begin_s), np.minimum(legs.t1, end_s)):
+        x, y = legs.x + legs.vx * (t - legs.t0), legs.y + legs.vy * (t - legs.t0)
+        furthest = np.maximum(furthest, np.hypot(x - gx, y - gy))
+    holds = furthest + GOAL_TOLERANCE_M < legs.radius
+    return any(
+        holds[(legs.obstacle == obstacle) & meanwhile].all()
+        for obstacle in set(legs.obstacle[meanwhile].tolist())
+    )
+
+
+def _axes(scenario: Scenario, p: ReachParams) -> tuple[np.ndarray, np.ndarray]:
+    """Centres of the cells along x and y."""
+    corners = [scenario.start_m, scenario.goal_m]
+    if scenario.walls is not None:
+        corners += [scenario.walls.lower_m, scenario.walls.upper_m]
+    low = np.min(corners, axis=0) - p.border_m
+    high = np.max(corners, axis=0) + p.border_m
+    return tuple(np.arange(a, b, p.cell_m) for a, b in zip(low, high))  # type: ignore[return-value]
+
+
+def _covered(xs: np.ndarray, ys: np.ndarray, legs: Legs, t_s: float, half: float) -> np.ndarray:
+    """Cells that lie wholly inside an enlarged circle at time t."""
+    covered = np.zeros((len(xs), len(ys)), dtype=bool)
+    now = np.flatnonzero((legs.t0 <= t_s) & (t_s <= legs.t1))
+    for m in now.tolist():
+        cx = legs.x[m] + legs.vx[m] * (t_s - legs.t0[m])
+        cy = legs.y[m] + legs.vy[m] * (t_s - legs.t0[m])
+        r = legs.radius[m] - half - 1e-9
+        i = slice(*np.searchsorted(xs, (cx - r, cx + r)))
+        j = slice(*np.searchsorted(ys, (cy - r, cy + r)))
+        covered[i, j] |= (xs[i, None] - cx) ** 2 + (ys[None, j] - cy) ** 2 < r * r
+    return covered

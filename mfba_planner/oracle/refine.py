@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a way that is free to the shortest one next to it: shortcuts, then via points that move."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..core.legs import Legs
+from ..core.world import Walls
+from .polyline import gaps, lengths, within
+from .tangents import CLEAR_M
+
+_NEAR_M = 1.5  # obstacle legs further away are looked at only in the end
+_PAIR_M = 0.05  # pairs of legs closer than this are constraints
+_BEND_RAD = 0.12  # a sharper bend becomes several: r a^3 / 12 longer than the arc
+_DIFFERENCE_M = 1e-7
+_MOST_POINTS = 40  # SLSQP's time grows with their cube; a way that has to wait has many
+
+
+def refine(
+    way: np.ndarray, speed_mps: float, legs: Legs, inside: Walls | None = None
+) -> np.ndarray | None:
+    """The shortest free polyline (p, 2) found next to a way, None when the way is not free."""
+    if not _free(way, speed_mps, legs):
+        return None
+    best = _shortcut(way, speed_mps, legs)
+    for split in (False, True):
+        trial = _bend_finer(best) if split else best
+        if trial is None:
+            break
+        tight = _tighten(trial, speed_mps, legs, inside)
+        if tight is None:
+            continue
+        tight = _shortcut(tight, speed_mps, legs)
+        if lengths(tight[None])[0] < lengths(best[None])[0]:
+            best = tight
+    return best
+
+
+def _free(points: np.ndarray, speed_mps: float, legs: Legs) -> bool:
+    return bool(gaps(points[None], speed_mps, legs).min(initial=math.inf) >= 0.0)
+
+
+def _shortcut(points: np.ndarray, speed_mps: float, legs: Legs) -> np.ndarray:
+    """Leave out via points, the one that saves most first, while the way stays free."""
+    while len(points) > 2:
+        k = np.arange(1, len(points) - 1)
+        trials = np.stack([np.delete(points, one, axis=0) for one in k])
+        free = gaps(trials, speed_mps, legs).min(axis=(1, 2)) >= 0.0
+        if not free.any():
+            return points
+        new = np.where(free, lengths(trials), math.inf)
+        points = trials[int(new.argmin())]
+    return points
+
+
+def _bend_finer(points: np.ndarray) -> np.ndarray | None:
+    """Put three via points in the place of every sharp bend; None without one."""
+    finer = [points[0]]
+    for before, here, after in zip(points, points[1:], points[2:]):
+        a, b = here - before, after - here
+        la, lb = math.hypot(*a), math.hypot(*b)
+        if la < 1e-6 or lb < 1e-6:
+            finer.append(here)
+            continue
+        bend = abs(math.atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]))
+        if bend < _BEND_RAD:
+            finer.append(here)
+            continue
+        back = min(0.3 * bend, 0.4 * la)  # about half the arc round a circle of 0.6 m
+        on = min(0.3 * bend, 0.4 * lb)
+        finer += [here - a * (back / la), here, here + b * (on / lb)]
+    finer.append(points[-1])
+    return np.array(finer) if len(finer) > len(points) else None
+
+
+def _tighten(
+    points: np.ndarray, speed_mps: float, legs: Legs, inside: Walls | None
+) -> np.ndarray | None:
+    """Minimise the length over the via points (SLSQP); None when the result is not free."""
+    if not 2 < len(points) <= _MOST_POINTS:
+        return None
+    near = gaps(points[None], speed_mps, legs)[0].min(axis=0) < _NEAR_M
+    local = Legs(*(column[near] for column in legs))
+    pairs = gaps(points[None], speed_mps, local)[0] < _PAIR_M
+    for margin in (CLEAR_M, 2.0 * CLEAR_M, 2e-4):
+        problem = _Problem(points, speed_mps, local, pairs, margin)
+        found = problem.solve(inside)
+        gap = gaps(found[None], speed_mps, local)[0]
+        if (
+            gap.min(initial=math.inf) >= 0.0
+            and _free(found, speed_mps, legs)
+            and within(inside, *found.T).all()
+        ):
+            return found
+        pairs = pairs | (gap < _PAIR_M)
+    return None
+
+
+class _Problem:
+    """Length of a polyline with fixed ends, subject to the gaps of some pairs of legs."""
+
+    def __init__(
+        self,
+        points: np.ndarray,
+        speed_mps: float,
+        legs: Legs,
+        pairs: np.ndarray,
+        margin: float,
+    ) -> None:
+        self.points, self.v, self.legs, self.margin = points, speed_mps, legs, margin
+        self.rows, self.columns = np.nonzero(pairs)
+
+    def solve(self, inside: Walls | None) -> np.ndarray:
+        """The via points that SLSQP ends with, feasible or not."""
+        from scipy.optimize import minimize
+
+        bounds = None
+        if inside is not None:
+            bounds = [*zip(inside.lower_m, inside.upper_m)] * (len(self.points) - 2)
+
+        constraints = {"type": "ineq", "fun": self.slack, "jac": self.slack_gradient}
+        found = minimize(
+            self.length,
+            self.points[1:-1].ravel(),
+            jac=self.length_gradient,
+            method="SLSQP",
+            bounds=bounds,
+            constraints=[constraints] if len(self.rows) else [],
+            options={"maxiter": 60, "ftol": 1e-7},
+        )
+        return self.full(found.x[None])[0]
+
+    def full(self, x: np.ndarray) -> np.ndarray:
+        """Polylines (b, p, 2) of via points (b, 2 (p - 2))."""
+        b = len(x)
+        points = np.empty((b, *self.points.shape))
+        points[:, 0], points[:, -1] = self.points[0], self.points[-1]
+        points[:, 1:-1] = x.reshape(b, -1, 2)
+        return points
+
+    def length(self, x: np.ndarray) -> float:
+        """The objective, metres."""
+        return float(lengths(self.full(x[None]))[0])
+
+    def length_gradient(self, x: np.ndarray) -> np.ndarray:
+        """Of length(): at every via point, unit vector in minus unit vector out."""
+        step = np.diff(self.full(x[None])[0], axis=0)
+        unit = step / np.maximum(np.sqrt((step * step).sum(axis=1)), 1e-9)[:, None]
+        gradient: np.ndarray = (unit[:-1] - unit[1:]).ravel()
+        return gradient
+
+    def slack(self, x: np.ndarray) -> np.ndarray:
+        """Gaps of the pairs above the margin, metres."""
+        return self._slacks(x[None])[0]
+
+    def slack_gradient(self, x: np.ndarray) -> np.ndarray:
+        """Of slack(), (pairs, via coordinates), by differences, all at once."""
+        trials = np.concatenate([x[None], x + _DIFFERENCE_M * np.eye(len(x))])
+        slacks = self._slacks(trials)
+        gradient: np.ndarray = ((slacks[1:] - slacks[0]) / _DIFFERENCE_M).T
+        return gradient
+
+    def _slacks(self, x: np.ndarray) -> np.ndarray:
+        all_gaps = gaps(self.full(x), self.v, self.legs)
+        slacks: np.ndarray = all_gaps[:, self.rows, self.columns] - self.margin
+        return slacks

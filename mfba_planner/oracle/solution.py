@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the oracle hands out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+from ..core.geometry import Point
+
+
+class Certificate(Enum):
+    """What is known about a world for a robot of one speed."""
+
+    FEASIBLE = "feasible"  # a trajectory at constant speed is at hand, checked independently
+    INFEASIBLE = "infeasible"  # proven for a time grid: not even slowing and waiting help
+    UNDECIDED = "undecided"
+
+
+class Waypoint(NamedTuple):
+    """Where the robot is when, in seconds and metres."""
+
+    t_s: float
+    x: float
+    y: float
+
+    @property
+    def point(self) -> Point:
+        """(x, y) in metres."""
+        return (self.x, self.y)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solution:
+    """The shortest trajectory found at constant speed; length inf and no waypoints without one.
+
+    length_m is an upper bound of the true optimum, straight_m a lower bound.
+    """
+
+    certificate: Certificate
+    speed_mps: float
+    straight_m: float
+    waypoints: tuple[Waypoint, ...] = ()
+    clearance_m: float = math.inf  # smallest, by the independent check
+    reason: str = ""
+
+    @property
+    def length_m(self) -> float:
+        """Length of the trajectory in metres."""
+        return self.waypoints[-1].t_s * self.speed_mps if self.waypoints else math.inf
+
+    @property
+    def detour(self) -> float:
+        """Length / straight line: 1 for a world that needs no avoidance at all."""
+        return self.length_m / self.straight_m

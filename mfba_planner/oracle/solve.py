@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The oracle itself: straight line, tangents, refinement, proof, lattice, independent check."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..core.errors import ConfigError
+from ..core.geometry import distance
+from ..core.legs import Legs, uniform_legs
+from ..core.world import Scenario, Walls
+from .check import inspect
+from .lattice import LatticeParams, lattice_ways
+from .polyline import gaps, lengths
+from .reach import unreachable
+from .refine import refine
+from .solution import Certificate, Solution, Waypoint
+from .tangents import CLEAR_M, Search, SearchParams
+
+_LONG, _VERY_LONG = 1.05, 1.08  # times the straight line
+_FINE = LatticeParams(step_s=0.6, headings=48, cell_m=0.1)
+_COARSE = LatticeParams()
+
+
+def solve(
+    scenario: Scenario,
+    speed_mps: float,
+    params: SearchParams | None = None,
+    *,
+    inside: Walls | None = None,
+) -> Solution:
+    """The shortest collision-free trajectory found at constant speed, with full knowledge.
+
+    The robot may cross walls, as in every run; inside keeps its centre within a rectangle
+    (start and goal have to lie in it). Raises ConfigError for a speed that is none.
+    """
+    if not (math.isfinite(speed_mps) and speed_mps > 0.0):
+        raise ConfigError(f"speed_mps={speed_mps}: no speed; give a number above 0")
+    task = _Task(scenario, speed_mps, params or SearchParams(), inside)
+    reason = ""
+    for points in task.ways():
+        waypoints = _timed(scenario, points, speed_mps)
+        smallest, reason = inspect(scenario, waypoints, speed_mps)
+        if not reason:
+            return Solution(
+                certificate=Certificate.FEASIBLE,
+                speed_mps=speed_mps,
+                straight_m=task.straight_m,
+                waypoints=waypoints,
+                clearance_m=smallest,
+            )
+    return Solution(
+        certificate=Certificate.INFEASIBLE if task.proof else Certificate.UNDECIDED,
+        speed_mps=speed_mps,
+        straight_m=task.straight_m,
+        reason=task.proof or reason or "no way found, and no proof that there is none",
+    )
+
+
+def _timed(scenario: Scenario, points: np.ndarray, speed_mps: float) -> tuple[Waypoint, ...]:
+    """Waypoints along a polyline from t = 0 on; the ends are the scenario's own."""
+    places = [scenario.start_m, *map(tuple, points[1:-1].tolist()), scenario.goal_m]
+    waypoints = [Waypoint(0.0, *scenario.start_m)]
+    travelled = 0.0
+    for before, (x, y) in zip(places, places[1:]):
+        travelled += math.dist(before, (x, y))
+        waypoints.append(Waypoint(travelled / speed_mps, x, y))
+    return tuple(waypoints)
+
+
+def _length(points: np.ndarray) -> float:
+    return float(lengths(points[None])[0])
+
+
+class _Task:
+    """One world for one speed: what has been tried, what was found."""
+
+    def __init__(
+        self, scenario: Scenario, speed_mps: float, params: SearchParams, inside: Walls | None
+    ) -> None:
+        self.scenario, self.v, self.params, self.inside = scenario, speed_mps, params, inside
+        self.straight = np.array([scenario.start_m, scenario.goal_m])
+        self.straight_m = distance(scenario.start_m, scenario.goal_m)
+        self.active: set[int] = set()
+        self.proof = ""
+
+    def ways(self) -> Iterator[np.ndarray]:
+        """Ways worth a check, the best first; each effort is made when the last one failed."""
+        limit_s = self.scenario.time_limit_s
+        straight_s = self.straight_m / self.v
+        if straight_s > limit_s:
+            self.proof = f"the straight way alone takes {straight_s:g} s of {limit_s:g} s"
+            return
+        horizon_s = min(limit_s, 1.5 * straight_s + 5.0)
+        legs = uniform_legs(self.scenario, horizon_s)
+        touched = self._touched(self.straight, legs)
+        if not touched:
+            yield self.straight
+            return
+        self.active |= touched
+        if found := self._refined(self._by_tangents(legs), legs):
+            yield from self._seconded(found, legs)
+            return
+        legs = uniform_legs(self.scenario, limit_s)
+        self.proof = unreachable(self.scenario, self.v, legs)
+        if self.proof:
+            return
+        if horizon_s < limit_s and (found := self._refined(self._by_tangents(legs), legs)):
+            yield from self._seconded(found, legs)
+            return
+        for times in (1.25, 2.5, 5.0):
+            until_s = min(limit_s, times * straight_s)
+            if found := self._refined(self._by_lattice(legs, until_s, _COARSE), legs):
+                yield from found
+                return
+
+    def _refined(self, ways: list[np.ndarray], legs: Legs) -> list[np.ndarray]:
+        """The ways, refined, the best first."""
+        tried = (refine(way, self.v, legs, self.inside) for way in ways)
+        return sorted((points for points in tried if points is not None), key=_length)
+
+    def _seconded(self, ways: list[np.ndarray], legs: Legs) -> list[np.ndarray]:
+        """Ask the lattice too where the tangents' way is long.
+
+        Such a robot is early for a gap that opens, and how it spends the time it has left is
+        what tangents know least about.
+        """
+        best_m = _length(ways[0])
+        if best_m <= _LONG * self.straight_m:
+            return ways
+        params = _FINE if best_m <= _VERY_LONG * self.straight_m else _COARSE
+        others = self._refined(self._by_lattice(legs, best_m / self.v, params), legs)
+        return sorted([*ways, *others], key=_length)
+
+    def _touched(self, way: np.ndarray, legs: Legs) -> set[int]:
+        """Obstacles that a way runs into."""
+        gap = gaps(way[None], self.v, legs)[0]
+        return set(legs.obstacle[(gap < CLEAR_M / 2.0).any(axis=0)].tolist())
+
+    def _by_tangents(self, legs: Legs) -> list[np.ndarray]:
+        """Shortest ways among a few obstacles; whom the best one touches joins them.
+
+        What is shortest among some obstacles and free of all is shortest among all.
+        """
+        start, goal = self.scenario.start_m, self.scenario.goal_m
+        while True:
+            some = legs.of(sorted(self.active))
+            ways = Search(start, goal, self.v, some, self.params, self.inside).ways()
+            if not ways:
+                return []
+            touched = self._touched(ways[0], legs)
+            if not touched - self.active:
+                return [way for way in ways if not self._touched(way, legs)]
+            self.active |= touched
+
+    def _by_lattice(
+        self, legs: Legs, limit_s: float, params: LatticeParams
+    ) -> list[np.ndarray]:
+        start, goal = self.scenario.start_m, self.scenario.goal_m
+        return lattice_ways(start, goal, self.v, legs, limit_s, params, self.inside)

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run of the core driver as the bag that the graph would have recorded of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from rclpy.serialization import serialize_message
+
+from ..core.episode import Episode, Outcome
+from ..core.planner import Decision
+from ..core.sensing import sense_circles
+from ..recording.configuration import attach_configuration
+from ..recording.writer import BagWriter
+from ..run_config import Driver, RunConfig, node_parameters, run_facts
+from ..scenarios import scenario_to_json
+from . import convert, topics
+from .qos import offered
+from .serialized import type_name
+
+_FRAME, _BASE = "odom", "base_link"
+_SAID = (
+    topics.CLOCK, topics.ODOM, topics.OBSTACLES, topics.SECTORS, topics.SENSORY_VECTOR,
+    topics.GOAL_POSE, topics.GOAL_STEP, topics.PLAN, topics.CMD_VEL, topics.DECISION,
+    topics.OUTCOME,
+)  # fmt: skip
+
+
+def write_episode_bag(episode: Episode, directory: Path, facts: Mapping[str, Any] = {}) -> None:
+    """Write a bag with all that is said in every tick; facts go with what explains the run.
+
+    Where a planner read no sectors, the bag holds those that the sensor would have measured.
+    Raises OutputError where nothing can be written; nothing half-written stays behind then.
+    """
+    config = RunConfig(
+        scenario=episode.scenario,
+        planner=episode.planner,
+        sensor=episode.sensor,
+        seed=episode.seed,
+        driver=Driver.CORE,
+    )
+    nodes = node_parameters(config, ())
+    nodes["world_sim"]["scenario_json"] = scenario_to_json(episode.scenario)
+    writer = BagWriter(directory)
+    try:
+        for topic in _SAID:
+            writer.add_topic(_name(topic), type_name(topic.type), offered(topic.qos))
+        attach_configuration(writer, {"nodes": nodes, "run": {**run_facts(config), **facts}})
+        for stamp_ns, topic, message in _messages(episode):
+            writer.write(_name(topic), serialize_message(message), stamp_ns, stamp_ns)
+        writer.close()
+    except BaseException:
+        writer.discard()
+        raise
+
+
+def _name(topic: topics.Topic) -> str:
+    return f"/{topic.name.lstrip('/')}"
+
+
+def _messages(episode: Episode) -> Iterator[tuple[int, topics.Topic, Any]]:
+    """All messages of the run in order: (stamp, topic, message)."""
+    if not episode.ticks:
+        return
+    first, last = episode.ticks[0].stamp_ns, episode.ticks[-1].stamp_ns
+    goal = convert.pose_stamped_msg(episode.scenario.goal_m, first, _FRAME)
+    yield first, topics.GOAL_POSE, goal
+    yield first, topics.OUTCOME, convert.outcome_msg(None, 0)
+    velocity = (0.0, 0.0)
+    for tick in episode.ticks:
+        for topic, message in _tick_messages(episode, tick, velocity):
+            yield tick.stamp_ns, topic, message
+        velocity = tick.velocity
+    if episode.outcome is not Outcome.INTERRUPTED:
+        yield last, topics.OUTCOME, convert.outcome_msg(episode.outcome, len(episode.ticks))
+
+
+def _tick_messages(
+    episode: Episode, tick: Decision, velocity: tuple[float, float]
+) -> Iterator[tuple[topics.Topic, Any]]:
+    """What the world, the sensor and the planner say; velocity is that of the step before."""
+    scenario, stamp, time_s = episode.scenario, tick.stamp_ns, episode.time_s(tick.stamp_ns)
+    circles = scenario.enlarged(time_s)
+    ranges = tick.ranges_m or sense_circles(tick.pose.position, circles, episode.sensor)
+    yield topics.CLOCK, convert.clock_msg(stamp)
+    yield topics.OBSTACLES, convert.obstacles_msg([c for c, _ in circles], stamp, _FRAME)
+    yield topics.ODOM, convert.odometry_msg(tick.pose, velocity, stamp, _FRAME, _BASE)
+    yield (
+        topics.SECTORS,
+        convert.sectors_msg(ranges, episode.sensor, scenario.robot_radius_m, stamp, _FRAME),
+    )
+    yield topics.SENSORY_VECTOR, convert.sensory_vector_msg(tick.vs)
+    yield topics.PLAN, convert.plan_msg(tick, _FRAME)
+    law = episode.planner.bat.algorithm.value
+    yield topics.DECISION, convert.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
+    yield topics.GOAL_STEP, convert.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
+    yield topics.CMD_VEL, convert.twist_msg(tick)

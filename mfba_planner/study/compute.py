@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts computed by any concurrent.futures executor; by default processes of this machine."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
+from typing import TypeVar
+
+from ..core.errors import ConfigError, MfbaError
+from .part import Columns, Part
+from .store import Store
+
+MAX_WORKERS = 256
+TRIES = 3  # of a part whose worker dies
+
+P = TypeVar("P", bound=Part)
+Done = Callable[[P], None]
+
+
+class WorkerDied(Exception):  # noqa: N818
+    """The process that computed a part has gone; the part may be computed elsewhere."""
+
+
+def check_workers(workers: int) -> None:
+    """Raise ConfigError for a number of workers that cannot be."""
+    if not 1 <= workers <= MAX_WORKERS:
+        raise ConfigError(f"--workers={workers}: out of range; give 1 to {MAX_WORKERS}")
+
+
+def compute(
+    parts: Sequence[P],
+    *,
+    workers: int = 1,
+    executor: Executor | None = None,
+    store: Store | None = None,
+    done: Done[P] = lambda _: None,
+    say: Callable[[str], None] = lambda _: None,
+) -> dict[str, Columns]:
+    """Compute (or read back) every part; {name of the part: its columns}.
+
+    done hears of each part, in no certain order; say of each worker that died. Whatever ends
+    this early leaves the parts that were finished in the store. An executor is used as it is
+    and left open; workers counts otherwise. Raises ConfigError for a number of workers that
+    cannot be, MfbaError for a part whose workers died TRIES times.
+    """
+    check_workers(workers)
+    found: dict[str, Columns] = {}
+    missing = []
+    for part in parts:
+        columns = store.read(part) if store else None
+        if columns is None:
+            missing.append(part)
+        else:
+            found[part.name] = columns
+            done(part)
+    for part, columns in _computed(missing, workers, executor, say):
+        if store:
+            store.write(part, columns)
+        found[part.name] = columns
+        done(part)
+    return found
+
+
+def _computed(
+    parts: Sequence[P], workers: int, executor: Executor | None, say: Callable[[str], None]
+) -> Iterator[tuple[P, Columns]]:
+    if executor is None and (workers == 1 or len(parts) < 2):
+        yield from ((part, part.run()) for part in parts)
+        return
+    died: Counter[str] = Counter()
+    left = {part.name: part for part in parts}
+    while left:
+        suspects = [part for part in left.values() if died[part.name]]
+        # What was under way when a worker died is tried again alone: then it is known.
+        batch = suspects[:1] or list(left.values())
+        for part, outcome in _batch(batch, workers, executor):
+            if isinstance(outcome, WorkerDied):
+                died[part.name] += 1
+                _report(part, died[part.name], alone=len(batch) == 1, say=say)
+            else:
+                del left[part.name]
+                yield part, outcome
+
+
+def _report(part: Part, times: int, *, alone: bool, say: Callable[[str], None]) -> None:
+    if alone and times >= TRIES:
+        raise MfbaError(
+            f"{part.name}: a worker process died {times} times on it (out of memory?); run again "
+            "with fewer --workers, finished parts are kept"
+        )
+    say(f"{part.name}: its worker process may have died; trying it again alone")
+
+
+def _batch(
+    parts: Sequence[P], workers: int, executor: Executor | None
+) -> Iterator[tuple[P, Columns | WorkerDied]]:
+    """Ends early where a worker has died: of what was not yet begun nothing is told."""
+    if executor is not None:
+        yield from _gathered(parts, executor, len(parts))
+        return
+    # Spawned, not forked: the parent may have threads, and every platform does the same.
+    workers = min(workers, len(parts))
+    own = ProcessPoolExecutor(
+        workers,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_belong_to_the_parent,
+    )
+    try:
+        yield from _gathered(parts, own, workers + 1)
+    except BaseException:
+        # A worker that a Ctrl-C met while it started may never end; what it does is not needed.
+        for child in multiprocessing.active_children():
+            child.kill()
+        raise
+    finally:
+        own.shutdown(wait=True, cancel_futures=True)
+
+
+def _gathered(
+    parts: Sequence[P], executor: Executor, at_once: int
+) -> Iterator[tuple[P, Columns | WorkerDied]]:
+    """Hand out at_once parts, and one more for each that comes back."""
+    waiting = iter(parts)
+    running: dict[Future[Columns], P] = {}
+    died = False
+    try:
+        running.update((executor.submit(part.run), part) for part in islice(waiting, at_once))
+        while running:
+            finished, _ = wait(running, return_when=FIRST_COMPLETED)
+            outcomes = [(running.pop(future), _outcome(future)) for future in finished]
+            died = died or any(isinstance(outcome, WorkerDied) for _, outcome in outcomes)
+            if not died:
+                more = islice(waiting, len(finished))
+                running.update((executor.submit(part.run), part) for part in more)
+            yield from outcomes
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _outcome(future: Future[Columns]) -> Columns | WorkerDied:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        return WorkerDied()
+    except Exception as error:
+        if type(error).__name__ == "KilledWorker":  # dask's; imported only where it is used
+            return WorkerDied()
+        raise
+
+
+def _belong_to_the_parent() -> None:
+    """Leave Ctrl-C, which reaches all processes of a terminal, to the parent; end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+
+
+def _end_with_the_parent() -> None:
+    """Idle workers of a parent that was killed would wait for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table's columns: what each means, and one row of them from a run."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Mapping
+from typing import Any
+
+from ..core.episode import Outcome
+from ..core.geometry import distance
+from ..core.metrics import assess
+from ..core.scores import barn_score, optimality_gap, spl, time_to_goal_s
+from .order import Run
+from .play import Played
+
+Row = dict[str, Any]
+FAILED = "failed"
+
+# name: (type, meaning); empty where it does not apply, inf for never
+_KEY: dict[str, tuple[type, str]] = {
+    "suite": (str, "suite of worlds"),
+    "world": (int, "number of the world in its suite"),
+    "planner": (str, "planner"),
+    "seed": (int, "seed of the planner and of sensor noise"),
+}
+_MADE: dict[str, tuple[type, str]] = {
+    "outcome": (str, "goal_reached, time_limit, or failed: the planner's own fault"),
+    "failure": (str, "the planner's fault and its tick, empty without one"),
+    "success": (bool, "goal reached without collision"),
+    "length_m": (float, "path length (eq. 1), m"),
+    "time_s": (float, "simulated time of the run, s"),
+    "time_to_goal_s": (float, "the same, inf unless the goal was reached, s"),
+    "ticks": (int, "decisions"),
+    "collisions": (int, "contacts, one per obstacle and unbroken run of ticks"),
+    "hits_moving": (int, "of these, robot into obstacle: it moved as contact began"),
+    "hits_standing": (int, "of these, obstacle into standing robot"),
+    "first_contact_with": (int, "obstacle of the first contact, from 1; 0 is none"),
+    "first_contact_s": (float, "begin of the step that leads to it, s"),
+    "min_clearance_m": (float, "smallest gap between edges, continuous in time, m"),
+    "mean_clearance_m": (float, "smallest gap of each step, mean over the steps, m"),
+    "min_ttc_s": (float, "smallest time to collision, both going on as in the step, s"),
+    "turning_rad": (float, "sum of all turns, rad"),
+    "curvature_radpm": (float, "turning / length, rad/m"),
+    "heading_changes": (int, "turns of more than 15 degrees"),
+    "jerk_mps3": (float, "mean third difference of the path over tick^3, m/s^3"),
+    "mode_switches": (int, "changes of the planner's mode"),
+    "avoidance_s": (float, "time in obstacle avoidance, s"),
+    "blocked_ticks": (int, "ticks without a free gap"),
+    "stopped_ticks": (int, "ticks with input that the planner refused"),
+    "encounters": (int, "obstacles that came within SR"),
+    "obstacles": (int, "obstacles of the world"),
+    "straight_m": (float, "distance from start to goal, m"),
+}
+_JUDGED: dict[str, tuple[type, str]] = {
+    "certificate": (str, "the oracle's: feasible, infeasible or undecided; empty without it"),
+    "survivability": (float, "share of places where nobody touches a standing robot"),
+    "optimum_m": (float, "shortest collision-free path at constant speed, full knowledge, m"),
+    "gap": (float, "length / optimum - 1, where the goal was reached"),
+    "spl": (float, "success weighted by path length, against the optimum"),
+    "barn": (float, "BARN score, against the optimum at full speed"),
+}
+COLUMNS = {**_KEY, **_MADE, **_JUDGED}
+# Clocks differ from run to run: these stand in a table of their own.
+TIMINGS: dict[str, tuple[type, str]] = {
+    **_KEY,
+    "decision_us": (float, "decision time, median over the run's ticks, us"),
+    "decision_max_us": (float, "longest decision, us"),
+    "wall_ms": (float, "wall time of the whole run, ms"),
+}
+
+
+def made_row(run: Run, played: Played) -> Row:
+    """What a run says of itself, without the oracle."""
+    result, conduct = assess(played.episode)
+    scenario = played.episode.scenario
+    row = {
+        **dict.fromkeys(_MADE),
+        **run._asdict(),
+        **{name: getattr(conduct, name) for name in _MADE if hasattr(conduct, name)},
+        **{name: getattr(result, name) for name in _MADE if hasattr(result, name)},
+        "outcome": FAILED if played.fault else result.outcome.value,
+        "failure": played.fault_at,
+        "time_to_goal_s": time_to_goal_s(result),
+        "encounters": len(result.encounters),
+        "obstacles": len(scenario.obstacles),
+        "straight_m": distance(scenario.start_m, scenario.goal_m),
+    }
+    return {name: row[name] for name in (*_KEY, *_MADE)}
+
+
+def lost_row(run: Run, failure: str) -> Row:
+    """The row of a run that told nothing of itself: it hung, or its process died."""
+    row = {**dict.fromkeys((*_KEY, *_MADE)), **run._asdict()}
+    return {**row, "outcome": FAILED, "failure": failure, "success": False}
+
+
+def timing_row(times_ns: tuple[int, ...], wall_ms: float) -> Row:
+    """What the machine's clock says of a run."""
+    times = times_ns or (math.nan,)
+    return {
+        "decision_us": statistics.median(times) / 1e3,
+        "decision_max_us": max(times) / 1e3,
+        "wall_ms": wall_ms,
+    }
+
+
+def judged(row: Row, optimum: Mapping[str, Any] | None, speed_mps: float) -> Row:
+    """The row with what the oracle says of its world (None: it was not asked)."""
+    found: Row = {**row, **dict.fromkeys(_JUDGED)}
+    if optimum is None:
+        return {**found, "certificate": ""}
+    found |= {name: optimum[name] for name in ("certificate", "survivability")}
+    optimum_m = optimum["optimum_m"]
+    if not math.isfinite(optimum_m):
+        return found
+    length_m, success = row["length_m"], bool(row["success"])
+    if row["outcome"] == Outcome.GOAL_REACHED.value:
+        found["gap"] = optimality_gap(length_m, optimum_m)
+    found["optimum_m"] = optimum_m
+    found["spl"] = spl(success, length_m or 0.0, optimum_m)
+    found["barn"] = barn_score(success, row["time_s"] or 0.0, optimum_m / speed_mps)
+    return found

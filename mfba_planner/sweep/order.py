@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a sweep is: which worlds, planners and seeds, seen how; and the runs it is made of."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from dataclasses import asdict, dataclass, field
+from typing import Any, NamedTuple
+
+from ..core.errors import ConfigError
+from ..core.options import flatten
+from ..core.planner import PathPlanner, PlannerParams
+from ..core.sensing import SensorParams
+from ..core.world import Scenario
+from ..planners.perception import NAMES, Perception
+from ..planners.registry import make
+from ..worlds import suite
+from ..worlds.suites import SPEED_MPS
+
+PERCEPTIONS = tuple(name for name in NAMES if name != "sectors")
+PATIENCE_S, LONGEST_S = 60.0, 86_400.0
+
+
+class Run(NamedTuple):
+    """One run of a sweep."""
+
+    suite: str
+    world: int
+    planner: str
+    seed: int
+
+    def __str__(self) -> str:
+        return f"{self.suite}/{self.world}/{self.planner}/{self.seed}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """All that decides how a run goes, but for which run it is.
+
+    patience_s is the wall time after which a run counts as hanging; no other number of a run
+    depends on a clock.
+    """
+
+    params: PlannerParams = field(default_factory=lambda: PlannerParams(speed_mps=SPEED_MPS))
+    sensor: SensorParams = field(default_factory=SensorParams)
+    perception: str = "known"
+    noise_m: float = 0.0
+    latency_ticks: int = 0
+    suite_seed: int = 0
+    patience_s: float = PATIENCE_S
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for what cannot be."""
+        self.look(0)
+        if not 0.0 < self.patience_s <= LONGEST_S:
+            raise ConfigError(
+                f"--patience={self.patience_s:g}: out of range; give 0 to {LONGEST_S:g} s"
+            )
+
+    def scenario(self, run: Run) -> Scenario:
+        """The world of a run."""
+        return suite(run.suite, self.suite_seed).world(run.world, self.params.speed_mps)
+
+    def look(self, seed: int, *, sectors: bool = True) -> Perception:
+        """What a planner gets to see."""
+        return Perception(
+            self.perception,
+            noise_m=self.noise_m,
+            latency_ticks=self.latency_ticks,
+            seed=seed,
+            sectors=sectors,
+        )
+
+    def brain(self, run: Run) -> PathPlanner:
+        """A fresh planner; see make_planner."""
+        return make_planner(run.planner, self.params, self.sensor, run.seed)
+
+    def facts(self) -> dict[str, Any]:
+        """As plain values."""
+        return {
+            **asdict(self),
+            "params": flatten(self.params),
+            "sensor": flatten(self.sensor),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """Worlds first .. first + worlds - 1 of a suite, each planner in each, seeds 0 .. seeds - 1.
+
+    Where a suite repeats its worlds, each round of them has the next seed; seeds is 1 there.
+    """
+
+    suite: str
+    planners: tuple[str, ...]
+    worlds: int
+    first: int = 0
+    seeds: int = 1
+    oracle: bool = True
+    setting: Setting = field(default_factory=Setting)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for what cannot be, with the nearest name where one is unknown."""
+        for name, value, least in (
+            ("--worlds", self.worlds, 1),
+            ("--first", self.first, 0),
+            ("--seeds", self.seeds, 1),
+        ):
+            if not least <= value < 2**31:
+                raise ConfigError(f"{name}={value}: out of range; give at least {least}")
+        found = suite(self.suite, self.setting.suite_seed)
+        if found.distinct is not None and self.seeds > 1:
+            raise ConfigError(
+                f"--seeds={self.seeds}: {self.suite} has {found.distinct} worlds, which --worlds "
+                "repeats with the next seed each time; leave out --seeds"
+            )
+        if not self.planners:
+            raise ConfigError("--planner: none given; name at least one")
+        for k, name in enumerate(self.planners):
+            make_planner(name, self.setting.params, self.setting.sensor, 0)
+            if name in self.planners[:k]:
+                raise ConfigError(f"--planner {name}: given twice; name each planner once")
+
+    @property
+    def world_range(self) -> range:
+        """The worlds."""
+        return range(self.first, self.first + self.worlds)
+
+    def run_seeds(self, world: int) -> range:
+        """Seeds of a world's runs."""
+        distinct = suite(self.suite, self.setting.suite_seed).distinct
+        first = 0 if distinct is None else world // distinct
+        return range(first, first + self.seeds)
+
+    def runs(self, planner: str, worlds: range) -> list[Run]:
+        """Runs of one planner in some worlds, in the table's order."""
+        return [
+            Run(self.suite, world, planner, seed)
+            for world in worlds
+            for seed in self.run_seeds(world)
+        ]
+
+
+def make_planner(name: str, params: PlannerParams, sensor: SensorParams, seed: int) -> PathPlanner:
+    """A planner of ours by name, or anybody's as MODULE:NAME, called with the same arguments.
+
+    Modules are also looked for in the working directory. Raises ConfigError for what is unknown.
+    """
+    if ":" not in name:
+        return make(name, params, sensor, seed)
+    module_name, _, attribute = name.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    try:
+        factory = getattr(importlib.import_module(module_name), attribute)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise ConfigError(
+            f"planner {name}: cannot be imported ({error}); give MODULE:NAME of something that "
+            "is called with PlannerParams, SensorParams and a seed"
+        ) from None
+    planner: PathPlanner = factory(params, sensor, seed)
+    return planner
+
+
+def read_run(text: str) -> Run:
+    """A run from SUITE/WORLD/PLANNER/SEED. Raises ConfigError."""
+    words = text.split("/")
+    if len(words) != 4 or not (words[1].isdecimal() and words[3].isdecimal()):
+        raise ConfigError(f"{text}: no run; give SUITE/WORLD/PLANNER/SEED, or a row's number")
+    return Run(words[0], int(words[1]), words[2], int(words[3]))

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A directory of `mfba sweep`, read back: what was ordered, and the rows that are finished."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import ConfigError, InputError
+from ..core.options import override
+from ..core.planner import PlannerParams
+from ..core.sensing import SensorParams
+from ..study.store import code_digest, read_manifest, read_part
+from .columns import Row
+from .order import Order, Setting
+from .parts import parts_of
+from .run import COMMAND, PACKAGES
+from .table import build
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadSweep:
+    """What a directory holds; of an interrupted sweep the finished part."""
+
+    order: Order
+    rows: list[Row]
+    code_changed: bool
+
+
+def read_sweep(directory: Path) -> ReadSweep:
+    """Read it. Raises InputError for anything else, OutputError for a damaged manifest."""
+    if not directory.is_dir():
+        raise InputError(f"{directory}: no such directory; give one that `mfba sweep` has made")
+    facts = read_manifest(directory, COMMAND)
+    try:
+        order = _order(facts)
+    except (KeyError, TypeError, AttributeError, ConfigError) as error:
+        raise InputError(
+            f"{directory}: not of this version's `{COMMAND}` ({error}); sweep again"
+        ) from None
+    parts = parts_of(order)
+    found = {part.name: read_part(directory, part.name) for part in parts}
+    finished = [part for part in parts if found[part.name] is not None]
+    rows, _ = build(order, finished, {name: c for name, c in found.items() if c is not None})
+    return ReadSweep(
+        order=order, rows=rows, code_changed=facts.get("code") != code_digest(*PACKAGES)
+    )
+
+
+def _order(facts: dict[str, Any]) -> Order:
+    told = dict(facts["setting"])
+    params = override(PlannerParams(), told.pop("params"))
+    sensor = override(SensorParams(), told.pop("sensor"))
+    return Order(
+        suite=facts["suite"],
+        planners=tuple(facts["planners"]),
+        worlds=facts["worlds"],
+        first=facts["first"],
+        seeds=facts["seeds"],
+        oracle=facts["oracle"],
+        setting=Setting(params=params, sensor=sensor, **told),
+    )

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a sweep's table says of each planner, and of pairs of them on the same worlds."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..oracle import Certificate
+from ..statistics import Interval, Paired, generator, mean, paired, rate
+from .columns import FAILED, Row
+
+REASONS = 3  # of failure that are named
+Value = Callable[[Row], float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """One planner's figures; rates with Wilson's, means with bootstrap intervals (95 %).
+
+    certified is the success rate on worlds for which the oracle holds a trajectory. gap,
+    gap_95 (95th percentile), length and clearance are over successes, means over worlds; spl
+    and barn over all worlds that have an optimum. None where there is nothing to tell.
+    """
+
+    planner: str
+    runs: int
+    success: Interval
+    certified: Interval | None
+    certified_runs: int
+    collisions: int
+    hits_moving: int
+    hits_standing: int
+    timeouts: int
+    failures: tuple[tuple[str, int], ...]
+    length_m: Interval | None
+    gap: Interval | None
+    gap_95: float | None
+    spl: Interval | None
+    barn: Interval | None
+    clearance_m: Interval | None
+    decision_us: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Versus:
+    """One planner against another in the same worlds with the same seeds.
+
+    wins and losses count runs in which only one of them succeeded, p is the exact sign test's
+    (McNemar). gap compares the gaps of worlds in which all runs of both succeeded.
+    """
+
+    planner: str
+    other: str
+    wins: int
+    losses: int
+    p: float
+    gap: Paired | None
+
+
+def standings(rows: Sequence[Row], timings: Sequence[Row]) -> list[Standing]:
+    """A Standing for each planner, in the table's order."""
+    names = list(dict.fromkeys(row["planner"] for row in rows))
+    return [
+        _standing(name, k, [r for r in rows if r["planner"] == name], timings)
+        for k, name in enumerate(names)
+    ]
+
+
+def _standing(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -> Standing:
+    good = [row for row in rows if row["success"]]
+    certified = [r for r in rows if r["certificate"] == Certificate.FEASIBLE.value]
+    gaps = [row["gap"] for row in good if row["gap"] is not None]
+    times = [
+        t["decision_us"] for t in timings if t["planner"] == name and _is_number(t["decision_us"])
+    ]
+
+    def over(some: list[Row], column: str, place: int) -> Interval | None:
+        values = list(by_world(some, lambda row: row[column]).values())
+        return mean(np.array(values), generator(number, place)) if values else None
+
+    judged = [row for row in rows if row["spl"] is not None]
+    return Standing(
+        planner=name,
+        runs=len(rows),
+        success=rate(len(good), len(rows)),
+        certified=rate(sum(row["success"] for row in certified), len(certified))
+        if certified
+        else None,
+        certified_runs=len(certified),
+        collisions=sum(bool(row["collisions"]) for row in rows),
+        hits_moving=sum(row["hits_moving"] or 0 for row in rows),
+        hits_standing=sum(row["hits_standing"] or 0 for row in rows),
+        timeouts=sum(row["outcome"] == "time_limit" for row in rows),
+        failures=tuple(_reasons(rows).most_common()),
+        length_m=over(good, "length_m", 0),
+        gap=over([row for row in good if row["gap"] is not None], "gap", 1),
+        gap_95=float(np.percentile(gaps, 95.0)) if gaps else None,
+        spl=over(judged, "spl", 2),
+        barn=over(judged, "barn", 3),
+        clearance_m=over(
+            [r for r in good if _is_number(r["min_clearance_m"])], "min_clearance_m", 4
+        ),
+        decision_us=float(np.median(times)) if times else None,
+    )
+
+
+def _reasons(rows: Sequence[Row]) -> Counter[str]:
+    """Failures by reason, without the tick."""
+    return Counter(
+        row["failure"].partition(": ")[2] or row["failure"]
+        for row in rows
+        if row["outcome"] == FAILED
+    )
+
+
+def by_world(rows: Sequence[Row], value: Value) -> dict[int, float]:
+    """Mean over the seeds of each world: runs in one world are not independent."""
+    values: dict[int, list[float]] = {}
+    for row in rows:
+        values.setdefault(row["world"], []).append(value(row))
+    return {world: math.fsum(found) / len(found) for world, found in values.items()}
+
+
+def comparisons(rows: Sequence[Row]) -> list[Versus]:
+    """Each planner against each one named before it."""
+    names = list(dict.fromkeys(row["planner"] for row in rows))
+    return [versus(rows, name, other) for k, name in enumerate(names) for other in names[:k]]
+
+
+def versus(rows: Sequence[Row], name: str, other: str) -> Versus:
+    """One planner against another."""
+    ours, theirs = (
+        {(row["world"], row["seed"]): row for row in rows if row["planner"] == planner}
+        for planner in (name, other)
+    )
+    cases = [key for key in ours if key in theirs]
+    scores = np.array(
+        [float(theirs[key]["success"]) - float(ours[key]["success"]) for key in cases]
+    )
+    met = paired(scores, np.zeros(len(cases)), generator(9))
+    lost = {key[0] for key in cases if not (_has_gap(ours[key]) and _has_gap(theirs[key]))}
+    a, b = (
+        by_world([side[key] for key in cases if key[0] not in lost], lambda row: row["gap"])
+        for side in (ours, theirs)
+    )
+    return Versus(
+        planner=name,
+        other=other,
+        wins=met.wins,
+        losses=met.losses,
+        p=met.sign_p,
+        gap=paired(np.array(list(a.values())), np.array(list(b.values())), generator(10))
+        if a
+        else None,
+    )
+
+
+def _has_gap(row: Row) -> bool:
+    return bool(row["success"]) and row["gap"] is not None
+
+
+def _is_number(value: float | None) -> bool:
+    return value is not None and math.isfinite(value)

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Named suites: world k of a suite is the same whatever else is generated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core.errors import ConfigError
+from ..core.options import did_you_mean
+from ..core.world import Scenario
+from ..scenarios import load_scenario
+from .adversarial import FAMILIES, hostile
+from .crowd import CrowdParams, Motion, crowd
+from .trip import ROOM, Trip, scenario
+
+WORLD_STREAM = 3  # spawn key of worlds' SeedSequence children; one number per purpose
+SPEED_MPS = 0.8  # robot speed at which gaps to the optimum are reported
+
+_Make = Callable[["Suite", int, float], Scenario]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Suite:
+    """Worlds 0, 1, 2, ... of one kind; number is the suite's own place in the seeds."""
+
+    name: str
+    description: str
+    number: int
+    make: _Make
+    distinct: int | None = None  # how many differ; None: all
+    seed: int = 0
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel to another process by name: how worlds are made cannot be pickled."""
+        return suite, (self.name, self.seed)
+
+    def world(self, k: int, speed_mps: float = SPEED_MPS) -> Scenario:
+        """World k for a robot of this speed (only hostile worlds depend on it).
+
+        Raises ConfigError for a negative k or a speed that is no speed.
+        """
+        if k < 0:
+            raise ConfigError(f"k={k}: negative; worlds are counted from 0")
+        if not (math.isfinite(speed_mps) and speed_mps > 0.0):
+            raise ConfigError(f"speed_mps={speed_mps}: no speed; give a number above 0")
+        return self.make(self, self.world_number(k), speed_mps)
+
+    def world_number(self, k: int) -> int:
+        """The smallest number with the same world as k: repeats differ in the planner's seed."""
+        return k if self.distinct is None else k % self.distinct
+
+    def stream(self, k: int) -> np.random.Generator:
+        """The random stream of world k, from the seed, the suite's number and k alone."""
+        key = (WORLD_STREAM, self.number, k)
+        sequence = np.random.SeedSequence(self.seed, spawn_key=key)
+        return np.random.Generator(np.random.PCG64(sequence))
+
+
+def suite(name: str, seed: int = 0) -> Suite:
+    """Return the suite of this name; ConfigError with the nearest name for an unknown one."""
+    if name not in _SUITES:
+        raise ConfigError(f"{name!r}: no such suite; {did_you_mean(name, list(_SUITES))}")
+    if seed < 0:
+        raise ConfigError(f"seed={seed}: negative; give a whole number from 0 up")
+    return replace(_SUITES[name], seed=seed)
+
+
+def suite_names() -> list[str]:
+    """Names of all suites, in the order in which they are reported."""
+    return list(_SUITES)
+
+
+_CASES = ("case1", "case2")
+
+
+def _paper(_: Suite, k: int, __: float) -> Scenario:
+    return load_scenario(_CASES[k])
+
+
+def _crowd(params: CrowdParams) -> _Make:
+    walls = ROOM if params.walled else None
+
+    def make(of: Suite, k: int, _: float) -> Scenario:
+        return scenario(f"{of.name}-{k}", crowd(params, of.stream(k)), walls)
+
+    return make
+
+
+def _adversarial(of: Suite, k: int, speed_mps: float) -> Scenario:
+    family = list(FAMILIES)[k % len(FAMILIES)]
+    obstacles = hostile(family, Trip(speed_mps=speed_mps), of.stream(k))
+    return scenario(f"{of.name}-{k}-{family}", obstacles)
+
+
+_DENSE = CrowdParams(
+    obstacles=60, radius_min_m=0.1, radius_max_m=0.3, speed_min_mps=0.05, static_share=0.3
+)
+_DYNABARN = CrowdParams(
+    obstacles=15,
+    radius_min_m=0.2,
+    radius_max_m=0.4,
+    speed_min_mps=0.0,
+    speed_max_mps=0.5,
+    motion=Motion.PIECEWISE,
+    turn_every_s=2.0,
+    turn_max_rad=math.radians(60.0),
+)
+
+
+# A suite's number is for ever: another one would be another suite.
+_ALL = (
+    Suite(
+        name="paper",
+        description="case studies 1 and 2 in turn; repeats differ in the planner's seed",
+        number=0,
+        make=_paper,
+        distinct=len(_CASES),
+    ),
+    *(
+        Suite(
+            name=f"random-{n}",
+            description=f"{n} obstacles of 0.3 m at 0.1 to 0.3 m/s that bounce in 12 x 12 m",
+            number=n,
+            make=_crowd(CrowdParams(obstacles=n)),
+        )
+        for n in (3, 10, 20, 30)
+    ),
+    Suite(
+        name="dense",
+        description="60 obstacles of 0.1 to 0.3 m, three in ten at rest, others up to 0.3 m/s",
+        number=101,
+        make=_crowd(_DENSE),
+    ),
+    Suite(
+        name="adversarial",
+        description="in turn: " + ", ".join(FAMILIES),
+        number=102,
+        make=_adversarial,
+    ),
+    Suite(
+        name="dynabarn-like",
+        description="15 obstacles of 0.2 to 0.4 m that change speed (up to 0.5 m/s) and heading",
+        number=103,
+        make=_crowd(_DYNABARN),
+    ),
+)
+_SUITES = {one.name: one for one in _ALL}

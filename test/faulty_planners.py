@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Planners that go wrong, each in its own way, from tick 5 on."""
+
+import math
+import os
+import time
+from dataclasses import replace
+from typing import Any
+
+from mfba_planner.core.planner import Decision, Observation, PlannerParams
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.planners.straight import Straight
+
+GOOD_TICKS = 5
+
+
+class Faulty(Straight):
+    """Drives straight, then goes wrong."""
+
+    def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
+        super().__init__(params, sensor, seed)
+        self.tick = 0
+
+    def plan(self, obs: Observation) -> Decision:
+        decision = super().plan(obs)
+        self.tick += 1
+        return decision if self.tick <= GOOD_TICKS else self.wrong(decision)
+
+    def wrong(self, decision: Decision) -> Any:
+        raise NotImplementedError
+
+
+class Raises(Faulty):
+    def wrong(self, decision: Decision) -> Any:
+        raise ValueError("no idea\nwhat to do")
+
+
+class NotANumber(Faulty):
+    def wrong(self, decision: Decision) -> Any:
+        return replace(decision, velocity=(math.nan, 0.0))
+
+
+class TooFast(Faulty):
+    def wrong(self, decision: Decision) -> Any:
+        vx, vy = decision.velocity
+        return replace(decision, velocity=(1.01 * vx, 1.01 * vy))
+
+
+class Nothing(Faulty):
+    def wrong(self, decision: Decision) -> Any:
+        return None
+
+
+class OldStamp(Faulty):
+    def wrong(self, decision: Decision) -> Any:
+        return replace(decision, stamp_ns=1)
+
+
+class OneNumber(Faulty):
+    def wrong(self, decision: Decision) -> Any:
+        velocity: Any = 3.0
+        return replace(decision, velocity=velocity)
+
+
+class Hangs(Faulty):
+    """Not even a signal's exception gets it out of there; in world 1 only."""
+
+    def wrong(self, decision: Decision) -> Any:
+        while self.seed == 1:
+            try:
+                time.sleep(3600.0)
+            except BaseException:
+                continue
+        return decision
+
+
+class Dies(Faulty):
+    """As a fault in machine code would end it."""
+
+    def wrong(self, decision: Decision) -> Any:
+        if self.seed == 1:
+            os._exit(7)
+        return decision
+
+
+class Sleeps(Faulty):
+    """Hangs until somebody wakes it."""
+
+    def wrong(self, decision: Decision) -> Any:
+        time.sleep(3600.0)
+        return decision
+
+
+class Unmakeable(Straight):
+    def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
+        if seed:
+            raise KeyError("seed")
+        super().__init__(params, sensor, seed)

@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba sweep` and `mfba show`: what a user gets, what a mistake costs, and interrupts."""
+
+import csv
+import os
+import re
+import signal
+from pathlib import Path
+
+import pytest
+from helpers import wait_until
+from launching import Program, complete
+
+from mfba_planner import cli
+from mfba_planner.cli.sweep import command
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.entry import guarded_main
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.sweep import parts
+from mfba_planner.sweep.order import Order, Setting
+from mfba_planner.sweep.run import sweep
+
+Said = pytest.CaptureFixture[str]
+HASH = re.compile(r"^sorted hash ([0-9a-f]{64})$", re.MULTILINE)
+LONG = ["sweep", "random-3", "--planner", "straight", "--worlds", "1500", "--no-oracle"]
+SMALL = ["random-3", "--planner", "paper", "--planner", "straight", "--worlds", "4"]
+
+
+def mfba(*args: str) -> int:
+    return guarded_main(lambda: cli.main(list(args)), "mfba")
+
+
+def refused(said: Said, *args: str) -> str:
+    """The one line that a mistake costs."""
+    code = mfba(*args)
+    out, err = said.readouterr()
+    assert (code, out, err.count("\n")) == (1, "", 1), err
+    return err
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory of eight runs; some of `straight` collide."""
+    out = tmp_path_factory.mktemp("sweep") / "out"
+    assert mfba("sweep", *SMALL, "--workers", "1", "--out", str(out)) == 0
+    return out
+
+
+def rows(directory: Path) -> list[dict[str, str]]:
+    with open(directory / "table.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_sweep_leaves_table_timings_report_and_parts(swept: Path) -> None:
+    assert {path.name for path in swept.iterdir()} == {
+        "chunks", "report.md", "study.json", "table.csv", "timings.csv",
+    }  # fmt: skip
+    assert len(rows(swept)) == 8
+    report = (swept / "report.md").read_text(encoding="utf-8")
+    assert "`mfba sweep random-3 --planner paper --planner straight --worlds 4`" in report
+    order = Order(suite="random-3", planners=("paper", "straight"), worlds=4)
+    assert f"sorted hash of the table `{sweep(order).hash}`" in report
+    assert re.search(r"^\| paper \| 4 \| 100\.00 % \[51\.01, 100\.00\] \|", report, re.MULTILINE)
+
+
+def test_again_it_computes_nothing_and_says_the_same(
+    swept: Path, capsys: Said, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = {path: path.stat().st_mtime_ns for path in swept.rglob("*")}
+    monkeypatch.setattr(parts.Runs, "run", lambda _: pytest.fail("nothing is left to do"))
+    monkeypatch.setattr(parts.Optima, "run", lambda _: pytest.fail("nothing is left to do"))
+    assert mfba("sweep", *SMALL, "--out", str(swept)) == 0
+    out, err = capsys.readouterr()
+    assert {path: path.stat().st_mtime_ns for path in swept.rglob("*")} == before
+    assert HASH.search(out)
+    assert err == ""
+
+
+def test_a_half_written_part_is_computed_again(swept: Path, capsys: Said) -> None:
+    part = swept / "chunks/random-3-straight-0-4.json"
+    table, whole = (swept / "table.csv").read_bytes(), part.read_bytes()
+    part.write_bytes(whole[: len(whole) // 2])
+    for name in ("timings.csv", "report.md"):  # what the clock says is another time
+        (swept / name).unlink()
+    assert mfba("sweep", *SMALL, "--out", str(swept)) == 0
+    assert (swept / "table.csv").read_bytes() == table
+
+
+def test_a_half_written_table_is_refused(swept: Path, capsys: Said) -> None:
+    path = swept / "table.csv"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:200])
+    assert mfba("sweep", *SMALL, "--out", str(swept)) == 1
+    assert "table.csv: is not what the finished runs say" in capsys.readouterr().err
+    path.unlink()
+    assert mfba("sweep", *SMALL, "--out", str(swept)) == 0
+    assert path.read_bytes() == whole
+
+
+@pytest.mark.parametrize(
+    ("args", "reason"),
+    [
+        (["random-33"], "'random-33': no such suite; did you mean 'random-3"),
+        (["paper", "--planner", "straigth"], "did you mean 'straight'?"),
+        (["paper", "--worlds", "0"], "--worlds=0: out of range"),
+        (["paper", "--seeds", "3"], "leave out --seeds"),
+        (["paper", "--workers", "0"], "--workers=0: out of range"),
+        (["paper", "--noise", "-1"], "noise_m=-1.0"),
+        (["paper", "--latency", "-1"], "latency_ticks=-1"),
+        (["paper", "--patience", "nan"], "--patience=nan: out of range"),
+        (["paper", "--perception", "sonar"], "--perception: invalid choice: 'sonar'"),
+        (["paper", "--format", "xls"], "--format: invalid choice: 'xls'"),
+        (["paper", "--set", "planner.speed=1"], "did you mean 'planner.speed_mps'?"),
+        (["paper", "--set", "planner.speed_mps=-1"], "speed_mps=-1"),
+        (["paper", "--plannner", "paper"], "did you mean '--planner'?"),
+        ([], "required: SUITE"),
+    ],
+)
+def test_mistakes_cost_one_line(args: list[str], reason: str, capsys: Said) -> None:
+    assert reason in refused(capsys, "sweep", *args)
+
+
+def test_a_scheduler_that_is_not_there_costs_one_line(
+    capsys: Said, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mfba_planner.sweep.run.CONNECT_S", 1)
+    monkeypatch.chdir(tmp_path)
+    assert mfba("sweep", "paper", "--scheduler", "tcp://127.0.0.1:9") == 1
+    assert "--scheduler tcp://127.0.0.1:9: cannot be reached" in capsys.readouterr().err
+
+
+def test_an_existing_directory_of_something_else_is_left_alone(
+    capsys: Said, tmp_path: Path
+) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    assert "no results of `mfba sweep`" in refused(capsys, "sweep", *SMALL, "--out", str(tmp_path))
+    assert os.listdir(tmp_path) == ["mine.txt"]
+
+
+def test_parquet(tmp_path: Path, capsys: Said) -> None:
+    from pyarrow import parquet
+
+    out = tmp_path / "out"
+    told = ["--worlds", "2", "--no-oracle", "--format", "parquet", "--workers", "1"]
+    assert mfba("sweep", "random-3", *told, "--out", str(out)) == 0
+    table = parquet.read_table(out / "table.parquet").to_pylist()
+    assert [(row["world"], row["certificate"], row["gap"]) for row in table] == [
+        (0, "", None), (1, "", None),
+    ]  # fmt: skip
+
+
+def test_the_command_of_a_report_makes_the_same_order() -> None:
+    setting = Setting(
+        params=PlannerParams(speed_mps=0.5, step_length_m=0.1),
+        perception="scan-12",
+        noise_m=0.02,
+        latency_ticks=1,
+        suite_seed=7,
+        patience_s=9.0,
+    )
+    order = Order(
+        suite="dense", planners=("paper", "ba"), worlds=3, first=4, seeds=2, oracle=False,
+        setting=setting,
+    )  # fmt: skip
+    words = command(order).split()
+    assert words[:2] == ["mfba", "sweep"]
+    from mfba_planner.cli.sweep import _order, _parser
+
+    assert _order(_parser().parse(words[2:])) == order
+
+
+def interrupted(out: Path, tmp_path: Path, send: signal.Signals, *, group: bool) -> Program:
+    """A sweep that is ended when some of its parts are finished."""
+    with Program("mfba", *LONG, "--workers", "2", "--out", str(out), cwd=tmp_path) as program:
+        chunks = out / "chunks"
+        wait_until(lambda: chunks.is_dir() and len(list(chunks.glob("*.json"))) >= 2, 120.0)
+        if group:  # as a terminal does: workers and their children get it too
+            for pid in program.family():
+                os.kill(pid, send)
+        else:
+            program.process.send_signal(send)
+        program.end()
+        wait_until(lambda: program.family() == [], 20.0)
+        return program
+
+
+def finished(out: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in (out / "chunks").glob("*.json")}
+
+
+def test_after_ctrl_c_it_goes_on_where_it_was(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    program = interrupted(out, tmp_path, signal.SIGINT, group=True)
+    assert program.process.returncode == 130
+    assert program.stderr == f"interrupted; go on with --out {out}\n"
+    kept = finished(out)
+    assert 2 <= len(kept) < 15
+    assert not (out / "table.csv").exists()
+    assert not list(out.rglob("*.tmp"))
+    again = complete("mfba", *LONG, "--workers", "1", "--out", str(out), cwd=tmp_path)
+    assert again.process.returncode == 0, again.stderr
+    after = finished(out)
+    assert len(after) == 15
+    assert {name: after[name] for name in kept} == kept, "what was finished is not done again"
+    found = HASH.search(again.stdout)
+    assert found
+    order = Order(suite="random-3", planners=("straight",), worlds=1500, oracle=False)
+    assert found.group(1) == sweep(order).hash
+
+
+def test_killed_it_leaves_nobody_behind(tmp_path: Path) -> None:
+    interrupted(tmp_path / "out", tmp_path, signal.SIGKILL, group=False)
+
+
+def test_one_worker_killed_is_named_and_the_sweep_goes_on(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    args = ["sweep", "random-3", "--planner", "straight", "--worlds", "600", "--no-oracle"]
+    with Program("mfba", *args, "--workers", "2", "--out", str(out), cwd=tmp_path) as program:
+        wait_until(lambda: len(_workers(program)) == 2, 60.0)
+        os.kill(_workers(program)[0], signal.SIGKILL)
+        assert program.end() == 0, program.stderr
+    assert "its worker process may have died; trying it again alone" in program.stderr
+    found = HASH.search(program.stdout)
+    assert found
+    order = Order(suite="random-3", planners=("straight",), worlds=600, oracle=False)
+    assert found.group(1) == sweep(order).hash
+
+
+def _workers(program: Program) -> list[int]:
+    """Processes of the pool, without the children they make runs in."""
+    return [
+        pid
+        for pid in program.family()
+        if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    ]
+
+
+# --- mfba show --------------------------------------------------------------------------------
+
+
+def a_collision(swept: Path) -> tuple[int, dict[str, str]]:
+    return next((k, row) for k, row in enumerate(rows(swept)) if int(row["collisions"] or 0))
+
+
+def test_a_failed_run_becomes_words_pictures_and_a_bag(
+    swept: Path, tmp_path: Path, capsys: Said
+) -> None:
+    number, row = a_collision(swept)
+    name = f"random-3/{row['world']}/straight/0"
+    assert mfba("show", str(swept), str(number), "--out", str(tmp_path / "a")) == 0
+    out = capsys.readouterr().out
+    assert out.startswith(f"{name}\nthe robot ran into obstacle {row['first_contact_with']} at ")
+    assert f"at {float(row['first_contact_s']):.2f} s" in out
+    assert "known: within SR (0.8 m) since tick" in out
+    assert "straight to the goal" in out
+    assert "oracle: feasible at 0.8 m/s" in out
+    assert "note:" not in out
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {
+        "bag", "explanation.txt", "moment.png", "run.png",
+    }  # fmt: skip
+    for picture in ("run.png", "moment.png"):
+        assert (tmp_path / "a" / picture).read_bytes().startswith(b"\x89PNG")
+    episode = read_episode(tmp_path / "a/bag")
+    assert len(episode.ticks) == int(row["ticks"])
+    assert mfba("show", str(swept), name, "--no-bag", "--out", str(tmp_path / "b")) == 0
+    assert (tmp_path / "b/explanation.txt").read_text() == (
+        tmp_path / "a/explanation.txt"
+    ).read_text()
+
+
+def test_a_bag_of_the_paper_s_planner_can_be_verified(tmp_path: Path, capsys: Said) -> None:
+    assert mfba("show", "random-10/1/paper/0", "--out", str(tmp_path / "a")) == 0
+    assert "goal reached without collision" in capsys.readouterr().out
+    assert mfba("verify", str(tmp_path / "a"), "--closed-loop") == 0
+    assert "closed loop: identical" in capsys.readouterr().out
+
+
+def test_runs_without_success_are_listed(swept: Path, capsys: Said) -> None:
+    failed = [k for k, row in enumerate(rows(swept)) if row["success"] == "false"]
+    assert mfba("show", str(swept)) == 0
+    out = capsys.readouterr().out
+    assert out.startswith(f"{len(failed)} of 8 runs without success\n")
+    assert [int(line.split()[0]) for line in out.splitlines()[1:]] == failed
+
+
+@pytest.mark.parametrize(
+    ("planner", "line"),
+    [
+        ("Raises", "the planner failed at tick 5: raised ValueError: no idea what to do"),
+        ("Sleeps", "the planner failed at tick 5: hung: no end after 1 s of wall time"),
+    ],
+)
+def test_a_planner_s_own_fault_is_shown(
+    planner: str, line: str, tmp_path: Path, capsys: Said
+) -> None:
+    out = tmp_path / "out"
+    told = ["--planner", f"faulty_planners:{planner}", "--worlds", "1", "--no-oracle"]
+    told += ["--patience", "1", "--workers", "1"]
+    assert mfba("sweep", "random-3", *told, "--out", str(out)) == 0
+    assert "1 x " in (out / "report.md").read_text()
+    capsys.readouterr()
+    assert mfba("show", str(out), "0", "--out", str(tmp_path / "shown")) == 0
+    said = capsys.readouterr().out
+    assert line in said
+    assert "straight to the goal" in said, "the last decisions that were followed"
+    assert len(read_episode(tmp_path / "shown/bag").ticks) == 5
+
+
+def test_a_run_that_did_not_arrive(tmp_path: Path, capsys: Said) -> None:
+    out = tmp_path / "out"
+    told = ["--set", "planner.speed_mps=0.1", "--worlds", "1", "--no-oracle", "--workers", "1"]
+    assert mfba("sweep", "random-3", *told, "--out", str(out)) == 0
+    capsys.readouterr()
+    assert mfba("show", str(out), "0", "--no-bag", "--out", str(tmp_path / "shown")) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"m left to the goal when time was up \(1\d\d\.\d s\)", said)
+    assert "modes: " in said
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["nowhere"], "nowhere: no such directory"),
+        (["random-3/0/paper"], "random-3/0/paper: no such directory"),
+        (["7"], "7: no run; give SUITE/WORLD/PLANNER/SEED"),
+        (["random-4/0/paper/0"], "'random-4': no such suite"),
+        (["random-3/0/papre/0"], "did you mean 'paper'?"),
+        (["random-3/0/paper/0", "1"], "1: one argument too many"),
+        ([], "required: DIR | RUN"),
+    ],
+)
+def test_mistakes_of_show_cost_one_line(words: list[str], reason: str, capsys: Said) -> None:
+    assert reason in refused(capsys, "show", *words)
+
+
+def test_runs_that_a_sweep_does_not_have(swept: Path, tmp_path: Path, capsys: Said) -> None:
+    assert "8: the table has 8 rows" in refused(capsys, "show", str(swept), "8")
+    other = "random-3/9/paper/0"
+    assert f"{other}: not a run of this sweep" in refused(capsys, "show", str(swept), other)
+    assert "no results of `mfba sweep`" in refused(capsys, "show", str(tmp_path))
+    taken = ["show", str(swept), "0", "--out", str(tmp_path)]
+    assert "exists and is never overwritten" in refused(capsys, *taken)

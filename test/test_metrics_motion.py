@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many obstacles at many moments at once: bit by bit what world.py says of each alone."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mfba_planner.core.motion import Motion
+from mfba_planner.core.world import Obstacle, Scenario, Turn, Walls, center_at, step_clearances
+
+ROOM = Walls(lower_m=(-2.0, 1.0), upper_m=(4.0, 6.0))
+SPEEDS, HEADINGS = st.floats(0.0, 3.0), st.floats(-10.0, 10.0)
+
+
+@st.composite
+def obstacles(draw: st.DrawFn) -> Obstacle:
+    """One that fits into ROOM, with or without turns."""
+    radius = draw(st.sampled_from([0.05, 0.3, 0.999]))
+    times = sorted(draw(st.sets(st.floats(0.1, 20.0), max_size=3)))
+    return Obstacle(
+        center_m=(
+            draw(st.floats(-2.0 + radius, 4.0 - radius)),
+            draw(st.floats(1.0 + radius, 6.0 - radius)),
+        ),
+        radius_m=radius,
+        speed_mps=draw(SPEEDS),
+        heading_rad=draw(HEADINGS),
+        turns=tuple(
+            Turn(at_s=t, speed_mps=draw(SPEEDS), heading_rad=draw(HEADINGS)) for t in times
+        ),
+    )
+
+
+def scenario(some: list[Obstacle], walled: bool) -> Scenario:
+    return Scenario(
+        name="x",
+        start_m=(-50.0, -50.0),
+        goal_m=(0.0, 0.0),
+        obstacles=tuple(some),
+        walls=ROOM if walled else None,
+    )
+
+
+@settings(max_examples=150)
+@given(
+    some=st.lists(obstacles(), max_size=4),
+    walled=st.booleans(),
+    times=st.lists(st.floats(0.0, 100.0), min_size=1, max_size=5),
+)
+def test_centres_are_those_of_center_at(
+    some: list[Obstacle], walled: bool, times: list[float]
+) -> None:
+    world = scenario(some, walled)
+    found = Motion(world).centers(np.array(times))
+    assert found.shape == (2, len(times), len(some))
+    for k, t in enumerate(times):
+        for i, obstacle in enumerate(some):
+            assert tuple(found[:, k, i].tolist()) == center_at(obstacle, t, world.walls)
+
+
+@settings(max_examples=150)
+@given(
+    some=st.lists(obstacles(), min_size=1, max_size=4),
+    walled=st.booleans(),
+    start=st.floats(0.0, 30.0),
+    durations=st.lists(st.floats(1e-3, 5.0), min_size=1, max_size=5),
+    data=st.data(),
+)
+def test_gaps_are_those_of_step_clearances(
+    some: list[Obstacle],
+    walled: bool,
+    start: float,
+    durations: list[float],
+    data: st.DataObject,
+) -> None:
+    world = scenario(some, walled)
+    times = [start]
+    for duration in durations:
+        times.append(times[-1] + duration)
+    place = st.tuples(st.floats(-3.0, 5.0), st.floats(0.0, 7.0))
+    places = [data.draw(place) for _ in times]
+    steps = Motion(world).steps(np.array(times), np.array(places).T)
+    for k, ((t0, a), (t1, b)) in enumerate(pairwise(zip(times, places))):
+        assert steps.gap_m[k].tolist() == step_clearances(world, t0, t1, a, b)
+    for k, (t, place_m) in enumerate(zip(times, places)):
+        for i, obstacle in enumerate(some):
+            there = center_at(obstacle, t, world.walls)
+            dx, dy = there[0] - place_m[0], there[1] - place_m[1]
+            assert steps.distance_m[k, i] == math.sqrt(dx * dx + dy * dy)
+
+
+def test_a_room_without_room_to_move() -> None:
+    tight = Walls(lower_m=(0.0, 0.0), upper_m=(1.0, 9.0))
+    stuck = Obstacle(center_m=(0.5, 4.0), radius_m=0.5, speed_mps=1.0, heading_rad=0.3)
+    world = Scenario(
+        name="x", start_m=(5.0, 5.0), goal_m=(6.0, 5.0), obstacles=(stuck,), walls=tight
+    )
+    times = np.array([0.0, 3.0, 17.0])
+    x, y = Motion(world).centers(times)[:, :, 0]
+    assert x.tolist() == [0.5, 0.5, 0.5]
+    assert y.tolist() == [center_at(stuck, t, tight)[1] for t in times.tolist()]
+    steps = Motion(world).steps(times, np.full((2, 3), 5.0))
+    expected = [step_clearances(world, 0.0, 3.0, (5.0, 5.0), (5.0, 5.0))]
+    assert steps.gap_m[:1].tolist() == expected
+
+
+def test_nobody_is_nowhere() -> None:
+    found = Motion(scenario([], True)).steps(np.array([0.0, 1.0]), np.zeros((2, 2)))
+    assert found.gap_m.shape == (1, 0)

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts anywhere: any executor, workers that die, and what is left when it ends early."""
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mfba_planner.core.errors import ConfigError, MfbaError
+from mfba_planner.study.compute import TRIES, compute
+from mfba_planner.study.store import Store
+
+
+@dataclass(frozen=True)
+class Square:
+    """A part that computes a square; it may die first, as often as a file says."""
+
+    number: int
+    deaths: Path | None = None
+
+    @property
+    def name(self) -> str:
+        return f"square-{self.number}"
+
+    @property
+    def cost(self) -> float:
+        return 1.0
+
+    def facts(self) -> Mapping[str, Any]:
+        return {"number": self.number}
+
+    def run(self) -> dict[str, list[int]]:
+        if self.deaths is not None:
+            left = int(self.deaths.read_text())
+            self.deaths.write_text(str(left - 1))
+            if left > 0:
+                os._exit(3)
+        return {"square": [self.number**2]}
+
+
+def squares(found: Mapping[str, Any]) -> dict[str, int]:
+    return {name: columns["square"][0] for name, columns in found.items()}
+
+
+EXPECTED = {f"square-{k}": k * k for k in range(7)}
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_any_number_of_workers(workers: int) -> None:
+    heard: list[str] = []
+    found = compute(
+        [Square(k) for k in range(7)], workers=workers, done=lambda part: heard.append(part.name)
+    )
+    assert squares(found) == EXPECTED
+    assert sorted(heard) == sorted(EXPECTED)
+
+
+def test_any_executor_which_is_left_open() -> None:
+    with ThreadPoolExecutor(2) as executor:
+        assert squares(compute([Square(k) for k in range(7)], executor=executor)) == EXPECTED
+        assert executor.submit(int, "3").result() == 3
+
+
+def test_a_part_whose_worker_dies_is_named_and_tried_again(tmp_path: Path) -> None:
+    deaths = tmp_path / "deaths"
+    deaths.write_text("2")
+    said: list[str] = []
+    parts = [Square(k, deaths if k == 3 else None) for k in range(7)]
+    assert squares(compute(parts, workers=2, say=said.append)) == EXPECTED
+    assert "square-3: its worker process may have died; trying it again alone" in said
+    assert deaths.read_text() == "-1"
+
+
+def test_one_that_kills_every_worker_costs_one_line_and_the_rest_is_kept(tmp_path: Path) -> None:
+    deaths = tmp_path / "deaths"
+    deaths.write_text("1000")
+    parts = [Square(k, deaths if k == 3 else None) for k in range(7)]
+    store = Store(tmp_path / "out", parts, {}, command="x", packages=("core",))
+    with pytest.raises(MfbaError, match=r"square-3: a worker process died 3 times on it"):
+        compute(parts, workers=2, store=store)
+    assert int(deaths.read_text()) == 1000 - TRIES
+    kept = [part.name for part in parts if store.read(part)]
+    assert "square-3" not in kept
+    deaths.write_text("0")
+    again: list[str] = []
+    found = compute(parts, workers=2, store=store, done=lambda part: again.append(part.name))
+    assert squares(found) == EXPECTED
+
+
+class Unlucky(Executor):
+    """A cluster that loses the first worker that it gives a part to."""
+
+    def __init__(self, error: Exception) -> None:
+        self.error: Exception | None = error
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        future: Future[Any] = Future()
+        if self.error:
+            future.set_exception(self.error)
+            self.error = None
+        else:
+            future.set_result(fn(*args, **kwargs))
+        return future
+
+
+class KilledWorker(Exception):  # noqa: N818
+    """Named as dask names it."""
+
+
+@pytest.mark.parametrize("error", [BrokenProcessPool(), KilledWorker()])
+def test_a_cluster_that_loses_a_worker(error: Exception) -> None:
+    said: list[str] = []
+    parts = [Square(k) for k in range(7)]
+    assert squares(compute(parts, executor=Unlucky(error), say=said.append)) == EXPECTED
+    assert len(said) == 1
+
+
+def test_an_error_of_a_part_arrives_as_it_was() -> None:
+    with pytest.raises(ZeroDivisionError):
+        compute([Square(1)], executor=Unlucky(ZeroDivisionError()))
+
+
+def test_workers_that_cannot_be() -> None:
+    with pytest.raises(ConfigError, match=r"--workers=0: out of range; give 1 to 256"):
+        compute([], workers=0)

@@ -1,0 +1,382 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A sweep: every row is what the core says of its run, whoever made it and whatever went wrong."""
+
+import csv
+import io
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+
+from mfba_planner.core.episode import run
+from mfba_planner.core.errors import ConfigError, OutputError
+from mfba_planner.core.metrics import assess
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.oracle import solve
+from mfba_planner.sweep import parts
+from mfba_planner.sweep.columns import COLUMNS, TIMINGS
+from mfba_planner.sweep.keeper import Keeper, Lost, each
+from mfba_planner.sweep.order import Order, Run, Setting, read_run
+from mfba_planner.sweep.parts import make, parts_of
+from mfba_planner.sweep.run import Swept, dask_executor, open_store, sweep
+from mfba_planner.sweep.summary import comparisons, standings, versus
+from mfba_planner.sweep.table import sorted_hash, to_csv, to_parquet, write
+from mfba_planner.worlds import suite
+from mfba_planner.worlds.difficulty import survivability
+
+
+def an_order(**changes: Any) -> Order:
+    plain: dict[str, Any] = {
+        "suite": "random-3", "planners": ("paper", "straight"), "worlds": 5, "oracle": False,
+    }  # fmt: skip
+    return Order(**{**plain, **changes})
+
+
+@pytest.fixture(scope="module")
+def small() -> Swept:
+    """Ten runs, judged by the oracle."""
+    return sweep(an_order(oracle=True))
+
+
+@pytest.fixture
+def tiny_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many parts of few runs; it is the parent who cuts."""
+    monkeypatch.setattr(parts, "RUNS_AT_ONCE", 2)
+    monkeypatch.setattr(parts, "WORLDS_AT_ONCE", 2)
+
+
+def test_every_run_is_there_once_in_order(small: Swept) -> None:
+    keys = [tuple(row[name] for name in Run._fields) for row in small.rows]
+    assert keys == [
+        ("random-3", world, planner, 0) for world in range(5) for planner in ("paper", "straight")
+    ]
+    assert all(list(row) == list(COLUMNS) for row in small.rows)
+    assert all(list(row) == list(TIMINGS) for row in small.timings)
+    assert [tuple(row[name] for name in Run._fields) for row in small.timings] == keys
+
+
+def test_a_row_is_what_the_core_says_of_the_run(small: Swept) -> None:
+    row = next(row for row in small.rows if (row["world"], row["planner"]) == (3, "paper"))
+    scenario = suite("random-3").world(3)
+    params = PlannerParams(speed_mps=0.8)
+    result, conduct = assess(run(scenario, planner=params, seed=0))
+    for name in ("length_m", "time_s", "collisions", "min_clearance_m", "ticks", "success"):
+        assert row[name] == getattr(result, name), name
+    for name in conduct.__slots__:
+        assert row[name] == getattr(conduct, name), name
+    optimum = solve(scenario, 0.8)
+    assert row["optimum_m"] == round(optimum.length_m, 6)
+    assert row["certificate"] == optimum.certificate.value
+    assert row["survivability"] == survivability(scenario, 0.8).share
+    assert row["gap"] == result.length_m / row["optimum_m"] - 1.0
+    assert row["spl"] == pytest.approx(1.0 / (1.0 + row["gap"]))
+    assert row["barn"] == 0.5
+    assert (row["obstacles"], row["encounters"]) == (3, len(result.encounters))
+
+
+def test_timings_are_measured(small: Swept) -> None:
+    for row in small.timings:
+        assert 0.0 < row["decision_us"] <= row["decision_max_us"] < 1e3 * row["wall_ms"]
+
+
+@pytest.mark.usefixtures("tiny_parts")
+@pytest.mark.parametrize("workers", [2, 4])
+def test_processes_change_nothing(small: Swept, workers: int) -> None:
+    again = sweep(an_order(oracle=True), workers=workers)
+    assert again.hash == small.hash
+    assert again.rows == small.rows or repr(again.rows) == repr(small.rows)
+
+
+@pytest.fixture
+def scheduler() -> Iterator[str]:
+    """The address of a real cluster of two worker processes."""
+    from distributed import LocalCluster
+
+    cluster = LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+    )
+    with cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.mark.usefixtures("tiny_parts")
+@pytest.mark.filterwarnings("default")  # of dask's own
+def test_dask_changes_nothing(small: Swept, scheduler: str) -> None:
+    with dask_executor(scheduler) as executor:
+        assert sweep(an_order(oracle=True), executor=executor).hash == small.hash
+
+
+def test_the_hash_tells_every_bit_but_not_the_order(small: Swept) -> None:
+    rows = small.rows
+    assert sorted_hash(rows[::-1]) == small.hash
+    last = {**rows[-1], "length_m": np.nextafter(rows[-1]["length_m"], 99.0).item()}
+    assert sorted_hash([*rows[:-1], last]) != small.hash
+    assert sorted_hash(rows[:-1]) != small.hash
+
+
+def test_worlds_and_seeds_asked_for() -> None:
+    found = sweep(an_order(planners=("paper",), first=2, worlds=2, seeds=3))
+    assert [(row["world"], row["seed"]) for row in found.rows] == [
+        (world, seed) for world in (2, 3) for seed in (0, 1, 2)
+    ]
+    whole = sweep(an_order(planners=("paper",), worlds=4, seeds=3))
+    assert repr(whole.rows[6:]) == repr(found.rows)
+
+
+def test_a_suite_that_repeats_its_worlds_changes_the_seed() -> None:
+    found = sweep(an_order(suite="paper", planners=("paper",), worlds=4))
+    assert [(row["world"], row["seed"]) for row in found.rows] == [(0, 0), (1, 0), (2, 1), (3, 1)]
+    assert found.rows[0]["length_m"] != found.rows[2]["length_m"]
+    with pytest.raises(ConfigError, match="--seeds=2: paper has 2 worlds, which --worlds repeats"):
+        an_order(suite="paper", seeds=2)
+    judged = sweep(an_order(suite="paper", planners=("paper",), worlds=4, oracle=True)).rows
+    assert judged[0]["optimum_m"] == judged[2]["optimum_m"] != judged[1]["optimum_m"]
+
+
+# --- planners that go wrong -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("planner", "failure"),
+    [
+        ("Raises", "tick 5: raised ValueError: no idea what to do"),
+        ("NotANumber", "tick 5: velocity (nan, 0.0) is not finite"),
+        ("TooFast", "tick 5: speed 0.808 m/s exceeds the limit of 0.8 m/s"),
+        ("Nothing", "tick 5: returned NoneType, not a Decision"),
+        ("OldStamp", "tick 5: answered stamp 1 instead of 2250000000"),
+        ("OneNumber", "tick 5: velocity 3.0 is not two numbers"),
+    ],
+)
+def test_a_faulty_planner_fails_and_the_sweep_goes_on(planner: str, failure: str) -> None:
+    faulty = f"faulty_planners:{planner}"
+    found = sweep(an_order(planners=(faulty, "straight"), worlds=2))
+    assert [row["outcome"] == "failed" for row in found.rows] == [True, False, True, False]
+    assert [row["failure"] for row in found.rows] == [failure, "", failure, ""]
+    assert {row["success"] for row in found.rows[::2]} == {False}
+    assert found.rows[0]["ticks"] == 5, "what was decided before is told"
+    assert found.rows[0]["length_m"] == pytest.approx(4 * 0.3)
+    assert found.rows[0]["time_to_goal_s"] == math.inf
+
+
+def test_a_planner_that_cannot_be_made_fails() -> None:
+    faulty = "faulty_planners:Unmakeable"
+    found = sweep(an_order(planners=(faulty,), worlds=1, seeds=2))
+    assert [row["failure"] for row in found.rows] == ["", "tick 0: raised KeyError: 'seed'"]
+    assert found.rows[1]["ticks"] == 0
+
+
+@pytest.mark.parametrize(
+    ("planner", "failure"),
+    [
+        ("Hangs", "hung: no end after 4 s of wall time"),
+        ("Dies", "its process died (exit code 7)"),
+    ],
+)
+@pytest.mark.parametrize("workers", [1, 2])
+def test_one_that_hangs_or_dies_costs_its_run(
+    planner: str, failure: str, workers: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(parts, "RUNS_AT_ONCE", 4)
+    order = an_order(
+        planners=(f"faulty_planners:{planner}",),
+        worlds=2,
+        seeds=3,
+        setting=Setting(patience_s=4.0),
+    )
+    found = sweep(order, workers=workers)
+    assert [row["failure"] for row in found.rows] == ["", failure, ""] * 2
+    assert [row["outcome"] for row in found.rows] == ["goal_reached", "failed", "goal_reached"] * 2
+    lost = found.rows[1]
+    assert (lost["length_m"], lost["collisions"], lost["success"]) == (None, None, False)
+    rows = found.rows
+    plain = sweep(an_order(planners=("straight",), worlds=2, seeds=3)).rows
+    for k in (0, 2, 3, 5):
+        assert rows[k]["length_m"] == plain[k]["length_m"], "the others are what they always were"
+
+
+def test_what_is_wrong_with_us_is_no_planner_s_fault() -> None:
+    run_of_no_suite = Run("random-4", 0, "straight", 0)
+    with pytest.raises(ConfigError, match="no such suite"):
+        list(each(make, [run_of_no_suite], Setting(), 60.0))
+    (row,) = each(make, [Run("random-3", 0, "straight", 0)], Setting(), 60.0)
+    assert not isinstance(row, Lost)
+    assert row["outcome"] == "goal_reached", "the next one is made as if nothing was"
+
+
+# --- what is said of it -----------------------------------------------------------------------
+
+
+def test_the_table_as_text_and_as_parquet(small: Swept, tmp_path: Path) -> None:
+    text = list(csv.DictReader(io.StringIO(to_csv(small.rows, COLUMNS).decode())))
+    (tmp_path / "t.parquet").write_bytes(to_parquet(small.rows, COLUMNS))
+    table = parquet.read_table(tmp_path / "t.parquet")
+    assert repr(table.to_pylist()) == repr(small.rows)
+    assert table.schema.field("gap").metadata[b"meaning"].startswith(b"length / optimum")
+    for line, row in zip(text, small.rows):
+        for name, (kind, _) in COLUMNS.items():
+            value = row[name]
+            if value is None:
+                assert line[name] == ""
+            elif kind is bool:
+                assert line[name] == str(value).lower()
+            else:
+                assert kind(line[name]) == value
+
+
+def test_a_table_that_was_cut_short_is_left_and_refused(small: Swept, tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    write(path, small.rows, COLUMNS)
+    whole = path.read_bytes()
+    write(path, small.rows, COLUMNS)
+    assert path.read_bytes() == whole
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(OutputError, match=r"table.csv: is not what the finished runs say"):
+        write(path, small.rows, COLUMNS)
+    assert path.read_bytes() == whole[: len(whole) // 2]
+
+
+def test_standings(small: Swept) -> None:
+    paper, straight = standings(small.rows, small.timings)
+    assert (paper.planner, straight.planner) == ("paper", "straight")
+    good = [row for row in small.rows if row["planner"] == "paper" and row["success"]]
+    assert paper.success.middle == len(good) / 5
+    assert paper.gap is not None
+    assert paper.gap.middle == pytest.approx(sum(row["gap"] for row in good) / len(good))
+    assert paper.gap.low <= paper.gap.middle <= paper.gap.high
+    assert paper.certified_runs == 5
+    hit = [row for row in small.rows if row["planner"] == "straight" and row["collisions"]]
+    assert straight.collisions == len(hit)
+    assert straight.hits_moving + straight.hits_standing == sum(r["collisions"] for r in hit)
+
+
+def made_up(planner: str, world: int, success: bool, gap: float | None, seed: int = 0) -> Any:
+    return {"planner": planner, "world": world, "seed": seed, "success": success, "gap": gap}
+
+
+def test_a_pair_on_the_same_worlds() -> None:
+    rows = [
+        made_up("a", 0, True, 0.3), made_up("b", 0, True, 0.1),
+        made_up("a", 1, True, 0.2), made_up("b", 1, False, 0.0),
+        made_up("a", 2, False, None), made_up("b", 2, True, 0.1),
+        made_up("a", 3, False, None), made_up("b", 3, True, 0.1),
+        made_up("a", 4, True, 0.2), made_up("b", 4, True, 0.2),
+        made_up("a", 5, True, 0.2),
+    ]  # fmt: skip
+    found = versus(rows, "b", "a")
+    assert (found.wins, found.losses) == (2, 1)
+    assert found.p == 1.0
+    assert found.gap is not None
+    assert (found.gap.n, found.gap.wins, found.gap.ties) == (2, 1, 1)
+    assert found.gap.difference.middle == pytest.approx(-0.1)
+    assert [(v.planner, v.other) for v in comparisons(rows)] == [("b", "a")]
+
+
+def test_seeds_of_one_world_are_one_case() -> None:
+    rows = [made_up("a", 0, True, 0.1, seed) for seed in range(9)]
+    rows += [made_up("b", 0, True, 0.2, seed) for seed in range(9)]
+    found = versus(rows, "b", "a")
+    assert found.gap is not None
+    assert found.gap.n == 1
+
+
+# --- orders -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"suite": "random-11"}, "'random-11': no such suite; did you mean 'random-1"),
+        ({"planners": ("papre",)}, "planner 'papre': unknown; did you mean 'paper'?"),
+        ({"planners": ("nowhere:Mine",)}, "planner nowhere:Mine: cannot be imported"),
+        ({"planners": ("math:Mine",)}, "planner math:Mine: cannot be imported"),
+        ({"planners": ()}, "--planner: none given"),
+        ({"planners": ("paper", "paper")}, "--planner paper: given twice"),
+        ({"worlds": 0}, "--worlds=0: out of range; give at least 1"),
+        ({"first": -1}, "--first=-1: out of range; give at least 0"),
+        ({"seeds": 0}, "--seeds=0: out of range; give at least 1"),
+    ],
+)
+def test_orders_that_cannot_be(changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        an_order(**changes)
+    assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"perception": "scan-13"}, "did you mean 'scan-12'?"),
+        ({"noise_m": math.nan}, "noise_m=nan"),
+        ({"latency_ticks": -1}, "latency_ticks=-1"),
+        ({"patience_s": 0.0}, "--patience=0: out of range"),
+        ({"patience_s": math.inf}, "--patience=inf: out of range"),
+    ],
+)
+def test_settings_that_cannot_be(changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        Setting(**changes)
+    assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "a/b/c/d", "random-3/1/paper", "random-3/-1/paper/0"])
+def test_what_is_no_run(text: str) -> None:
+    with pytest.raises(ConfigError, match="no run; give SUITE/WORLD/PLANNER/SEED"):
+        read_run(text)
+    assert read_run("random-3/1/paper/0") == Run("random-3", 1, "paper", 0)
+
+
+def test_perception_reaches_the_planner() -> None:
+    known = sweep(an_order(planners=("paper",), worlds=3)).rows
+    scan = sweep(
+        an_order(planners=("paper",), worlds=3, setting=Setting(perception="scan-12"))
+    ).rows
+    assert [row["length_m"] for row in known] != [row["length_m"] for row in scan]
+
+
+def test_a_directory_belongs_to_one_order(tmp_path: Path) -> None:
+    order = an_order()
+    open_store(tmp_path / "out", order)
+    open_store(tmp_path / "out", an_order())
+    for other, what in (
+        (replace(order, worlds=6), "worlds=5, now 6"),
+        (replace(order, planners=("paper",)), "planners=['paper', 'straight'], now ['paper']"),
+        (replace(order, oracle=True), "oracle=False, now True"),
+        (replace(order, setting=Setting(noise_m=0.1)), "setting="),
+    ):
+        with pytest.raises(OutputError) as caught:
+            open_store(tmp_path / "out", other)
+        assert what in str(caught.value)
+
+
+def test_parts_do_not_depend_on_who_computes_them() -> None:
+    names = [part.name for part in parts_of(an_order(worlds=250, oracle=True))]
+    assert len(set(names)) == len(names)
+    assert names[0] == "random-3-oracle-0-20"
+    assert names[-3:] == [
+        "random-3-straight-0-100", "random-3-straight-100-100", "random-3-straight-200-50",
+    ]  # fmt: skip
+
+
+def environment(name: str, _: None) -> str | None:
+    """A variable as the processes see it that work is done in."""
+    return os.environ.get(name)
+
+
+def test_work_is_done_by_one_thread_whatever_the_workers_are_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Several would add up in another order: dask tells its workers to use one, others do not."""
+    names = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"]
+    for name in names:
+        monkeypatch.setenv(name, "2")
+    child = Keeper()
+    try:
+        assert list(child.ask(environment, tuple(names), None, 60.0)) == ["1", "1", "1"]
+    finally:
+        child.end()
