@@ -15,6 +15,7 @@ from ..core.options import check, option
 from ..core.planner import NANO, Circle, Event, Observation, PlannerParams, stream
 from ..core.region import Disc
 from ..core.sensing import Bits, SensorParams
+from .memory import Memory, MemoryParams
 from .prediction import Prediction, RiskParams, from_sectors, moved
 from .steering import Move, Steering
 from .tracking import Tracker, TrackingParams
@@ -24,7 +25,6 @@ WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, in full speeds; not 0, so that it has a direction
 SHUT = 12  # headings weighed when every one is closed
 _FREE_M = 1e-9
-_NEAR_S = 1e-9  # so that no leg is without a duration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +43,7 @@ class PredictiveParams:
     sector_radius_m: float = option(
         0.3, "radius of what stands for a set sector", unit="m", minimum=0.01, maximum=10.0
     )
+    memory: MemoryParams = field(default_factory=MemoryParams)
     tracking: TrackingParams = field(default_factory=TrackingParams)
     risk: RiskParams = field(default_factory=RiskParams)
 
@@ -86,6 +87,7 @@ class Predictive(Steering):
         angles = 2.0 * math.pi / n * np.arange(1, n + 1)
         self._cos, self._sin = np.cos(angles), np.sin(angles)
         self._waypoint: Point | None = None
+        self._memory = Memory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
         super().__init__(params, sensor, seed)
 
@@ -100,7 +102,7 @@ class Predictive(Steering):
         tick_s = self.params.tick_ns * NANO
         (x, y), (gx, gy) = here, goal
         to_goal, left = (gx - x, gy - y), distance(here, goal)
-        world = Prediction(here, circles, self.options.risk, tick_s)
+        world = Prediction(here, circles, self.options.risk, tick_s, speed)
         share = min(1.0, speed * tick_s / left)
         ahead, t_ahead = (to_goal[0] * share, to_goal[1] * share), share * left / speed
         direct = world.cost(ahead, t_ahead, to_goal, speed)
@@ -112,16 +114,20 @@ class Predictive(Steering):
         ways = self._waypoints(gaps, to_goal, left)
         if before is not None:  # likely to be the best still: it spares the others most
             q = (before[0] - x, before[1] - y)
-            ways.insert(0, (q, distance((0.0, 0.0), q) / speed + _NEAR_S))
-        for q, t1 in ways:
+            ways.insert(0, (-math.inf, q, max(distance((0.0, 0.0), q) / speed, tick_s)))
+        for number, (lower, q, t1) in enumerate(ways):
+            if lower >= least:
+                break  # so are all that follow
             cost = world.cost(q, t1, to_goal, speed, least)
             if cost < least:
                 way, lasts, least = q, t1, cost
+            if number == 0:
+                world.narrow(to_goal, least)
         swarm = self._fly(world, way, to_goal, least, obs.stamp_ns)
         if swarm.best_value < least:
             (qx, qy), least = swarm.best_x, swarm.best_value
             way = (qx, qy)
-            lasts = math.sqrt(qx * qx + qy * qy) / speed
+            lasts = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
         if distance((0.0, 0.0), way) > 0.999 * lasts * speed:
             self._waypoint = (x + way[0], y + way[1])
         scale = 1.0 / max(lasts, distance((0.0, 0.0), way) / speed)
@@ -144,15 +150,18 @@ class Predictive(Steering):
         )
 
     def forget(self) -> None:
-        """Drop the last waypoint and all tracks."""
+        """Drop the last waypoint, all tracks and all that is out of sight."""
         self._waypoint = None
+        self._memory = Memory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
-        """The circles as they are now: told, tracked from scans, or a stand-in per sector."""
+        """The circles as they are now: told or remembered, tracked, or a stand-in per sector."""
         stamp_ns, pose = obs.sensed or (obs.stamp_ns, obs.pose)
         if obs.circles is not None:
-            return moved(obs.circles, (obs.stamp_ns - stamp_ns) * NANO)
+            reach_m = self.sensor.sensing_range_m
+            known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
+            return moved(known, (obs.stamp_ns - stamp_ns) * NANO)
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
             return self._tracker.circles(obs.stamp_ns, self.options.robot_radius_m)
@@ -175,18 +184,27 @@ class Predictive(Steering):
 
     def _waypoints(
         self, gaps: list[int], to_goal: Point, left: float
-    ) -> list[tuple[Point, float]]:
-        """Waypoints and the time they are reached after."""
+    ) -> list[tuple[float, Point, float]]:
+        """What waypoints cost at least, where they are and the time they are reached after.
+
+        The cheapest come first: most of the others need not be weighed then.
+        """
         speed, reach = self.params.speed_mps, self.options.reach_m
-        ways = []
+        (gx, gy), ways = to_goal, []
         for k in gaps:
             c, s = float(self._cos[k]), float(self._sin[k])
             for share in LENGTHS:
-                ways.append(((c * share * reach, s * share * reach), share * reach / speed))
-        ex, ey = to_goal[0] / left * speed, to_goal[1] / left * speed
+                first = share * reach
+                qx, qy = c * first, s * first
+                rx, ry = gx - qx, gy - qy
+                ways.append((first + math.sqrt(rx * rx + ry * ry), (qx, qy), first / speed))
+        ex, ey = gx / left * speed, gy / left * speed
+        waiting = self.options.risk.waiting * speed
         for share in SPEEDS:
             for t in WAITS_S:
-                ways.append(((ex * share * t, ey * share * t), t))
+                lower = left + waiting * t * (1.0 - share)
+                ways.append((lower - _FREE_M, (ex * share * t, ey * share * t), t))
+        ways.sort()
         return ways
 
     def _fly(
@@ -194,12 +212,14 @@ class Predictive(Steering):
     ) -> BatSwarm:
         """Bats around the best waypoint so far; what cannot be below the bound is not weighed."""
         bat, speed = self.params.bat, self.params.speed_mps
+        tick_s = self.params.tick_ns * NANO
         disc = Disc(self.options.search_m, center)
         swarm = BatSwarm(bat, disc, stream(self.seed, stamp_ns), ahead=bat.iterations)
         for _ in range(bat.iterations + 1):
             values = []
             for qx, qy in swarm.ask():
-                t1 = math.sqrt(qx * qx + qy * qy) / speed + _NEAR_S
+                # A velocity is held for a tick: who is there sooner would drive beyond it.
+                t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
                 values.append(world.cost((qx, qy), t1, to_goal, speed, bound))
             swarm.tell(values)
             bound = min(bound, swarm.best_value)
