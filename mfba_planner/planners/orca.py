@@ -52,6 +52,7 @@ class Orca(Steering):
             place = (circle.center_m[0] - px, circle.center_m[1] - py)
             number = simulator.add_agent(place)
             simulator.set_agent_radius(number, circle.radius_m)
+            simulator.set_agent_max_neighbors(number, 0)  # what they would do is not asked for
             others.append((number, place, circle.velocity_mps))
         velocity = self._velocity
         for _ in range(ROUNDS):
