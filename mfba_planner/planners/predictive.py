@@ -15,6 +15,7 @@ from ..core.options import check, option
 from ..core.planner import NANO, Circle, Event, Observation, PlannerParams, stream
 from ..core.region import Disc
 from ..core.sensing import Bits, SensorParams
+from .memory import Memory, MemoryParams
 from .prediction import Prediction, RiskParams, from_sectors, moved
 from .steering import Move, Steering
 from .tracking import Tracker, TrackingParams
@@ -43,6 +44,7 @@ class PredictiveParams:
     sector_radius_m: float = option(
         0.3, "radius of what stands for a set sector", unit="m", minimum=0.01, maximum=10.0
     )
+    memory: MemoryParams = field(default_factory=MemoryParams)
     tracking: TrackingParams = field(default_factory=TrackingParams)
     risk: RiskParams = field(default_factory=RiskParams)
 
@@ -86,6 +88,7 @@ class Predictive(Steering):
         angles = 2.0 * math.pi / n * np.arange(1, n + 1)
         self._cos, self._sin = np.cos(angles), np.sin(angles)
         self._waypoint: Point | None = None
+        self._memory = Memory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
         super().__init__(params, sensor, seed)
 
@@ -144,15 +147,18 @@ class Predictive(Steering):
         )
 
     def forget(self) -> None:
-        """Drop the last waypoint and all tracks."""
+        """Drop the last waypoint, all tracks and all that is out of sight."""
         self._waypoint = None
+        self._memory = Memory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
-        """The circles as they are now: told, tracked from scans, or a stand-in per sector."""
+        """The circles as they are now: told or remembered, tracked, or a stand-in per sector."""
         stamp_ns, pose = obs.sensed or (obs.stamp_ns, obs.pose)
         if obs.circles is not None:
-            return moved(obs.circles, (obs.stamp_ns - stamp_ns) * NANO)
+            reach_m = self.sensor.sensing_range_m
+            known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
+            return moved(known, (obs.stamp_ns - stamp_ns) * NANO)
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
             return self._tracker.circles(obs.stamp_ns, self.options.robot_radius_m)

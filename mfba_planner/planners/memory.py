@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Circles that were seen and have left the sensing region, followed on for a while."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..core.geometry import Point
+from ..core.options import check, option
+from ..core.planner import NANO, Circle
+
+_SAME = 0.25  # of a radius: a circle seen this near to a remembered one is the same
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MemoryParams:
+    """How long what is out of sight is believed to move on as it did."""
+
+    way_m: float = option(
+        0.6, "way after which a circle out of sight is given up", unit="m", minimum=0.0,
+        maximum=1000.0,
+    )  # fmt: skip
+    longest_s: float = option(
+        10.0, "time after which it is given up at any speed", unit="s", minimum=0.0,
+        maximum=3600.0,
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+class Memory:
+    """What was seen and is out of sight; nothing is in it that no look ever showed.
+
+    A remembered circle that ought to be in sight is dropped, whether or not it is seen: the
+    present look knows better.
+    """
+
+    def __init__(self, params: MemoryParams | None = None) -> None:
+        """Start empty."""
+        self.params = params or MemoryParams()
+        self._circles: list[tuple[Circle, float]] = []  # and since when they are out of sight, s
+        self._stamp_ns: int | None = None
+
+    def update(
+        self, stamp_ns: int, position: Point, range_m: float, seen: Sequence[Circle]
+    ) -> list[Circle]:
+        """Circles seen at that stamp and those remembered, all as they are at that stamp.
+
+        range_m is how near the edge of a circle has to be to be seen. Stamps that do not rise
+        begin anew.
+        """
+        last, self._stamp_ns = self._stamp_ns, stamp_ns
+        found = [(circle, 0.0) for circle in seen]
+        if last is not None and last < stamp_ns:
+            dt = (stamp_ns - last) * NANO
+            hidden = (self._later(circle, age, dt) for circle, age in self._circles)
+            for circle, age in list(filter(None, hidden)):
+                if _apart(circle.center_m, position) <= circle.radius_m + range_m:
+                    continue
+                if all(_apart(circle.center_m, c.center_m) > _SAME * c.radius_m for c in seen):
+                    found.append((circle, age))
+        self._circles = found
+        return [circle for circle, _ in found]
+
+    def _later(self, circle: Circle, age_s: float, dt: float) -> tuple[Circle, float] | None:
+        """The circle and its age dt seconds on; None once it is given up."""
+        (x, y), (vx, vy) = circle.center_m, circle.velocity_mps
+        age_s += dt
+        p = self.params
+        if age_s > p.longest_s or age_s * math.sqrt(vx * vx + vy * vy) > p.way_m:
+            return None
+        return replace(circle, center_m=(x + vx * dt, y + vy * dt)), age_s
+
+
+def _apart(a: Point, b: Point) -> float:
+    dx, dy = a[0] - b[0], a[1] - b[1]
+    return math.sqrt(dx * dx + dy * dy)

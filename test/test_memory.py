@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is out of sight: kept while it may matter, and never against what is seen."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mfba_planner.core.geometry import Point
+from mfba_planner.core.planner import Circle
+from mfba_planner.planners.memory import Memory, MemoryParams
+
+SECOND = 10**9
+RANGE_M = 0.8
+HERE = (0.0, 0.0)
+
+
+def circle(x: float, y: float = 0.0, velocity: Point = (0.0, 0.0)) -> Circle:
+    return Circle(center_m=(x, y), radius_m=0.6, velocity_mps=velocity)
+
+
+def look(memory: Memory, at_s: float, *seen: Circle, position: Point = HERE) -> list[Circle]:
+    return memory.update(round(at_s * SECOND), position, RANGE_M, seen)
+
+
+def test_who_has_left_is_followed_on() -> None:
+    memory = Memory()
+    look(memory, 0.0, circle(1.39, velocity=(0.3, -0.1)))
+    (hidden,) = look(memory, 0.5)
+    assert hidden.center_m == pytest.approx((1.54, -0.05))
+    (hidden,) = look(memory, 1.5)
+    assert hidden.center_m == pytest.approx((1.84, -0.15))
+
+
+def test_a_ghost_in_sight_is_dropped_for_good() -> None:
+    memory = Memory()
+    look(memory, 0.0, circle(1.3))
+    assert look(memory, 0.1) == []
+    assert look(memory, 0.2, position=(-5.0, 0.0)) == []
+
+
+def test_who_is_seen_is_not_remembered_beside_itself() -> None:
+    memory = Memory()
+    look(memory, 0.0, circle(1.39, velocity=(0.2, 0.0)))
+    turned = circle(1.39, velocity=(0.0, 0.2))  # where it would be out of sight, had it not turned
+    assert look(memory, 0.1, turned) == [turned]
+
+
+@pytest.mark.parametrize(("speed_mps", "until_s"), [(0.3, 2.0), (0.1, 6.0), (0.0, 10.0)])
+def test_the_faster_the_sooner_it_is_given_up(speed_mps: float, until_s: float) -> None:
+    memory = Memory(MemoryParams(way_m=0.6, longest_s=10.0))
+    look(memory, 0.0, circle(1.4, velocity=(speed_mps, 0.0)))
+    assert len(look(memory, until_s - 0.01, position=(-1.0, 0.0))) == 1
+    assert look(memory, until_s + 0.01, position=(-1.0, 0.0)) == []
+
+
+def test_a_clock_that_does_not_rise_begins_anew() -> None:
+    memory = Memory()
+    look(memory, 1.0, circle(1.39, velocity=(0.3, 0.0)))
+    assert look(memory, 1.0) == []
+
+
+def test_nothing_is_remembered_for_no_time() -> None:
+    memory = Memory(MemoryParams(longest_s=0.0))
+    look(memory, 0.0, circle(1.39, velocity=(0.3, 0.0)))
+    assert look(memory, 0.1) == []
+
+
+@given(
+    x=st.floats(0.7, 1.4), vx=st.floats(-0.5, 0.5), vy=st.floats(-0.5, 0.5),
+    ticks=st.lists(st.floats(0.05, 0.5), min_size=1, max_size=8),
+)  # fmt: skip
+@settings(max_examples=100)
+def test_a_straight_mover_is_held_once_and_where_it_is(
+    x: float, vx: float, vy: float, ticks: list[float]
+) -> None:
+    memory, t = Memory(), 0.0
+    for dt in (0.0, *ticks):
+        t += dt
+        true = circle(x + vx * t, vy * t, (vx, vy))
+        in_sight = true.center_m[0] ** 2 + true.center_m[1] ** 2 <= 1.4**2
+        held = look(memory, t, *([true] if in_sight else []))
+        assert len(held) <= 1
+        if in_sight:
+            assert held == [true]
+        elif held:
+            assert held[0].center_m == pytest.approx(true.center_m, abs=1e-6)
