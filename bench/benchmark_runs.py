@@ -68,8 +68,9 @@ INGREDIENTS = (
     Entry("all without velocities", _without("NoVelocities")),
     Entry("all without bats", _without("NoBats")),
     Entry("all without waiting and slowing", _without("NoWaiting")),
-    Entry("all without the last waypoint", _without("NoMemory")),
-    Entry("all without margins", _without("NoMargins")),
+    Entry("all without the last waypoint", _without("NoLastWaypoint")),
+    Entry("all without memory of circles", _without("no_memory")),
+    Entry("all without margins", _without("no_margins")),
     Entry("all (predictive)", "predictive"),
 )
 

@@ -12,6 +12,7 @@ from typing import Any
 from ..core.geometry import Point, wrap_angle
 from ..core.planner import NANO, Circle, Event, Observation, PlannerParams
 from ..core.sensing import SensorParams
+from .memory import MemoryParams
 from .prediction import Prediction, RiskParams
 from .predictive import Predictive, PredictiveParams
 from .steering import Move
@@ -74,8 +75,8 @@ class NoWaiting(Predictive):
         return [way for way in ways if math.hypot(*way[0]) > 0.999 * speed * way[1]]
 
 
-class NoMemory(Predictive):
-    """Every tick begins anew, without the last waypoint."""
+class NoLastWaypoint(Predictive):
+    """Every tick begins its search anew."""
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """As ever."""
@@ -83,13 +84,16 @@ class NoMemory(Predictive):
         return super().move(obs, goal)
 
 
-class NoMargins(Predictive):
+def no_margins(params: PlannerParams, sensor: SensorParams, seed: int) -> Predictive:
     """Any pass that is no contact is as good as any other."""
+    risk = RiskParams(close_m=0.0, margin_m=1e-6, margin_ticks=0.0)
+    return Predictive(params, sensor, seed, PredictiveParams(risk=risk))
 
-    def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
-        """Start idle; ConfigError for a negative seed."""
-        risk = RiskParams(close_m=0.0, margin_m=1e-6, margin_ticks=0.0)
-        super().__init__(params, sensor, seed, PredictiveParams(risk=risk))
+
+def no_memory(params: PlannerParams, sensor: SensorParams, seed: int) -> Predictive:
+    """Who leaves the sensing region is forgotten."""
+    memory = MemoryParams(way_m=0.0, longest_s=0.0)
+    return Predictive(params, sensor, seed, PredictiveParams(memory=memory))
 
 
 class NoVelocities(Predictive):
