@@ -15,10 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
 from mfba_planner.report import style
-from mfba_planner.report.figure import run_figure
+from mfba_planner.report.moment import moment_png
 from mfba_planner.report.sheet import EDGE, Sheet, to_bytes
 from mfba_planner.statistics import Interval
 from mfba_planner.sweep.columns import Row
+from mfba_planner.sweep.explain import contact_index, explain
 from mfba_planner.sweep.order import Run
 from mfba_planner.sweep.play import play
 
@@ -204,14 +205,18 @@ def _example(
     if not found:
         return
     suite, world = found[0]
-    runs = {e: Run(suite, world, e.planner, 0) for e in (winner, loser)}
-    best, worst = (play(runs[e], e.setting).episode for e in (winner, loser))
+    run = Run(suite, world, loser.planner, 0)
+    played = play(run, loser.setting)
+    headline = explain(played)[0]
+    index = contact_index(played.episode)
+    assert index is not None, "it collided in the sweep"
     file = f"benchmark-{winner.label}-wins.png"
-    words = f"{winner.label} arrives, {loser.label} (dashed) collides"
-    _write(images / file, run_figure(best, worst, words))
+    (images / file).write_bytes(moment_png(played.episode, index, str(run), [headline]))
     directory = results.directories[suite, loser.planner, loser.setting]
-    show = f"mfba show {directory} {runs[loser]}"
-    yield Example(f"{suite}, world {world}: {words}; one of {len(found)}", show, file)
+    words = (
+        f"{winner.label} arrives where {loser.label} does not ({len(found)} worlds), one of them"
+    )
+    yield Example(f"{words}: {headline}", f"mfba show {directory} {run}", file)
 
 
 def _won(results: Results, suite: str, winner: Entry, loser: Entry, worlds: int) -> Iterator[int]:

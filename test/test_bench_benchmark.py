@@ -101,7 +101,7 @@ def test_ingredients_and_perceptions_share_what_is_the_same_run(made: Path) -> N
 def test_what_was_written_by_hand_stays_and_pictures_are_small(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     assert page.partition("<!-- generated")[0] == PAGE.partition("<!-- generated")[0]
-    assert "python bench/benchmark.py --worlds 2 --suite random-20" in page
+    assert "python bench/benchmark.py --worlds 2 --out out --suite random-20" in page
     named = re.findall(r"!\[.*?\]\((.*?)\)", page.partition("<!-- generated")[2])
     assert len(named) >= 3
     for name in named:
