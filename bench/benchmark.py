@@ -102,7 +102,7 @@ def main(args: list[str] | None = None) -> None:
 
 def _command(found: argparse.Namespace) -> str:
     words = [f"--worlds {found.worlds}"]
-    words += [f"--{k} {v}" for k in ("others", "few") if (v := getattr(found, k))]
+    words += [f"--{k} {v}" for k in ("others", "few", "out") if (v := getattr(found, k))]
     words += [f"--suite {name}" for name in found.suite or ()]
     words += [f"--rounds {found.rounds}", f"--workers {found.workers}"]
     return " ".join(["python bench/benchmark.py", *words])

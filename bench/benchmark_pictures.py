@@ -213,10 +213,8 @@ def _example(
     file = f"benchmark-{winner.label}-wins.png"
     (images / file).write_bytes(moment_png(played.episode, index, str(run), [headline]))
     directory = results.directories[suite, loser.planner, loser.setting]
-    words = (
-        f"{winner.label} arrives where {loser.label} does not ({len(found)} worlds), one of them"
-    )
-    yield Example(f"{words}: {headline}", f"mfba show {directory} {run}", file)
+    words = f"Worlds where {winner.label} arrives and {loser.label} collides: {len(found)}"
+    yield Example(f"{words}. The first: {headline}", f"mfba show {directory} {run}", file)
 
 
 def _won(results: Results, suite: str, winner: Entry, loser: Entry, worlds: int) -> Iterator[int]:
