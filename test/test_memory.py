@@ -45,6 +45,13 @@ def test_who_is_seen_is_not_remembered_beside_itself() -> None:
     assert look(memory, 0.1, turned) == [turned]
 
 
+def test_who_is_seen_beyond_the_range_is_not_doubled() -> None:
+    memory = Memory()
+    for tick in range(10):
+        seen = [circle(5.0 + 0.02 * tick, velocity=(0.2, 0.0)), circle(3.0)]
+        assert look(memory, 0.1 * tick, *seen) == seen
+
+
 @pytest.mark.parametrize(("speed_mps", "until_s"), [(0.3, 2.0), (0.1, 6.0), (0.0, 10.0)])
 def test_the_faster_the_sooner_it_is_given_up(speed_mps: float, until_s: float) -> None:
     memory = Memory(MemoryParams(way_m=0.6, longest_s=10.0))

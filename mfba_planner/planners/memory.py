@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..core.geometry import Point
 from ..core.options import check, option
@@ -50,18 +50,23 @@ class Memory:
     ) -> list[Circle]:
         """Circles seen at that stamp and those remembered, all as they are at that stamp.
 
-        range_m is how near the edge of a circle has to be to be seen. Stamps that do not rise
-        begin anew.
+        range_m is how near the edge of a circle has to be to be seen; who is seen farther away
+        proves it longer. Stamps that do not rise begin anew.
         """
         last, self._stamp_ns = self._stamp_ns, stamp_ns
         found = [(circle, 0.0) for circle in seen]
         if last is not None and last < stamp_ns:
             dt = (stamp_ns - last) * NANO
+            edges = [_apart(c.center_m, position) - c.radius_m for c in seen]
+            range_m = max(range_m, *edges) if edges else range_m
             hidden = (self._later(circle, age, dt) for circle, age in self._circles)
             for circle, age in list(filter(None, hidden)):
-                if _apart(circle.center_m, position) <= circle.radius_m + range_m:
-                    continue
-                if all(_apart(circle.center_m, c.center_m) > _SAME * c.radius_m for c in seen):
+                here, same = circle.center_m, _SAME * circle.radius_m
+                beyond = _apart(here, position) - circle.radius_m - range_m
+                # Who is farther beyond cannot be one of those in sight.
+                if beyond > same or (
+                    beyond > 0.0 and all(_apart(here, c.center_m) > same for c in seen)
+                ):
                     found.append((circle, age))
         self._circles = found
         return [circle for circle, _ in found]
@@ -73,7 +78,9 @@ class Memory:
         p = self.params
         if age_s > p.longest_s or age_s * math.sqrt(vx * vx + vy * vy) > p.way_m:
             return None
-        return replace(circle, center_m=(x + vx * dt, y + vy * dt)), age_s
+        center = (x + vx * dt, y + vy * dt)
+        later = Circle(center_m=center, radius_m=circle.radius_m, velocity_mps=(vx, vy))
+        return later, age_s
 
 
 def _apart(a: Point, b: Point) -> float:

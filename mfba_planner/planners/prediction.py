@@ -59,21 +59,34 @@ class Prediction:
     """
 
     def __init__(
-        self, position: Point, circles: Sequence[Circle], params: RiskParams, tick_s: float
+        self,
+        position: Point,
+        circles: Sequence[Circle],
+        params: RiskParams,
+        tick_s: float,
+        speed_mps: float = math.inf,
     ) -> None:
-        """Take the circles as they are now."""
+        """Take the circles as they are now; who cannot be met at that speed is left out."""
         self.params = params
         px, py = position
+        tau, per_mps = params.horizon_s, params.margin_ticks * tick_s
         self._rows: list[_Row] = []
         for circle in circles:
             (x, y), (vx, vy), r = circle.center_m, circle.velocity_mps, circle.radius_m
-            margin = params.margin_m + params.margin_ticks * tick_s * math.sqrt(vx * vx + vy * vy)
-            self._rows.append((x - px, y - py, vx, vy, r, margin, (r + margin) ** 2))
+            own = math.sqrt(vx * vx + vy * vy)
+            margin = params.margin_m + per_mps * own
+            x, y, outer = x - px, y - py, r + margin
+            meets = outer + (speed_mps + own) * tau
+            if x * x + y * y <= meets * meets:
+                self._rows.append((x, y, vx, vy, r, margin, outer * outer))
         # The nearest first: it refuses most.
         self._rows.sort(key=lambda row: row[0] * row[0] + row[1] * row[1] - row[6])
+        self._weighed = self._rows
 
     def closed(self, ux: np.ndarray, uy: np.ndarray) -> np.ndarray:
         """Bits (m,): 1 where a robot with velocity (ux, uy) comes too close within tau."""
+        if not self._rows:
+            return np.zeros(ux.shape, dtype=int)
         x, y, vx, vy, _, _, outer = np.array(self._rows).T[:, :, None]
         wx, wy = vx - ux, vy - uy
         b = x * wx
@@ -86,6 +99,27 @@ class Prediction:
         closest = (a * t + 2.0 * b) * t + away
         near: np.ndarray = (closest < np.minimum(away, outer) * _ROUNDING).any(axis=0)
         return near.astype(int)
+
+    def narrow(self, to_goal: Point, bound: float) -> None:
+        """Leave out of cost() who is met by no way that costs less than the bound.
+
+        Such a way stays where |p| + |p - goal| is less than the bound, hence the centres of
+        those it meets where it is less than the bound + 2 radii. That sum is convex in time,
+        so its tangent now tells how small it may become.
+        """
+        (gx, gy), tau, kept = to_goal, self.params.horizon_s, []
+        for row in self._weighed:
+            x, y, vx, vy, r, margin, _ = row
+            hx, hy = x - gx, y - gy
+            near = math.sqrt(x * x + y * y) or _TINY
+            far = math.sqrt(hx * hx + hy * hy) or _TINY
+            sum_now = near + far
+            change = (vx * x + vy * y) / near + (vx * hx + vy * hy) / far
+            if change < 0.0:
+                sum_now += change * tau
+            if sum_now < bound + 2.0 * (r + margin):
+                kept.append(row)
+        self._weighed = kept
 
     def cost(
         self, way: Point, t1: float, to_goal: Point, speed: float, bound: float = math.inf
@@ -131,7 +165,7 @@ class Prediction:
         """
         p, worst = self.params, 0.0
         tau, close, contact, urgent = p.horizon_s, p.close_m, p.contact_m, p.urgent_m
-        for x, y, vx, vy, r, margin, outer in self._rows:
+        for x, y, vx, vy, r, margin, outer in self._weighed:
             dx, dy, wx, wy = x + vx * t0 - qx, y + vy * t0 - qy, vx - ux, vy - uy
             b = dx * wx + dy * wy
             if b >= 0.0:

@@ -103,7 +103,7 @@ class Predictive(Steering):
         tick_s = self.params.tick_ns * NANO
         (x, y), (gx, gy) = here, goal
         to_goal, left = (gx - x, gy - y), distance(here, goal)
-        world = Prediction(here, circles, self.options.risk, tick_s)
+        world = Prediction(here, circles, self.options.risk, tick_s, speed)
         share = min(1.0, speed * tick_s / left)
         ahead, t_ahead = (to_goal[0] * share, to_goal[1] * share), share * left / speed
         direct = world.cost(ahead, t_ahead, to_goal, speed)
@@ -115,11 +115,15 @@ class Predictive(Steering):
         ways = self._waypoints(gaps, to_goal, left)
         if before is not None:  # likely to be the best still: it spares the others most
             q = (before[0] - x, before[1] - y)
-            ways.insert(0, (q, distance((0.0, 0.0), q) / speed + _NEAR_S))
-        for q, t1 in ways:
+            ways.insert(0, (-math.inf, q, distance((0.0, 0.0), q) / speed + _NEAR_S))
+        for number, (lower, q, t1) in enumerate(ways):
+            if lower >= least:
+                break  # so are all that follow
             cost = world.cost(q, t1, to_goal, speed, least)
             if cost < least:
                 way, lasts, least = q, t1, cost
+            if number == 0:
+                world.narrow(to_goal, least)
         swarm = self._fly(world, way, to_goal, least, obs.stamp_ns)
         if swarm.best_value < least:
             (qx, qy), least = swarm.best_x, swarm.best_value
@@ -181,18 +185,27 @@ class Predictive(Steering):
 
     def _waypoints(
         self, gaps: list[int], to_goal: Point, left: float
-    ) -> list[tuple[Point, float]]:
-        """Waypoints and the time they are reached after."""
+    ) -> list[tuple[float, Point, float]]:
+        """What waypoints cost at least, where they are and the time they are reached after.
+
+        The cheapest come first: most of the others need not be weighed then.
+        """
         speed, reach = self.params.speed_mps, self.options.reach_m
-        ways = []
+        (gx, gy), ways = to_goal, []
         for k in gaps:
             c, s = float(self._cos[k]), float(self._sin[k])
             for share in LENGTHS:
-                ways.append(((c * share * reach, s * share * reach), share * reach / speed))
-        ex, ey = to_goal[0] / left * speed, to_goal[1] / left * speed
+                first = share * reach
+                qx, qy = c * first, s * first
+                rx, ry = gx - qx, gy - qy
+                ways.append((first + math.sqrt(rx * rx + ry * ry), (qx, qy), first / speed))
+        ex, ey = gx / left * speed, gy / left * speed
+        waiting = self.options.risk.waiting * speed
         for share in SPEEDS:
             for t in WAITS_S:
-                ways.append(((ex * share * t, ey * share * t), t))
+                lower = left + waiting * t * (1.0 - share)
+                ways.append((lower - _FREE_M, (ex * share * t, ey * share * t), t))
+        ways.sort()
         return ways
 
     def _fly(
