@@ -69,10 +69,10 @@ class NoWaiting(Predictive):
 
     def _waypoints(
         self, gaps: list[int], to_goal: Point, left: float
-    ) -> list[tuple[Point, float]]:
-        speed = self.params.speed_mps
+    ) -> list[tuple[float, Point, float]]:
+        full = 0.999 * self.params.speed_mps
         ways = super()._waypoints(gaps, to_goal, left)
-        return [way for way in ways if math.hypot(*way[0]) > 0.999 * speed * way[1]]
+        return [(lower, q, t) for lower, q, t in ways if math.hypot(*q) > full * t]
 
 
 class NoLastWaypoint(Predictive):
