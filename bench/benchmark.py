@@ -2,7 +2,7 @@
 """All of docs/benchmark.md: every suite, planner, perception and ingredient, and what it costs.
 
     pip install -e .[orca]
-    python bench/benchmark.py --worlds 10000     # the whole thing; days on two cores
+    python bench/benchmark.py --worlds 10000     # the whole thing; some hours on two cores
     python bench/benchmark.py --out DIR          # small; goes on where it was interrupted
 
 Every sweep has a directory below --out, which `mfba show` reads. The optima of a suite have one
@@ -53,7 +53,8 @@ def arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument(
         "--worlds", type=int, default=20, metavar="N",
-        help=f"of paper, predictive and orca in {', '.join(HEADLINE)} (default: 20)",
+        help=f"of paper, predictive and orca in {', '.join(HEADLINE)}; seeds of each of the "
+        "paper's cases, 1000 at most (default: 20)",
     )  # fmt: skip
     parser.add_argument("--others", type=int, metavar="N", help="in other suites (default: all)")
     parser.add_argument(
