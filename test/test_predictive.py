@@ -21,6 +21,7 @@ from mfba_planner.planners.prediction import Prediction, RiskParams, from_sector
 from mfba_planner.planners.predictive import Predictive, PredictiveParams, preset
 from mfba_planner.planners.registry import make
 from mfba_planner.scenarios import load_scenario
+from mfba_planner.worlds.suites import suite
 
 PARAMS = preset(PlannerParams(speed_mps=0.8))
 SENSOR = SensorParams()
@@ -225,9 +226,9 @@ def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
 ) -> None:
     risk = RiskParams()
     circle = Circle(center_m=(x, y), radius_m=0.6, velocity_mps=(vx, vy))
-    if math.hypot(x, y) < 0.7:
-        return
     margin = risk.margin_m + risk.margin_ticks * 0.1 * math.hypot(vx, vy)
+    if math.hypot(x, y) < 0.61 + margin:  # who is within it already may leave it for nothing
+        return
     way = (0.8 * t1 * math.cos(heading), 0.8 * t1 * math.sin(heading))
     goal = (9.0, 1.0)
     cost = Prediction((0.0, 0.0), [circle], risk, 0.1).cost(way, t1, goal, 0.8)
@@ -259,3 +260,8 @@ def test_the_preset_changes_step_and_swarm_only() -> None:
     )
     assert isinstance(make("predictive", changed, SENSOR, 1), Predictive)
     assert PredictiveParams().headings == 72
+
+
+@pytest.mark.parametrize(("suite_name", "k"), [("dense", 1074), ("adversarial", 1109)])
+def test_no_waypoint_is_so_near_that_the_tick_leads_beyond_it(suite_name: str, k: int) -> None:
+    assert evaluate(drive(suite(suite_name).world(k))).success

@@ -25,7 +25,6 @@ WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, in full speeds; not 0, so that it has a direction
 SHUT = 12  # headings weighed when every one is closed
 _FREE_M = 1e-9
-_NEAR_S = 1e-9  # so that no leg is without a duration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +114,7 @@ class Predictive(Steering):
         ways = self._waypoints(gaps, to_goal, left)
         if before is not None:  # likely to be the best still: it spares the others most
             q = (before[0] - x, before[1] - y)
-            ways.insert(0, (-math.inf, q, distance((0.0, 0.0), q) / speed + _NEAR_S))
+            ways.insert(0, (-math.inf, q, max(distance((0.0, 0.0), q) / speed, tick_s)))
         for number, (lower, q, t1) in enumerate(ways):
             if lower >= least:
                 break  # so are all that follow
@@ -128,7 +127,7 @@ class Predictive(Steering):
         if swarm.best_value < least:
             (qx, qy), least = swarm.best_x, swarm.best_value
             way = (qx, qy)
-            lasts = math.sqrt(qx * qx + qy * qy) / speed
+            lasts = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
         if distance((0.0, 0.0), way) > 0.999 * lasts * speed:
             self._waypoint = (x + way[0], y + way[1])
         scale = 1.0 / max(lasts, distance((0.0, 0.0), way) / speed)
@@ -213,12 +212,14 @@ class Predictive(Steering):
     ) -> BatSwarm:
         """Bats around the best waypoint so far; what cannot be below the bound is not weighed."""
         bat, speed = self.params.bat, self.params.speed_mps
+        tick_s = self.params.tick_ns * NANO
         disc = Disc(self.options.search_m, center)
         swarm = BatSwarm(bat, disc, stream(self.seed, stamp_ns), ahead=bat.iterations)
         for _ in range(bat.iterations + 1):
             values = []
             for qx, qy in swarm.ask():
-                t1 = math.sqrt(qx * qx + qy * qy) / speed + _NEAR_S
+                # A velocity is held for a tick: who is there sooner would drive beyond it.
+                t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
                 values.append(world.cost((qx, qy), t1, to_goal, speed, bound))
             swarm.tell(values)
             bound = min(bound, swarm.best_value)
