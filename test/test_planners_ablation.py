@@ -60,12 +60,12 @@ def test_without_bats_no_candidates() -> None:
 
 
 @pytest.mark.parametrize("name", ["NoWaiting", "BitsOnly"])
-def test_full_speed_or_nothing(name: str) -> None:
+def test_full_speed_unless_blocked_or_nearly_there(name: str) -> None:
     for world in range(3):
-        for tick in drive(name, "random-30", world).ticks[:-2]:
-            speed = math.hypot(*tick.velocity)
-            # exactly 0: blocked, or at its waypoint; who waits creeps
-            assert speed == pytest.approx(0.8) or speed == 0.0
+        for tick in drive(name, "random-30", world).ticks:
+            left = math.dist(tick.waypoint or tick.pose.position, tick.pose.position)
+            if left > 0.08 * (1.0 + 1e-6):  # what a tick takes it
+                assert math.hypot(*tick.velocity) == pytest.approx(0.8)
 
 
 def test_bits_only_takes_the_nearest_free_heading_and_stands_among_none() -> None:
