@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -26,6 +25,7 @@ from benchmark_pictures import write_pictures
 from benchmark_runs import HEADLINE, Counts, Results, say
 
 from mfba_planner.outputs import new_run_directory
+from mfba_planner.study.compute import belong_to_the_parent
 from mfba_planner.worlds import suite_names
 
 ROOT = Path(__file__).parents[1]
@@ -39,9 +39,7 @@ def _pool(workers: int) -> Iterator[Executor | None]:
         yield None
         return
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(
-        workers, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
-    )
+    pool = ProcessPoolExecutor(workers, context, initializer=belong_to_the_parent)
     try:
         yield pool
     finally:
