@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..core.errors import ConfigError
 from ..core.geometry import Point
 from ..core.planner import NANO, Event, Observation, PlannerParams
@@ -65,5 +67,8 @@ class Orca(Steering):
                 simulator.set_agent_pref_velocity(number, keeps)
             simulator.do_step()
             velocity = simulator.get_agent_velocity(robot).to_tuple()
+        # Single precision, and the program of last resort, may leave the disc of speeds.
+        excess = max(1.0, math.hypot(*velocity) / speed)
+        velocity = (velocity[0] / excess, velocity[1] / excess)
         self._velocity = velocity
         return Move(velocity=velocity, reason=f"ORCA among {len(circles)}", event=Event.OBSTACLE)
