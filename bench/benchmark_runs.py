@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -117,10 +117,8 @@ class Results:
         self._optima[suite] = {row["world"]: row for row in rows}
 
     def make(self, suite: str, entry: Entry, worlds: int) -> None:
-        """Make the runs of one line, unless more of the same have been made."""
+        """Make the runs of one line."""
         key = (suite, entry.planner, entry.setting)
-        if key in self._found:
-            return
         order = Order(
             suite=suite, planners=(entry.planner,), worlds=worlds, oracle=False,
             setting=entry.setting,
@@ -161,15 +159,22 @@ class Results:
         ]
 
     def make_all(self, suites: Sequence[str], counts: Counts) -> None:
-        """Make everything, the longest sweeps first where lines share one."""
-        for suite in suites:
-            self.judge(suite, counts.lead(suite))
-        for suite in suites:
-            for entry in LEAD:
-                self.make(suite, entry, counts.lead(suite))
-        for suite in suites:
-            for entry in (*PEERS, *of_suite(PERCEPTIONS, suite), *of_suite(INGREDIENTS, suite)):
-                self.make(suite, entry, counts.rest(suite))
+        """Make everything; as many sweeps at once as keep all workers busy to the end."""
+        with ThreadPoolExecutor(1 if self.executor is None else 2 * self.workers) as threads:
+            list(threads.map(lambda suite: self.judge(suite, counts.lead(suite)), suites))
+            list(threads.map(lambda sweep: self.make(*sweep), _sweeps(suites, counts)))
+
+
+def _sweeps(suites: Sequence[str], counts: Counts) -> list[tuple[str, Entry, int]]:
+    """Every sweep once, in the most worlds that any table has of it."""
+    found = [(suite, entry, counts.lead(suite)) for suite in suites for entry in LEAD]
+    known = {(suite, entry.planner, entry.setting) for suite, entry, _ in found}
+    for suite in suites:
+        for entry in (*PEERS, *of_suite(PERCEPTIONS, suite), *of_suite(INGREDIENTS, suite)):
+            key = (suite, entry.planner, entry.setting)
+            if key not in known:
+                found.append((suite, entry, counts.rest(suite)))
+    return found
 
 
 def _timed(rows: Sequence[Row]) -> list[Row]:
