@@ -107,6 +107,7 @@ def _headline(results: Results, suites: Sequence[str], counts: Counts) -> Figure
         ax.set_xticks(x)
     for ax in axes[1:]:
         ax.set_yscale("symlog", linthresh=1.0)
+        ax.set_ylim(bottom=-0.1)
         _percents(ax.yaxis)
     _legend(sheet, axes[0], _LEGEND)
     return sheet.figure
@@ -169,6 +170,7 @@ def _ablation(results: Results, suites: Sequence[str], counts: Counts) -> Figure
         ax.set_ylim(len(INGREDIENTS) - 0.5, -0.5)
         ax.set_yticks(range(len(INGREDIENTS)), [entry.label for entry in INGREDIENTS])
     axes[1].set_xscale("symlog", linthresh=1.0)
+    axes[1].set_xlim(left=-0.1)
     _percents(axes[1].xaxis)
     axes[1].set_yticklabels([])
     _legend(sheet, axes[1], _LEGEND)
