@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
 from mfba_planner.report import style
+from mfba_planner.report.figure import run_figure
 from mfba_planner.report.moment import moment_png
 from mfba_planner.report.sheet import EDGE, Sheet, to_bytes
 from mfba_planner.statistics import Interval
@@ -31,6 +32,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "dwa": {"color": style.GREEN, "marker": "D"},
 }
 # where wins are looked for first: many obstacles make telling pictures
+CLEAR = ("adversarial", "random-10", "random-20")  # few obstacles: whole ways can be seen
 EXAMPLES = ("random-20", "random-30", "random-10", "adversarial", "dynabarn-like", "dense")
 _SUCCESS, _LONGER = "reached without collision (%)", "longer than the optimum (%)"
 _W, _H, _AXIS, _HEAD, _LEGEND = 3.4, 2.6, 0.6, 0.55, 1.2  # inches
@@ -205,6 +207,7 @@ def _example(
         for world in _won(results, suite, winner, loser, counts.lead(suite))
     ]
     if not found:
+        yield from _shorter(results, suites, counts, winner, loser, images)
         return
     suite, world = found[0]
     run = Run(suite, world, loser.planner, 0)
@@ -217,6 +220,41 @@ def _example(
     directory = results.directories[suite, loser.planner, loser.setting]
     words = f"Worlds where {winner.label} arrives and {loser.label} collides: {len(found)}"
     yield Example(f"{words}. The first: {headline}", f"mfba show {directory} {run}", file)
+
+
+def _shorter(
+    results: Results,
+    suites: Sequence[str],
+    counts: Counts,
+    winner: Entry,
+    loser: Entry,
+    images: Path,
+) -> Iterator[Example]:
+    """Where nobody wins by arriving: the world in which the way is shorter by most."""
+    found: list[tuple[float, str, int]] = [
+        (100.0 * (b["gap"] - a["gap"]), suite, a["world"])
+        for suite in [name for name in CLEAR if name in suites][:1]
+        for a, b in zip(*(results.of(0, suite, e, counts.lead(suite)) for e in (winner, loser)))
+        if a["success"] and b["success"] and a["gap"] is not None
+    ]
+    if not found or max(found)[0] <= 0.0:
+        return
+    points, suite, world = max(found)
+    run = Run(suite, world, loser.planner, 0)
+    ways = [play(Run(suite, world, e.planner, 0), e.setting).episode for e in (winner, loser)]
+    file = f"benchmark-{winner.label}-wins.png"
+    legend = f"dash-dotted: {loser.label}, {points:.0f} points longer"
+    figure = run_figure(ways[0], ways[1], f"{winner.label}; {legend}")
+    figure.set_dpi(80)
+    _write(images / file, figure)
+    directory = results.directories[suite, loser.planner, loser.setting]
+    yield Example(
+        f"Worlds where {winner.label} arrives and {loser.label} collides: none. Its way in "
+        f"{suite} is shorter by most, {points:.0f} points of gap, in world {world} (dash-dotted: "
+        f"{loser.label})",
+        f"mfba show {directory} {run}",
+        file,
+    )
 
 
 def _won(results: Results, suite: str, winner: Entry, loser: Entry, worlds: int) -> Iterator[int]:
