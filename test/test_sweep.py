@@ -19,7 +19,7 @@ from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.metrics import assess
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.oracle import solve
-from mfba_planner.sweep import parts
+from mfba_planner.sweep import keeper, parts
 from mfba_planner.sweep.columns import COLUMNS, TIMINGS
 from mfba_planner.sweep.keeper import Keeper, Lost, each
 from mfba_planner.sweep.order import Order, Run, Setting, read_run
@@ -380,3 +380,12 @@ def test_work_is_done_by_one_thread_whatever_the_workers_are_told(
         assert list(child.ask(environment, tuple(names), None, 60.0)) == ["1", "1", "1"]
     finally:
         child.end()
+
+
+def test_one_child_makes_one_part_after_the_other() -> None:
+    first, second = parts_of(an_order())
+    first.run()
+    child = keeper._LOCAL.keeper
+    second.run()
+    assert keeper._LOCAL.keeper is child
+    assert child.is_alive

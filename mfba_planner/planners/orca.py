@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..core.errors import ConfigError
 from ..core.geometry import Point
 from ..core.planner import NANO, Event, Observation, PlannerParams
@@ -52,6 +54,7 @@ class Orca(Steering):
             place = (circle.center_m[0] - px, circle.center_m[1] - py)
             number = simulator.add_agent(place)
             simulator.set_agent_radius(number, circle.radius_m)
+            simulator.set_agent_max_neighbors(number, 0)  # what they would do is not asked for
             others.append((number, place, circle.velocity_mps))
         velocity = self._velocity
         for _ in range(ROUNDS):
@@ -64,5 +67,8 @@ class Orca(Steering):
                 simulator.set_agent_pref_velocity(number, keeps)
             simulator.do_step()
             velocity = simulator.get_agent_velocity(robot).to_tuple()
+        # Single precision, and the program of last resort, may leave the disc of speeds.
+        excess = max(1.0, math.hypot(*velocity) / speed)
+        velocity = (velocity[0] / excess, velocity[1] / excess)
         self._velocity = velocity
         return Move(velocity=velocity, reason=f"ORCA among {len(circles)}", event=Event.OBSTACLE)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from rich.table import Table
 
@@ -13,11 +13,12 @@ from mfba_planner.sweep.summary import Standing, Versus
 _NONE = "-"
 HEAD = (
     "planner", "runs", "success", "certified", "collided", "by robot / standing", "time limit",
-    "failed", "length m", "gap", "gap 95 %", "SPL", "BARN", "clearance m", "decision us",
+    "failed", "length m", "time s", "gap", "gap 95 %", "SPL", "BARN", "clearance m", "decision us",
 )  # fmt: skip
 NOTE = (
     "95 % intervals: Wilson's for rates, bootstrap over worlds for means. certified: success "
-    "where the oracle holds a collision-free trajectory; gap, length, clearance: of successes; "
+    "where the oracle holds a collision-free trajectory; gap, length, time, clearance: of "
+    "successes; "
     "gap 95 %: 95th percentile; collided: runs; decision: median by this machine's clock"
 )
 VERSUS_HEAD = (
@@ -40,15 +41,25 @@ def to_markdown(
 ) -> str:
     """The same as a page; facts are lines that tell how it was made."""
     blocks = [f"# {title}", "\n".join(f"- {fact}" for fact in facts)]
-    blocks += [_markdown(HEAD, _standing_lines(standings)), NOTE + "."]
+    blocks += [standing_table(standings), NOTE + "."]
     failures = [
         f"- {s.planner}: {count} x {reason}" for s in standings for reason, count in s.failures
     ]
     if failures:
         blocks += ["## Failures of planners", "\n".join(failures)]
     if versus:
-        blocks += ["## In pairs", _markdown(VERSUS_HEAD, _versus_lines(versus)), VERSUS_NOTE + "."]
+        blocks += ["## In pairs", versus_table(versus), VERSUS_NOTE + "."]
     return "\n\n".join(blocks) + "\n"
+
+
+def standing_table(standings: Sequence[Standing]) -> str:
+    """A line for each planner, as Markdown."""
+    return markdown(HEAD, _standing_lines(standings))
+
+
+def versus_table(versus: Sequence[Versus]) -> str:
+    """A line for each pair, as Markdown."""
+    return markdown(VERSUS_HEAD, _versus_lines(versus))
 
 
 def _standing_lines(standings: Sequence[Standing]) -> Iterator[list[str]]:
@@ -56,15 +67,16 @@ def _standing_lines(standings: Sequence[Standing]) -> Iterator[list[str]]:
         yield [
             s.planner,
             str(s.runs),
-            _percent(s.success),
-            f"{_percent(s.certified)} of {s.certified_runs}" if s.certified else _NONE,
+            percent(s.success),
+            f"{percent(s.certified)} of {s.certified_runs}" if s.certified else _NONE,
             str(s.collisions),
             f"{s.hits_moving} / {s.hits_standing}",
             str(s.timeouts),
             str(sum(count for _, count in s.failures)),
             _number(s.length_m, 3),
-            _percent(s.gap),
-            _NONE if s.gap_95 is None else f"{100.0 * s.gap_95:.2f} %",
+            _number(s.time_s, 2),
+            percent(s.gap),
+            percent(s.gap_95),
             _number(s.spl, 3),
             _number(s.barn, 3),
             _number(s.clearance_m, 3),
@@ -77,7 +89,7 @@ def _versus_lines(versus: Sequence[Versus]) -> Iterator[list[str]]:
         gap = [_NONE] * 6
         if v.gap is not None:
             counts = [str(n) for n in (v.gap.n, v.gap.wins, v.gap.losses)]
-            gap = [*counts, _points(v.gap.difference), _p(v.gap.sign_p), _p(v.gap.rank_p)]
+            gap = [*counts, points(v.gap.difference), _p(v.gap.sign_p), _p(v.gap.rank_p)]
         yield [v.planner, v.other, str(v.wins), str(v.losses), _p(v.p), *gap]
 
 
@@ -93,19 +105,22 @@ def _table(title: str, head: Sequence[str], lines: Iterator[list[str]], note: st
     return table
 
 
-def _markdown(head: Sequence[str], lines: Iterator[list[str]]) -> str:
+def markdown(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """A table, as Markdown."""
     rows = [head, ["---"] * len(head), *lines]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
 
 
-def _percent(interval: Interval | None) -> str:
+def percent(interval: Interval | None) -> str:
+    """A share and the ends of its interval."""
     if interval is None:
         return _NONE
     middle, low, high = (100.0 * v for v in (interval.middle, interval.low, interval.high))
     return f"{middle:.2f} % [{low:.2f}, {high:.2f}]"
 
 
-def _points(interval: Interval) -> str:
+def points(interval: Interval) -> str:
+    """A difference of shares and the ends of its interval."""
     middle, low, high = (100.0 * v for v in (interval.middle, interval.low, interval.high))
     return f"{middle:+.2f} [{low:+.2f}, {high:+.2f}] points"
 

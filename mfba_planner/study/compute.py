@@ -111,7 +111,7 @@ def _batch(
     own = ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=_belong_to_the_parent,
+        initializer=belong_to_the_parent,
     )
     try:
         yield from _gathered(parts, own, workers + 1)
@@ -157,7 +157,7 @@ def _outcome(future: Future[Columns]) -> Columns | WorkerDied:
         raise
 
 
-def _belong_to_the_parent() -> None:
+def belong_to_the_parent() -> None:
     """Leave Ctrl-C, which reaches all processes of a terminal, to the parent; end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_the_parent, daemon=True).start()

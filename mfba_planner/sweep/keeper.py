@@ -88,14 +88,15 @@ class Keeper:
         finished = False
         try:
             self._pipe.send((work, items, shared))
-            for _ in items:
+            for number, _ in enumerate(items, 1):
                 answer = self._heard(patience_s)
                 if isinstance(answer, Exception):
                     raise answer
+                # Now: who has as many answers as items does not ask for the end.
+                finished = number == len(items) and not isinstance(answer, Lost)
                 yield answer
                 if isinstance(answer, Lost):
                     return
-            finished = True
         finally:
             if not finished:
                 self.end()

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..oracle import Certificate
-from ..statistics import Interval, Paired, generator, mean, paired, rate
+from ..statistics import Interval, Paired, estimate, generator, mean, paired, rate
 from .columns import FAILED, Row
 
 REASONS = 3  # of failure that are named
@@ -23,8 +23,8 @@ class Standing:
     """One planner's figures; rates with Wilson's, means with bootstrap intervals (95 %).
 
     certified is the success rate on worlds for which the oracle holds a trajectory. gap,
-    gap_95 (95th percentile), length and clearance are over successes, means over worlds; spl
-    and barn over all worlds that have an optimum. None where there is nothing to tell.
+    gap_95 (95th percentile), length, time and clearance are over successes, means over worlds;
+    spl and barn over all worlds that have an optimum. None where there is nothing to tell.
     """
 
     planner: str
@@ -38,8 +38,9 @@ class Standing:
     timeouts: int
     failures: tuple[tuple[str, int], ...]
     length_m: Interval | None
+    time_s: Interval | None
     gap: Interval | None
-    gap_95: float | None
+    gap_95: Interval | None
     spl: Interval | None
     barn: Interval | None
     clearance_m: Interval | None
@@ -74,7 +75,7 @@ def standings(rows: Sequence[Row], timings: Sequence[Row]) -> list[Standing]:
 def _standing(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -> Standing:
     good = [row for row in rows if row["success"]]
     certified = [r for r in rows if r["certificate"] == Certificate.FEASIBLE.value]
-    gaps = [row["gap"] for row in good if row["gap"] is not None]
+    gaps = by_world([row for row in good if row["gap"] is not None], lambda row: row["gap"])
     times = [
         t["decision_us"] for t in timings if t["planner"] == name and _is_number(t["decision_us"])
     ]
@@ -98,8 +99,11 @@ def _standing(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -
         timeouts=sum(row["outcome"] == "time_limit" for row in rows),
         failures=tuple(_reasons(rows).most_common()),
         length_m=over(good, "length_m", 0),
+        time_s=over(good, "time_s", 5),
         gap=over([row for row in good if row["gap"] is not None], "gap", 1),
-        gap_95=float(np.percentile(gaps, 95.0)) if gaps else None,
+        gap_95=estimate(np.array(list(gaps.values())), _percentile_95, generator(number, 6))
+        if gaps
+        else None,
         spl=over(judged, "spl", 2),
         barn=over(judged, "barn", 3),
         clearance_m=over(
@@ -107,6 +111,11 @@ def _standing(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -
         ),
         decision_us=float(np.median(times)) if times else None,
     )
+
+
+def _percentile_95(values: np.ndarray) -> np.ndarray:
+    found: np.ndarray = np.percentile(values, 95.0, axis=1)
+    return found
 
 
 def _reasons(rows: Sequence[Row]) -> Counter[str]:

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All of docs/benchmark.md: every suite, planner, perception and ingredient, and what it costs.
+
+    pip install -e .[orca]
+    python bench/benchmark.py --worlds 10000     # the whole thing; some hours on two cores
+    python bench/benchmark.py --out DIR          # small; goes on where it was interrupted
+
+Every sweep has a directory below --out, which `mfba show` reads. The optima of a suite have one
+of their own, since they do not depend on any planner.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+from benchmark_costs import measure_costs
+from benchmark_page import render
+from benchmark_pictures import write_pictures
+from benchmark_runs import HEADLINE, Counts, Results, say
+
+from mfba_planner.outputs import new_run_directory
+from mfba_planner.study.compute import belong_to_the_parent
+from mfba_planner.worlds import suite_names
+
+ROOT = Path(__file__).parents[1]
+BEGIN, END = "<!-- generated: begin -->\n", "<!-- generated: end -->\n"
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[Executor | None]:
+    """One pool for all sweeps: starting one for each would take longer than many of them."""
+    if workers == 1:
+        yield None
+        return
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, context, initializer=belong_to_the_parent)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def arguments() -> argparse.ArgumentParser:
+    """Scale, output, workers."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument(
+        "--worlds", type=int, default=20, metavar="N",
+        help=f"of paper, predictive and orca in {', '.join(HEADLINE)}; seeds of each of the "
+        "paper's cases, 1000 at most (default: 20)",
+    )  # fmt: skip
+    parser.add_argument("--others", type=int, metavar="N", help="in other suites (default: all)")
+    parser.add_argument(
+        "--few", type=int, metavar="N",
+        help="of other planners, perceptions and ingredients (default: a tenth of --worlds)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--suite", action="append", choices=suite_names(), help="only this; may be repeated"
+    )
+    parser.add_argument("--rounds", type=int, default=200, help="of the measurement of cost")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="directory to make or to go on in")
+    parser.add_argument(
+        "--docs", type=Path, default=ROOT / "docs", metavar="DIR",
+        help="where benchmark.md and images/ are (default: the project's)",
+    )  # fmt: skip
+    return parser
+
+
+def main(args: list[str] | None = None) -> None:
+    """Make all and write the page."""
+    found = arguments().parse_args(args)
+    if min(found.worlds, found.others or 2, found.few or 2) < 2:
+        arguments().error("--worlds, --others, --few: give at least 2")
+    counts = Counts(
+        worlds=found.worlds,
+        others=found.others or found.worlds,
+        few=found.few or max(2, found.worlds // 10),
+    )
+    suites = [name for name in suite_names() if not found.suite or name in found.suite]
+    out = found.out or new_run_directory(stem="benchmark")
+    target = found.docs / "benchmark.md"
+    _between(target.read_text(encoding="utf-8"), "")  # before the work is done
+    say(f"results go to {out}")
+    with _pool(found.workers) as executor:
+        results = Results(out, found.workers, executor)
+        results.make_all(suites, counts)
+    costs = measure_costs(found.rounds)
+    images = found.docs / "images"
+    images.mkdir(exist_ok=True)
+    examples = write_pictures(results, suites, counts, costs, images)
+    text = render(results, suites, counts, costs, examples, _command(found))
+    target.write_text(_between(target.read_text(encoding="utf-8"), text), encoding="utf-8")
+    print(text)
+
+
+def _command(found: argparse.Namespace) -> str:
+    words = [f"--worlds {found.worlds}"]
+    words += [f"--{k} {v}" for k in ("others", "few", "out") if (v := getattr(found, k))]
+    words += [f"--suite {name}" for name in found.suite or ()]
+    words += [f"--rounds {found.rounds}", f"--workers {found.workers}"]
+    return " ".join(["python bench/benchmark.py", *words])
+
+
+def _between(text: str, generated: str) -> str:
+    before, _, rest = text.partition(BEGIN)
+    _, found, after = rest.partition(END)
+    if not found:
+        raise SystemExit(f"benchmark.md: lacks the lines {BEGIN.strip()} and {END.strip()}")
+    return before + BEGIN + generated + END + after
+
+
+if __name__ == "__main__":
+    main()

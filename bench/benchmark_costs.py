@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one decision costs: ours, pyrvo's ORCA and a dynamic window, in turn, among ever more.
+
+The dynamic window is this package's `dwa` (samples of velocities simulated on, as in the tutorial
+PythonRobotics, but all at once in numpy); the tutorial is no package that could be measured.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from benchmark_runs import FINE
+from planners import arrangement
+
+from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.planner import Observation
+from mfba_planner.planners.registry import make
+from mfba_planner.sweep.keeper import Lost, each
+
+COUNTS = (1, 3, 10, 30, 100, 300, 1000)
+NAMES = ("predictive", "orca", "dwa")
+ARRANGEMENTS = 20
+FEWEST = 3 * ARRANGEMENTS  # rounds; in the first third every planner meets its arrangement
+PATIENCE_S = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """Microseconds of one decision, median, per planner and number of circles in range."""
+
+    counts: Sequence[int]
+    median_us: Mapping[str, Sequence[float]]
+    rounds: int
+
+    def at(self, name: str, count: int) -> float:
+        """One of them."""
+        return self.median_us[name][list(self.counts).index(count)]
+
+    def slope(self, name: str) -> float:
+        """Exponent of the growth with the number, from 10 on, by least squares on logarithms."""
+        far = [k for k, count in enumerate(self.counts) if count >= 10]
+        x = np.log([self.counts[k] for k in far])
+        return float(np.polyfit(x, np.log([self.median_us[name][k] for k in far]), 1)[0])
+
+
+def measure_costs(rounds: int) -> Costs:
+    """Measure in a process like those that runs are made in: with one thread."""
+    (found,) = each(_measure, [rounds], None, PATIENCE_S)
+    if isinstance(found, Lost):
+        raise SystemExit(f"the measurement of cost {found.why}")
+    return found
+
+
+def _measure(rounds: int, _: None) -> Costs:
+    """CPU times, all in turn: a machine whose speed drifts slows all alike."""
+    median_us: dict[str, list[float]] = {name: [] for name in NAMES}
+    for count in COUNTS:
+        subjects = {name: _deciding(name, count) for name in NAMES}
+        taken: dict[str, list[int]] = {name: [] for name in NAMES}
+        for k in range(max(FEWEST, min(rounds, 20 * rounds // count))):
+            for name, once in subjects.items():
+                begin = time.process_time_ns()
+                once(100_000_000 * (k + 1))
+                taken[name].append(time.process_time_ns() - begin)
+        for name in NAMES:
+            median_us[name].append(statistics.median(taken[name][ARRANGEMENTS:]) / 1e3)
+    return Costs(COUNTS, median_us, rounds)
+
+
+def _deciding(name: str, count: int) -> Callable[[int], object]:
+    """Decisions of as many planners as there are arrangements, the same ones for every name."""
+    rng = np.random.default_rng(count)
+    crowds = [arrangement(count, rng) for _ in range(ARRANGEMENTS)]
+    planners = [make(name, FINE.params) for _ in crowds]
+    calls = iter(range(10**9))
+
+    def once(stamp: int) -> object:
+        number = next(calls) % ARRANGEMENTS
+        return planners[number].plan(
+            Observation(
+                stamp_ns=stamp, now_ns=stamp, pose=Pose2D(1.0, 2.0), ranges_m=(), goal=(9.0, 9.0),
+                circles=crowds[number],
+            )
+        )  # fmt: skip
+
+    return once

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The generated part of docs/benchmark.md: targets first, then every table."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from importlib.metadata import version
+from statistics import fmean
+
+from benchmark_costs import NAMES, Costs
+from benchmark_pictures import Example
+from benchmark_runs import (
+    CROWDS,
+    INGREDIENTS,
+    LEAD,
+    PEERS,
+    PERCEPTIONS,
+    STRIPPED,
+    Counts,
+    Entry,
+    Results,
+)
+
+from mfba_planner.report.sweep import (
+    NOTE,
+    VERSUS_NOTE,
+    markdown,
+    percent,
+    standing_table,
+    versus_table,
+)
+from mfba_planner.statistics import Interval
+from mfba_planner.sweep.summary import Standing
+from mfba_planner.sweep.table import sorted_hash
+
+PAPER, PREDICTIVE, ORCA = LEAD
+SUCCESS = {"random-10": 0.999, "random-20": 0.999, "random-30": 0.995, "adversarial": 0.99}
+GAP = {"random-10": 0.007, "random-20": 0.018, "random-30": 0.033}
+SCAN_GAP = {"random-10": 0.012, "random-20": 0.03, "random-30": 0.05}
+CASE_GAP = {1: 0.005, 2: 0.01}
+PER_MINUTE = {PAPER: 10_000, PREDICTIVE: 3000}
+DECISION_US, SLOPE = 300.0, 1.0
+
+Lines = Iterator[Sequence[str]]
+
+
+def render(
+    results: Results,
+    suites: Sequence[str],
+    counts: Counts,
+    costs: Costs,
+    examples: Sequence[Example],
+    command: str,
+) -> str:
+    """Everything between the marks."""
+    blocks = [_facts(results, suites, counts, command), "## Targets"]
+    targets = [*_targets(results, suites, counts), *_cost_targets(results, suites, costs)]
+    blocks.append(markdown(("what", "target", "found", ""), targets))
+    missed = [f"{line[0]}: {line[2]}" for line in targets if line[3].startswith("**missed")]
+    blocks.append(f"Missed: {'; '.join(missed)}." if missed else "None is missed.")
+    blocks += ["## Suites", NOTE + ".", "![success and gap](images/benchmark.png)"]
+    for suite in suites:
+        blocks += [f"### {suite}", _suite(results, suite, counts)]
+    blocks += ["## predictive beside ORCA and the paper's", VERSUS_NOTE + "."]
+    blocks += [_pairs(results, suites, counts, timed=False)]
+    blocks += ["The same with time instead of length, so that waiting counts:"]
+    blocks += [_pairs(results, suites, counts, timed=True)]
+    for one in examples:
+        blocks += [
+            f"{one.words}:\n\n```sh\n{one.command}\n```",
+            f"![{one.words}](images/{one.file})",
+        ]
+    for title, entries, where in (
+        ("What predictive sees", PERCEPTIONS, CROWDS),
+        ("What each ingredient buys", INGREDIENTS, STRIPPED),
+    ):
+        found = [
+            _named(suite, results.standing(suite, entry, counts.rest(suite)))
+            for suite in suites
+            if suite in where
+            for entry in entries
+        ]
+        if found:
+            blocks += [f"## {title}", standing_table(found)]
+    if any(suite in STRIPPED for suite in suites):
+        blocks.append("![ablation](images/benchmark-ablation.png)")
+    blocks += ["## What a decision costs", _costs(costs)]
+    blocks += ["![decision time](images/benchmark-cost.png)"]
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _pairs(results: Results, suites: Sequence[str], counts: Counts, *, timed: bool) -> str:
+    return versus_table(
+        [
+            replace(found, planner=f"{suite}: predictive")
+            for suite in suites
+            for other in (ORCA, PAPER)
+            for found in [
+                results.versus(suite, PREDICTIVE, other, counts.lead(suite), timed=timed)
+            ]
+        ]
+    )
+
+
+def _facts(results: Results, suites: Sequence[str], counts: Counts, command: str) -> str:
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "pyrvo"))
+    lines = [
+        f"Made by\n\n```sh\n{command}\n```\n",
+        f"- Python {platform.python_version()}, {versions}; {platform.machine()}, "
+        f"{os.cpu_count()} cores, which other jobs may have shared: trust ratios of times",
+        "- suite seed 0; worlds 0 to N - 1, seed 0 in each; in `paper` a seed for each repeat",
+    ]
+    for suite in suites:
+        rows = [r for e in LEAD for r in results.of(0, suite, e, counts.lead(suite))]
+        rows += [r for e in PEERS for r in results.of(0, suite, e, counts.rest(suite))]
+        lines.append(
+            f"- {suite}: {counts.lead(suite)} worlds for {_words(LEAD)}, {counts.rest(suite)} for "
+            f"{_words(PEERS)}; sorted hash of these rows `{sorted_hash(rows)[:16]}`"
+        )
+    return "\n".join(lines)
+
+
+def _words(entries: Sequence[Entry]) -> str:
+    return ", ".join(entry.label for entry in entries)
+
+
+def _named(prefix: str, standing: Standing) -> Standing:
+    return replace(standing, planner=f"{prefix}: {standing.planner}")
+
+
+def _suite(results: Results, suite: str, counts: Counts) -> str:
+    cases = (1, 2) if suite == "paper" else (0,)
+    found = [
+        _named(f"case {case}", standing) if case else standing
+        for case in cases
+        for entries, worlds in ((LEAD, counts.lead(suite)), (PEERS, counts.rest(suite)))
+        for entry in entries
+        for standing in [results.standing(suite, entry, worlds, case)]
+    ]
+    return standing_table(found)
+
+
+def verdict(found: Interval, target: float, *, at_least: bool) -> str:
+    """Whether a target is met, and whether the whole interval says so."""
+    sign = 1.0 if at_least else -1.0
+    if sign * (found.middle - target) < 0.0:
+        return "**missed**"
+    surely = (found.low - target) if at_least else (target - found.high)
+    return "met" if surely >= 0.0 else "met, but not by the whole interval"
+
+
+def _targets(results: Results, suites: Sequence[str], counts: Counts) -> Lines:
+    for suite, least in SUCCESS.items():
+        if suite in suites:
+            one = results.standing(suite, PREDICTIVE, counts.lead(suite))
+            if one.certified:
+                what = f"success, certified {suite}"
+                yield _line(what, one.certified, least, at_least=True, of=one.certified_runs)
+    for suite, most in GAP.items():
+        if suite in suites:
+            one = results.standing(suite, PREDICTIVE, counts.lead(suite))
+            yield _line(f"mean gap, {suite}, known", one.gap, most, at_least=False, of=one.runs)
+    for suite, most in SCAN_GAP.items():
+        if suite in suites:
+            for entry in PERCEPTIONS[1:]:
+                one = results.standing(suite, entry, counts.rest(suite))
+                what = f"mean gap, {suite}, {entry.label}"
+                told = _line(what, one.gap, most, at_least=False, of=one.runs)
+                yield told if entry in PERCEPTIONS[1:3] else [told[0], "(told)", told[2], ""]
+    for case, most in CASE_GAP.items() if "paper" in suites else ():
+        one = results.standing("paper", PREDICTIVE, counts.lead("paper"), case)
+        free = "met" if not one.collisions else "**missed**"
+        yield [f"collisions, case {case}", "0", f"{one.collisions} of {one.runs}", free]
+        yield _line(f"mean gap, case {case}", one.gap, most, at_least=False, of=one.runs)
+
+
+def _line(
+    what: str, found: Interval | None, target: float, *, at_least: bool, of: int
+) -> Sequence[str]:
+    sign = ">=" if at_least else "<="
+    told = "-" if found is None else f"{percent(found)} of {of}"
+    judged = "**missed**" if found is None else verdict(found, target, at_least=at_least)
+    return [what, f"{sign} {100.0 * target:g} %", told, judged]
+
+
+def _cost_targets(results: Results, suites: Sequence[str], costs: Costs) -> Lines:
+    for entry, least in PER_MINUTE.items() if "random-10" in suites else ():
+        wall_ms = [row["wall_ms"] for row in results.of(1, "random-10", entry, 2**31)]
+        found = 2 * 60e3 / fmean(wall_ms)
+        yield [
+            f"episodes per minute on 2 cores, {entry.label}, random-10",
+            f">= {least}",
+            f"{found:.0f} (2 x 60 s / mean wall time of {len(wall_ms)} runs)",
+            "met" if found >= least else "**missed**",
+        ]
+    for what, found, most in (
+        (
+            "median us of a predictive decision, 10 in range",
+            costs.at("predictive", 10),
+            DECISION_US,
+        ),
+        ("exponent of its growth, 10 to 1000 in range", costs.slope("predictive"), SLOPE),
+    ):
+        yield [what, f"<= {most:g}", f"{found:.3g}", "met" if found <= most else "**missed**"]
+
+
+def _costs(costs: Costs) -> str:
+    lines = [
+        [
+            str(count),
+            *(f"{costs.at(name, count):.0f}" for name in NAMES),
+            *(f"{costs.at('predictive', count) / costs.at(n, count):.2f}" for n in NAMES[1:]),
+        ]
+        for count in costs.counts
+    ]
+    head = ["in range", *(f"{n}, us" for n in NAMES), *(f"predictive / {n}" for n in NAMES[1:])]
+    slopes = ", ".join(f"{name} {costs.slope(name):.2f}" for name in NAMES)
+    return (
+        "Medians of CPU time (one thread), all planners in turn among the same circles (evenly "
+        "over the sensing region, which grows with their number beyond 10), "
+        f"{costs.rounds} rounds at 10 and fewer where more are in range. "
+        f"Growth as count^s from 10 on: s = {slopes}. `orca` is pyrvo asked "
+        "`ROUNDS` times per decision; `dwa` is ours, in the manner of PythonRobotics', but with "
+        f"all velocities at once in numpy.\n\n{markdown(head, lines)}"
+    )

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""bench/benchmark.py: its tables say what the rows say; docs/benchmark.md keeps its word."""
+
+import json
+import os
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mfba_planner.report.sweep import HEAD
+from mfba_planner.statistics import Interval
+from mfba_planner.sweep.read import read_sweep
+
+ROOT = Path(__file__).parents[1]
+SCRIPT = ROOT / "bench" / "benchmark.py"
+PAGE = (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")
+SMALL = [
+    "--suite", "random-20", "--worlds", "2", "--rounds", "1", "--workers", "1", "--out", "out",
+    "--docs", "docs",
+]  # fmt: skip
+
+
+def bench(words: list[str], directory: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(SCRIPT), *words],
+        cwd=directory,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory in which the benchmark of one suite has been made, two worlds of it."""
+    directory = tmp_path_factory.mktemp("benchmark")
+    (directory / "docs").mkdir()
+    (directory / "docs" / "benchmark.md").write_text(PAGE, encoding="utf-8")
+    found = bench(SMALL, directory)
+    assert found.returncode == 0, found.stderr
+    return directory
+
+
+def lines(page: str, title: str) -> dict[str, dict[str, str]]:
+    """The table below a title: {first cell: {head: cell}}."""
+    table = page.partition(f"{title}\n")[2].partition("\n|")[2].partition("\n\n")[0]
+    cells = [[c.strip() for c in row.strip("|").split("|")] for row in table.splitlines()]
+    return {row[0]: dict(zip(cells[0], row)) for row in cells[2:]}
+
+
+def test_the_tables_say_what_the_rows_say(made: Path) -> None:
+    page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    found = lines(page, "### random-20")
+    assert list(found) == ["paper", "predictive", "orca", "dwa", "vfh", "apf", "straight"]
+    (optima,) = (
+        json.loads(path.read_text())["columns"]
+        for path in (made / "out" / "random-20-optima" / "chunks").glob("*.json")
+    )
+    for name, line in found.items():
+        assert list(line) == list(HEAD)
+        rows = read_sweep(made / "out" / f"random-20-{name}").rows
+        assert [row["world"] for row in rows] == [0, 1]
+        good = [row for row in rows if row["success"]]
+        assert line["success"].startswith(f"{50.0 * len(good):.2f} % ["), name
+        assert line["collided"] == str(sum(row["collisions"] > 0 for row in rows))
+        if good:
+            gaps = [row["length_m"] / optima["optimum_m"][row["world"]] - 1.0 for row in good]
+            assert line["gap"].startswith(f"{100.0 * sum(gaps) / len(gaps):.2f} % ["), name
+            assert line["time s"].startswith(f"{sum(r['time_s'] for r in good) / len(good):.2f} [")
+
+
+def test_paper_has_its_own_step_and_all_others_share_one(made: Path) -> None:
+    steps = {
+        path.name: read_sweep(path).order.setting.params.step_length_m
+        for path in (made / "out").iterdir()
+        if not path.name.endswith("optima")
+    }
+    assert len(steps) == 7 + 5 + 8
+    assert {name for name, step in steps.items() if step != 0.08} == {"random-20-paper"}
+    assert steps["random-20-paper"] == 0.3
+
+
+def test_ingredients_and_perceptions_share_what_is_the_same_run(made: Path) -> None:
+    page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    suite = lines(page, "### random-20")["predictive"]
+    seen = lines(page, "## What predictive sees")
+    bought = lines(page, "## What each ingredient buys")
+    assert len(seen) == 6
+    assert len(bought) == 10
+    for same in (seen["random-20: known"], bought["random-20: all (predictive)"]):
+        assert {**same, "planner": "predictive"} == suite
+
+
+def test_what_was_written_by_hand_stays_and_pictures_are_small(made: Path) -> None:
+    page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    assert page.partition("<!-- generated")[0] == PAGE.partition("<!-- generated")[0]
+    assert "python bench/benchmark.py --worlds 2 --out out --suite random-20" in page
+    named = re.findall(r"!\[.*?\]\((.*?)\)", page.partition("<!-- generated")[2])
+    assert len(named) >= 3
+    for name in named:
+        assert 1000 < (made / "docs" / name).stat().st_size < 200_000
+
+
+def test_it_goes_on_from_what_is_finished(made: Path) -> None:
+    chunks = sorted((made / "out").glob("*/chunks/*.json"))
+    before = {path: path.stat().st_mtime_ns for path in chunks}
+    gone = made / "out" / "random-20-orca" / "chunks"
+    for path in gone.iterdir():
+        del before[path]
+        path.unlink()
+    found = bench(SMALL, made)
+    assert found.returncode == 0, found.stderr
+    assert len(list(gone.iterdir())) == 1
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+def test_verdicts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(SCRIPT.parent))
+    verdict: Any = runpy.run_path(str(SCRIPT.parent / "benchmark_page.py"))["verdict"]
+    assert verdict(Interval(0.999, 0.99, 1.0), 0.999, at_least=True).startswith("met, but")
+    assert verdict(Interval(0.9995, 0.9991, 1.0), 0.999, at_least=True) == "met"
+    assert "missed" in verdict(Interval(0.998, 0.99, 1.0), 0.999, at_least=True)
+    assert verdict(Interval(0.01, 0.005, 0.012), 0.012, at_least=False) == "met"
+    assert verdict(Interval(0.01, 0.005, 0.013), 0.012, at_least=False).startswith("met, but")
+    assert "missed" in verdict(Interval(0.0121, 0.005, 0.013), 0.012, at_least=False)
+
+
+def test_bad_scales_and_pages_are_refused_before_any_work(tmp_path: Path) -> None:
+    few = bench([*SMALL, "--few", "1"], tmp_path)
+    assert few.returncode == 2
+    assert "give at least 2" in few.stderr
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "benchmark.md").write_text("no marks")
+    marks = bench(SMALL, tmp_path)
+    assert marks.returncode == 1
+    assert "benchmark.md: lacks the lines" in marks.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_page_s_commands_have_only_options_that_exist(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(str(SCRIPT.parent))
+    parser = runpy.run_path(str(SCRIPT))["arguments"]()
+    blocks = re.findall(r"^```sh\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    assert blocks
+    for block in blocks:
+        words = shlex.split(block)
+        if words[:2] == ["python", "bench/benchmark.py"]:
+            parser.parse_args(words[2:])
+        else:
+            assert words[:2] == ["mfba", "show"]
+            assert re.fullmatch(r"[\w-]+/\d+/\w+/0", words[-1])
+    for part in re.findall(r"`(--.*?)`", PAGE):
+        options = [word for word in part.split() if word.startswith("--")]
+        assert all(word == "--help" or f"{word} " in parser.format_help() for word in options)

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Each ablation lacks what its name says, and nothing else keeps it from driving."""
+
+import math
+from typing import Any
+
+import pytest
+
+from mfba_planner.core.episode import Episode, Outcome
+from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.planner import Circle, Mode, Observation, PlannerParams
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.planners import ablation
+from mfba_planner.planners.predictive import Predictive, preset
+from mfba_planner.sweep.order import Run, Setting
+from mfba_planner.sweep.play import play
+
+SETTING = Setting(params=preset(PlannerParams(speed_mps=0.8)))
+NAMES = (
+    "BitsOnly",
+    "NoBats",
+    "NoLastWaypoint",
+    "NoVelocities",
+    "NoWaiting",
+    "no_margins",
+    "no_memory",
+)
+
+
+def drive(name: str, suite: str = "random-30", world: int = 0) -> Episode:
+    planner = name if name == "predictive" else f"{ablation.__name__}:{name}"
+    played = play(Run(suite, world, planner, 0), SETTING)
+    assert played.fault == ""
+    return played.episode
+
+
+def decide(name: str, *circles: Circle) -> Any:
+    planner = getattr(ablation, name)(SETTING.params, SensorParams(), 0)
+    return planner.plan(
+        Observation(
+            stamp_ns=100_000_000, now_ns=100_000_000, pose=Pose2D(0.0, 0.0), ranges_m=(),
+            goal=(10.0, 0.0), circles=circles,
+        )
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_all_of_them_arrive_somewhere_and_go_another_way_than_the_whole(name: str) -> None:
+    results = [evaluate(drive(name, world=world)) for world in range(3)]
+    assert {r.outcome for r in results} == {Outcome.GOAL_REACHED}
+    whole = [evaluate(drive("predictive", world=world)) for world in range(3)]
+    if name not in ("NoWaiting", "no_memory"):  # which are seldom missed among so few
+        assert [r.length_m for r in results] != [r.length_m for r in whole]
+
+
+def test_without_bats_no_candidates() -> None:
+    assert not any(tick.candidates for tick in drive("NoBats").ticks)
+    assert any(tick.candidates for tick in drive("NoWaiting").ticks)
+
+
+@pytest.mark.parametrize("name", ["NoWaiting", "BitsOnly"])
+def test_full_speed_unless_blocked_or_nearly_there(name: str) -> None:
+    for world in range(3):
+        for tick in drive(name, "random-30", world).ticks:
+            left = math.dist(tick.waypoint or tick.pose.position, tick.pose.position)
+            if left > 0.08 * (1.0 + 1e-6):  # what a tick takes it
+                assert math.hypot(*tick.velocity) == pytest.approx(0.8)
+
+
+def test_bits_only_takes_the_nearest_free_heading_and_stands_among_none() -> None:
+    ahead = Circle(center_m=(1.0, 0.1), radius_m=0.6)
+    decision = decide("BitsOnly", ahead)
+    assert decision.mode is Mode.OBSTACLE_AVOIDANCE
+    k = decision.gap - 1
+    assert decision.vs[k] == 0
+    angle = (k + 1) * 2.0 * math.pi / 72
+    assert math.atan2(decision.velocity[1], decision.velocity[0]) == pytest.approx(
+        math.remainder(angle, 2.0 * math.pi)
+    )
+    away = {
+        abs(math.remainder((n + 1) * 2.0 * math.pi / 72, 2.0 * math.pi))
+        for n, bit in enumerate(decision.vs)
+        if not bit
+    }
+    assert abs(math.remainder(angle, 2.0 * math.pi)) == pytest.approx(min(away))
+    ring = [
+        Circle(center_m=(0.7 * math.cos(a), 0.7 * math.sin(a)), radius_m=0.6)
+        for a in (k * math.pi / 6 for k in range(12))
+    ]
+    among = decide("BitsOnly", *ring)
+    assert among.velocity == (0.0, 0.0)
+    assert among.mode is Mode.BLOCKED
+
+
+def test_without_velocities_whoever_comes_across_is_not_seen_coming() -> None:
+    across = Circle(center_m=(1.2, 1.2), radius_m=0.6, velocity_mps=(0.0, -0.8))
+    assert decide("NoVelocities", across).velocity == pytest.approx((0.8, 0.0))
+    assert decide("NoBats", across).velocity != pytest.approx((0.8, 0.0))
+
+
+def test_without_margins_a_close_pass_is_as_good_as_any() -> None:
+    beside = Circle(center_m=(1.0, 0.6 + 1e-4), radius_m=0.6)
+    assert decide("no_margins", beside).velocity == pytest.approx((0.8, 0.0))
+    assert decide("NoBats", beside).velocity != pytest.approx((0.8, 0.0))
+
+
+def test_without_memory_who_is_out_of_sight_is_out_of_mind() -> None:
+    ahead = Circle(center_m=(1.35, 0.0), radius_m=0.6)
+    goes = {}
+    for make in (Predictive, ablation.no_memory):
+        planner = make(SETTING.params, SensorParams(), 0)
+        for stamp, x, circles in ((1, 0.0, (ahead,)), (2, -0.1, ())):
+            stamp_ns = 100_000_000 * stamp
+            decision = planner.plan(
+                Observation(
+                    stamp_ns=stamp_ns, now_ns=stamp_ns, pose=Pose2D(x, 0.0), ranges_m=(),
+                    goal=(10.0, 0.0), circles=circles,
+                )
+            )  # fmt: skip
+        goes[make] = decision.velocity
+    assert goes[ablation.no_memory] == pytest.approx((0.8, 0.0))
+    assert goes[Predictive] != pytest.approx((0.8, 0.0), abs=0.01)
