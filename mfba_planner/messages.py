@@ -8,17 +8,19 @@ is wrong. ros/convert.py holds the other direction.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .core.errors import InputError
 from .core.geometry import Point, Pose2D
-from .core.planner import Decision, Mode
+from .core.planner import Decision, Mode, Refused
 from .core.sensing import Bits, Ranges, Scan
 
 SECOND_NS = 1_000_000_000
+
+T = TypeVar("T")
 
 
 def stamp_ns(stamp: Any) -> int:
@@ -30,6 +32,14 @@ def _finite(what: str, values: Iterable[float]) -> None:
     for value in values:
         if not math.isfinite(value):
             raise InputError(f"{what} holds {value}; send finite numbers")
+
+
+def or_refused(read: Callable[[Any], T], message: Any) -> T | Refused:
+    """What read makes of a message, or the reason why it refuses it."""
+    try:
+        return read(message)
+    except InputError as error:
+        return str(error)
 
 
 def pose2d(pose: Any, what: str) -> Pose2D:

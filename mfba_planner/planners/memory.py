@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..core.geometry import Point
+from ..core.geometry import Point, distance
 from ..core.options import check, option
 from ..core.planner import NANO, Circle
 
@@ -57,15 +57,15 @@ class Memory:
         found = [(circle, 0.0) for circle in seen]
         if last is not None and last < stamp_ns:
             dt = (stamp_ns - last) * NANO
-            edges = [_apart(c.center_m, position) - c.radius_m for c in seen]
+            edges = [distance(c.center_m, position) - c.radius_m for c in seen]
             range_m = max(range_m, *edges) if edges else range_m
             hidden = (self._later(circle, age, dt) for circle, age in self._circles)
             for circle, age in list(filter(None, hidden)):
                 here, same = circle.center_m, _SAME * circle.radius_m
-                beyond = _apart(here, position) - circle.radius_m - range_m
+                beyond = distance(here, position) - circle.radius_m - range_m
                 # Who is farther beyond cannot be one of those in sight.
                 if beyond > same or (
-                    beyond > 0.0 and all(_apart(here, c.center_m) > same for c in seen)
+                    beyond > 0.0 and all(distance(here, c.center_m) > same for c in seen)
                 ):
                     found.append((circle, age))
         self._circles = found
@@ -81,8 +81,3 @@ class Memory:
         center = (x + vx * dt, y + vy * dt)
         later = Circle(center_m=center, radius_m=circle.radius_m, velocity_mps=(vx, vy))
         return later, age_s
-
-
-def _apart(a: Point, b: Point) -> float:
-    dx, dy = a[0] - b[0], a[1] - b[1]
-    return math.sqrt(dx * dx + dy * dy)

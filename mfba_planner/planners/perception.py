@@ -12,11 +12,11 @@ import numpy as np
 
 from ..core.episode import World, sense
 from ..core.errors import ConfigError
-from ..core.geometry import Point, Pose2D
+from ..core.geometry import Point, Pose2D, distance
 from ..core.options import did_you_mean
 from ..core.planner import Circle, Observation
 from ..core.sensing import Ranges, Scan, SensorParams, sense_scan
-from ..core.world import center_at, velocity_at
+from ..core.world import velocity_at
 
 SENSOR_STREAM = 2  # spawn key of the noise's SeedSequence child; the planner's is 1
 BEAMS = {"scan-12": 12, "scan-360": 360}
@@ -101,10 +101,8 @@ class Perception:
     def _circles(self, world: World, sensor: SensorParams) -> tuple[Circle, ...]:
         scenario, t_s = world.scenario, world.time_s
         circles = []
-        for obstacle in scenario.obstacles:
-            center = center_at(obstacle, t_s, scenario.walls)
-            radius = scenario.enlarged_radius(obstacle)
-            if _near(world.pose.position, center, radius + sensor.sensing_range_m):
+        for obstacle, (center, radius) in zip(scenario.obstacles, world.enlarged()):
+            if distance(world.pose.position, center) <= radius + sensor.sensing_range_m:
                 velocity = velocity_at(obstacle, t_s, scenario.walls)
                 circles.append(Circle(center_m=center, radius_m=radius, velocity_mps=velocity))
         if not self.noise_m or not circles:
@@ -116,12 +114,11 @@ class Perception:
         )
 
     def _scan(self, world: World, sensor: SensorParams) -> Scan:
-        scenario, t_s = world.scenario, world.time_s
+        scenario = world.scenario
         longest = sensor.sensing_range_m + scenario.robot_radius_m
         near = []
-        for obstacle in scenario.obstacles:
-            center = center_at(obstacle, t_s, scenario.walls)
-            if _near(world.pose.position, center, longest + obstacle.radius_m):
+        for obstacle, (center, _) in zip(scenario.obstacles, world.enlarged()):
+            if distance(world.pose.position, center) <= longest + obstacle.radius_m:
                 near.append((*center, obstacle.radius_m))
         ranges = cast_rays(world.pose.position, near, self._beams, longest)
         if self.noise_m:
@@ -139,11 +136,6 @@ class Perception:
     def _noise(self, stamp_ns: int, count: int) -> np.ndarray:
         sequence = np.random.SeedSequence(self.seed, spawn_key=(SENSOR_STREAM, stamp_ns))
         return np.random.Generator(np.random.PCG64(sequence)).normal(0.0, self.noise_m, count)
-
-
-def _near(a: Point, b: Point, reach_m: float) -> bool:
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    return math.sqrt(dx * dx + dy * dy) <= reach_m
 
 
 _RAYS: dict[int, tuple[np.ndarray, np.ndarray]] = {}

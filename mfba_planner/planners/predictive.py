@@ -18,6 +18,7 @@ from ..core.sensing import Bits, SensorParams
 from .memory import Memory, MemoryParams
 from .prediction import Prediction, RiskParams, from_sectors, moved
 from .steering import Move, Steering
+from .surroundings import ROBOT_RADIUS_M
 from .tracking import Tracker, TrackingParams
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # of a gap's waypoints, in reaches
@@ -37,9 +38,12 @@ class PredictiveParams:
         0.3, "radius of the disc the bats search", unit="m", minimum=0.001, maximum=100.0
     )
     robot_radius_m: float = option(
-        0.3, "radius of the robot, which enlarges what scans show", unit="m", minimum=0.0,
+        ROBOT_RADIUS_M,
+        "radius of the robot, which enlarges what scans show",
+        unit="m",
+        minimum=0.0,
         maximum=10.0,
-    )  # fmt: skip
+    )
     sector_radius_m: float = option(
         0.3, "radius of what stands for a set sector", unit="m", minimum=0.01, maximum=10.0
     )

@@ -9,9 +9,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..core.conduct import Conduct
 from ..core.episode import Episode, Outcome
 from ..core.geometry import Point, bearing, distance, wrap_angle
-from ..core.metrics import assess, within_range
+from ..core.metrics import Result, assess, within_range
 from ..core.motion import Motion
 from ..core.planner import Decision
 from ..core.world import velocity_at
@@ -21,14 +22,13 @@ from .play import Played
 BEFORE = 6  # decisions that are shown
 
 
-def headline(played: Played) -> str:
+def _headline(played: Played, result: Result, conduct: Conduct) -> str:
     """How it ended, in one line."""
     episode = played.episode
-    result, conduct = assess(episode)
     if played.fault:
         return f"the planner failed at {played.fault_at}"
     if result.collisions:
-        number, index = conduct.first_contact_with, contact_index(episode) or 0
+        number, index = conduct.first_contact_with, _index(episode, conduct) or 0
         did = "ran into" if _moves(episode, index) else "stood still and was hit by"
         more = f"; {result.collisions} contacts in all" if result.collisions > 1 else ""
         return f"the robot {did} obstacle {number} at {conduct.first_contact_s:.2f} s{more}"
@@ -40,28 +40,38 @@ def headline(played: Played) -> str:
 
 def contact_index(episode: Episode) -> int | None:
     """The tick (from 0) at which the step begins that leads to the first contact."""
-    contact_s = assess(episode)[1].first_contact_s
+    return _index(episode, assess(episode)[1])
+
+
+def _index(episode: Episode, conduct: Conduct) -> int | None:
     times = [episode.time_s(tick.stamp_ns) for tick in episode.ticks]
+    contact_s = conduct.first_contact_s
     return times.index(contact_s) if contact_s in times else None
 
 
 def explain(played: Played) -> list[str]:
     """Lines that tell what happened and why, the headline first."""
     episode = played.episode
-    lines = [headline(played)]
+    result, conduct = assess(episode)
+    lines = [_headline(played, result, conduct)]
     if not episode.ticks:
         return lines
-    index = contact_index(episode)
+    index = _index(episode, conduct)
     if index is not None:
-        number = assess(episode)[1].first_contact_with
+        number = conduct.first_contact_with
         lines += [*_contact(episode, index, number), "", *_table(episode, index, number)]
     elif played.fault:
         last = len(episode.ticks) - 1
         lines += ["", "the last decisions that were followed:", *_table(episode, last, 0)]
     elif episode.outcome is not Outcome.GOAL_REACHED:
-        lines += [*_held_up(episode), "", *_table(episode, len(episode.ticks) - 1, 0)]
+        lines += [
+            *_held_up(episode, result),
+            *_passes(result, conduct),
+            "",
+            *_table(episode, len(episode.ticks) - 1, 0),
+        ]
     else:
-        lines += _passes(episode)
+        lines += _passes(result, conduct)
     return lines
 
 
@@ -115,9 +125,8 @@ def _table(episode: Episode, index: int, number: int) -> Iterator[str]:
         yield f"{line}  {tick.reason}{_bits(tick)}"
 
 
-def _held_up(episode: Episode) -> Iterator[str]:
+def _held_up(episode: Episode, result: Result) -> Iterator[str]:
     """What it did with its time."""
-    result, _ = assess(episode)
     counts = Counter(tick.mode.value for tick in episode.ticks)
     shares = [f"{mode} {count / result.ticks:.0%}" for mode, count in counts.most_common()]
     yield f"modes: {', '.join(shares)}"
@@ -127,11 +136,9 @@ def _held_up(episode: Episode) -> Iterator[str]:
         f"way: {result.length_m:.2f} m travelled, never nearer to the goal than {nearest:.2f} m; "
         f"{len(result.encounters)} obstacles met"
     )
-    yield from _passes(episode)
 
 
-def _passes(episode: Episode) -> Iterator[str]:
-    result, conduct = assess(episode)
+def _passes(result: Result, conduct: Conduct) -> Iterator[str]:
     if math.isfinite(result.min_clearance_m):
         ttc = f"{conduct.min_ttc_s:.2f} s" if math.isfinite(conduct.min_ttc_s) else "never"
         yield (

@@ -15,7 +15,7 @@ from ..core.geometry import Point, Pose2D
 from ..core.planner import Decision, Mode, observe
 from ..core.sensing import sense_circles, sensory_vector
 from ..messages import decision as read_decision
-from ..messages import obstacle_centers, robot_pose, rotated, sector_ranges, velocity
+from ..messages import obstacle_centers, or_refused, robot_pose, rotated, sector_ranges, velocity
 from ..planners.method import brain
 from ..recording.episode import Setup, read_setup
 from ..recording.integrity import check_data
@@ -81,7 +81,7 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
     for tick in evidence.ticks:
         if DECISION not in tick.said or SECTORS not in tick.said:
             continue  # named by evidence where it must not be
-        ranges = _read(sector_ranges, tick.said[SECTORS])
+        ranges = or_refused(sector_ranges, tick.said[SECTORS])
         try:
             was = read_decision(tick.said[DECISION], () if isinstance(ranges, str) else ranges)
         except InputError as error:
@@ -100,7 +100,7 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
                 goal = was.goal
         seen: Any = was.pose
         if setup.lockstep:
-            seen = _read(robot_pose, tick.said[ODOM]) if ODOM in tick.said else pose
+            seen = or_refused(robot_pose, tick.said[ODOM]) if ODOM in tick.said else pose
         elif was.mode is Mode.STOPPED:
             unchecked += 1  # what was refused or how old it was is not recorded
             continue
@@ -119,14 +119,6 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         faults=tuple(faults),
         notes=tuple(notes),
     )
-
-
-def _read(reader: Any, message: Any) -> Any:
-    """What the planner read: the value, or the reason why it was refused."""
-    try:
-        return reader(message)
-    except InputError as error:
-        return str(error)
 
 
 def _contradictions(setup: Setup, tick: Tick, was: Decision) -> list[str]:
@@ -158,7 +150,7 @@ def _step_agrees(step: Any, was: Decision) -> bool:
 
 
 def _twist_agrees(twist: Any, was: Decision) -> bool:
-    return bool(_read(velocity, twist) == (*rotated(was.velocity, -was.pose.yaw), 0.0))
+    return bool(or_refused(velocity, twist) == (*rotated(was.velocity, -was.pose.yaw), 0.0))
 
 
 def _is_sensed(setup: Setup, tick: Tick, was: Decision) -> bool:

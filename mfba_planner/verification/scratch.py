@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,10 +15,11 @@ from ..core.errors import BagError, InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner import Decision, PlannerParams, Refused, observe
 from ..core.sensing import Ranges, SensorParams, sense_scan
-from ..messages import goal_point, laser_scan, robot_pose, stamp_ns
+from ..messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
 from ..planners.method import brain
+from ..recording.decisions import DECISION, SECTORS
 from ..recording.integrity import check_data
-from ..recording.reader import BagReader
+from ..recording.reader import BagReader, DecodedMessage
 
 ODOMETRY, SCAN, GOAL = (
     "nav_msgs/msg/Odometry",
@@ -58,7 +60,7 @@ class FromScratch:
 def is_foreign(reader: BagReader) -> bool:
     """Whether a bag has scans and odometry, but neither decisions nor sectors of ours."""
     types = {topic.type_name for topic in reader.topics.values()}
-    ours = {"/planner/decision", "/sectors"} & set(reader.topics)
+    ours = {DECISION, SECTORS} & set(reader.topics)
     return not ours and {ODOMETRY, SCAN} <= types
 
 
@@ -109,6 +111,20 @@ def _goals(reader: BagReader, robot: Robot) -> list[tuple[int, Point]]:
     return goals
 
 
+def _rising(
+    reader: BagReader, topic: str, faults: list[str]
+) -> Iterator[tuple[int, DecodedMessage]]:
+    """Messages with their stamps; one whose stamp does not rise is a fault and left out."""
+    last_ns = -1
+    for message in reader.decoded([topic]):
+        stamp = stamp_ns(message.message.header.stamp)
+        if stamp <= last_ns:
+            faults.append(f"{topic}: stamp {stamp} ns comes after {last_ns} ns")
+            continue
+        last_ns = stamp
+        yield stamp, message
+
+
 class _Poses:
     """All poses of a recording: by stamp, and by when they were recorded."""
 
@@ -116,14 +132,8 @@ class _Poses:
         self.by_stamp: dict[int, Pose2D | Refused] = {}
         self._times_ns: list[int] = []
         self._all: list[tuple[int, Pose2D | Refused]] = []
-        last_ns = -1
-        for message in reader.decoded([topic]):
-            stamp = stamp_ns(message.message.header.stamp)
-            if stamp <= last_ns:
-                faults.append(f"{topic}: stamp {stamp} ns comes after {last_ns} ns")
-                continue
-            last_ns = stamp
-            pose = _read(robot_pose, message.message)
+        for stamp, message in _rising(reader, topic, faults):
+            pose = or_refused(robot_pose, message.message)
             self.by_stamp[stamp] = pose
             self._times_ns.append(message.log_time_ns)
             self._all.append((stamp, pose))
@@ -150,13 +160,7 @@ class _Decider:
 
     def on(self, reader: BagReader, topic: str) -> FromScratch:
         decided = []
-        last_ns = -1
-        for message in reader.decoded([topic]):
-            stamp = stamp_ns(message.message.header.stamp)
-            if stamp <= last_ns:
-                self._faults.append(f"{topic}: stamp {stamp} ns comes after {last_ns} ns")
-                continue
-            last_ns = stamp
+        for stamp, message in _rising(reader, topic, self._faults):
             decision = self._decide(stamp, message.log_time_ns, message.message)
             if decision is not None:
                 decided.append(decision)
@@ -188,14 +192,6 @@ class _Decider:
             return pose
         robot = self._robot
         yaw = pose.yaw + robot.scan_yaw_rad
-        return _read(
+        return or_refused(
             lambda x: sense_scan(laser_scan(x), yaw, robot.robot_radius_m, robot.sensor), scan
         )
-
-
-def _read(reader: Any, message: Any) -> Any:
-    """The value, or the reason why it is refused."""
-    try:
-        return reader(message)
-    except InputError as error:
-        return str(error)
