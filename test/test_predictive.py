@@ -265,3 +265,17 @@ def test_the_preset_changes_step_and_swarm_only() -> None:
 @pytest.mark.parametrize(("suite_name", "k"), [("dense", 1074), ("adversarial", 1109)])
 def test_no_waypoint_is_so_near_that_the_tick_leads_beyond_it(suite_name: str, k: int) -> None:
     assert evaluate(drive(suite(suite_name).world(k))).success
+
+
+@pytest.mark.parametrize("waypoint_m", [0.5, 1.0, 1.5])
+def test_a_contact_costs_by_what_is_driven_until_then_whichever_leg_it_is_on(
+    waypoint_m: float,
+) -> None:
+    """x = 1 - s / tau: a contact after 2.1 s, a closest approach, right through, after 2.6 s."""
+    risk = RiskParams(horizon_s=3.0, contact_m=3.0, urgent_m=100.0, close_m=0.3)
+    ahead = Circle(center_m=(2.6, 0.0), radius_m=0.5)
+    world = Prediction((0.0, 0.0), [ahead], risk, 0.1)
+    contact, closest = 1.0 - 2.1 / 3.0, 1.0 - 2.6 / 3.0
+    expected = 5.0 + 3.0 * contact**2 + 100.0 * contact**8 + 0.3 * closest
+    found = world.cost((waypoint_m, 0.0), waypoint_m, (5.0, 0.0), 1.0)
+    assert found == pytest.approx(expected)
