@@ -70,7 +70,7 @@ class Talk:
             self.goal.publish(goal(*at))  # latched
         self.node = graph.start(PlannerNode, parameters)
         if at:
-            graph.until(lambda: self.node._goal is not None)
+            graph.until(lambda: self.node.goals.errands.goal is not None)
 
     def answers(self, *messages: Any) -> list[Any]:
         """Publish in this order and return the decisions that come of it."""
@@ -253,14 +253,14 @@ def test_a_refused_pose_does_not_move_where_the_robot_is_said_to_be(graph: Graph
 
 
 @pytest.mark.parametrize("bad", [NAN, INF])
-def test_a_goal_that_is_not_finite_is_no_goal(graph: Graph, bad: float) -> None:
+def test_a_goal_that_is_not_finite_changes_nothing(graph: Graph, bad: float) -> None:
     talk = Talk(graph, LOCKSTEP)
-    talk.answer(odom(1), sectors(1))
-    idle = talk.answer(goal(bad, 1.0), odom(2), sectors(2))
-    assert mode(idle) is Mode.IDLE
-    assert fields(idle)["refused_inputs"] == "1"
-    assert talk.velocity == (0.0, 0.0)
-    assert mode(talk.answer(goal(*GOAL), odom(3), sectors(3))) is Mode.PATH_GENERATION
+    before = fields(talk.answer(odom(1), sectors(1)))
+    after = fields(talk.answer(goal(bad, 1.0), odom(2), sectors(2)))
+    assert after["refused_inputs"] == "1"
+    assert {key: after[key] for key in ("mode", "goal", "errand")} == {
+        key: before[key] for key in ("mode", "goal", "errand")
+    }
 
 
 def test_in_lockstep_it_waits_for_a_goal_that_somebody_gives(graph: Graph) -> None:
@@ -289,11 +289,14 @@ def test_the_goals_orientation_is_not_used(graph: Graph) -> None:
     assert mode(answer) is Mode.PATH_GENERATION
 
 
-def test_a_goal_in_another_frame_is_taken_as_in_odom(graph: Graph) -> None:
-    talk = Talk(graph, LOCKSTEP, at=None)
-    elsewhere = goal(3.0, 0.0)
-    elsewhere.header.frame_id = "map"
-    assert fields(talk.answer(elsewhere, odom(1), sectors(1)))["goal"] == "3.0,0.0"
+def test_a_goal_in_another_frame_is_refused_and_in_none_it_is_taken(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    for frame, expected in (("map", GOAL), ("", (3.0, 0.0))):
+        sent = goal(3.0, 0.0)
+        sent.header.frame_id = frame
+        talk.goal.publish(sent)
+        graph.settle()
+        assert talk.node.goals.errands.goal == expected
 
 
 def test_a_new_goal_counts_at_once_even_after_arrival(graph: Graph) -> None:

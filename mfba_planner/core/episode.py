@@ -11,6 +11,7 @@ import numpy as np
 
 from .errors import ConfigError
 from .geometry import Point, Pose2D, distance
+from .guarded import Guarded
 from .motion import Motion
 from .planner import NANO, Decision, Method, Observation, PathPlanner, Planner, PlannerParams
 from .sensing import Ranges, SensorParams, sense_circles
@@ -153,7 +154,7 @@ def run(
             raise ConfigError(
                 f"method={planner.method.value}: not the core's own; use planners.method.simulate"
             )
-        brain = Planner(planner, seed)
+        brain = Guarded(Planner(planner, seed))
     ticks = [brain.plan(look(world, sensor))]
     while (outcome := world.outcome()) is None and go_on(world):
         world.step(ticks[-1].velocity)
