@@ -6,12 +6,26 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TwistStamped
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from graph import Graph
 from nav_msgs.msg import Odometry
 from rclpy.qos import qos_profile_sensor_data, qos_profile_system_default
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
+from talk import (
+    FREE,
+    GOAL,
+    INF,
+    LOCKSTEP,
+    NAN,
+    NORTH_EAST,
+    Talk,
+    fields,
+    goal,
+    mode,
+    odom,
+    sectors,
+)
 
 from mfba_planner.core.bat import Algorithm
 from mfba_planner.core.errors import ConfigError
@@ -25,83 +39,11 @@ from mfba_planner.core.planner import (
     PlannerParams,
     Swarm,
 )
-from mfba_planner.core.sensing import Ranges, SensorParams
 from mfba_planner.messages import decision as read_decision
 from mfba_planner.messages import stamp_ns
 from mfba_planner.ros import topics
-from mfba_planner.ros.convert import odometry_msg, pose_stamped_msg, sectors_msg, time_msg
+from mfba_planner.ros.convert import time_msg
 from mfba_planner.ros.planner import PlannerNode
-
-INF, NAN = math.inf, math.nan
-FREE: Ranges = (INF,) * 12
-NORTH_EAST = (0.5, *FREE[1:])  # sector 1 is set
-GOAL = (10.0, 5.0)
-LOCKSTEP = {"lockstep": True, "seed": 3}
-
-
-def odom(stamp: int, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Odometry:
-    return odometry_msg(Pose2D(x, y, yaw), (0.0, 0.0), stamp, "odom", "base_link")
-
-
-def sectors(stamp: int, ranges: Ranges = FREE) -> LaserScan:
-    return sectors_msg(ranges, SensorParams(sectors=len(ranges)), 0.3, stamp, "odom")
-
-
-def goal(x: float, y: float) -> PoseStamped:
-    return pose_stamped_msg((x, y), 1, "odom")
-
-
-class Talk:
-    """A planner, what it is given and what it answers."""
-
-    def __init__(
-        self, graph: Graph, parameters: dict[str, Any], at: tuple[float, float] | None = GOAL
-    ) -> None:
-        self.graph = graph
-        self.odom = graph.writer(topics.ODOM)
-        self.sectors = graph.writer(topics.SECTORS)
-        self.goal = graph.writer(topics.GOAL_POSE)
-        self.decisions = graph.hear(topics.DECISION)
-        self.plans = graph.hear(topics.PLAN)
-        self.steps = graph.hear(topics.GOAL_STEP)
-        stamped = parameters.get("enable_stamped_cmd_vel")
-        self.cmd_vel = graph.hear(topics.CMD_VEL, TwistStamped if stamped else None)
-        if at:
-            self.goal.publish(goal(*at))  # latched
-        self.node = graph.start(PlannerNode, parameters)
-        if at:
-            graph.until(lambda: self.node.goals.errands.goal is not None)
-
-    def answers(self, *messages: Any) -> list[Any]:
-        """Publish in this order and return the decisions that come of it."""
-        count = len(self.decisions)
-        writers = {Odometry: self.odom, LaserScan: self.sectors, PoseStamped: self.goal}
-        for message in messages:
-            writers[type(message)].publish(message)
-            if isinstance(message, PoseStamped):
-                self.graph.settle()
-        self.graph.settle()
-        assert len(self.cmd_vel) == len(self.decisions), "each decision has its Twist"
-        return self.decisions[count:]
-
-    def answer(self, *messages: Any) -> Any:
-        (only,) = self.answers(*messages)
-        return only
-
-    @property
-    def velocity(self) -> tuple[float, float]:
-        """The Twist of the last decision."""
-        twist = getattr(self.cmd_vel[-1], "twist", self.cmd_vel[-1])
-        return (twist.linear.x, twist.linear.y)
-
-
-def fields(message: Any) -> dict[str, str]:
-    (status,) = message.status
-    return {item.key: item.value for item in status.values} | {"reason": status.message}
-
-
-def mode(message: Any) -> Mode:
-    return Mode(fields(message)["mode"])
 
 
 def test_the_method_can_be_changed_while_it_drives(graph: Graph) -> None:
