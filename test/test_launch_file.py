@@ -186,7 +186,7 @@ def test_a_replay_is_told_what_its_command_line_understands() -> None:
     assert planner.parameters == {"lockstep": True}
     settings = parse(list(replay.arguments))
     assert (settings.inputs_of, settings.wait_for_subscribers) == (("planner",), ())
-    with pytest.raises(InputError, match="^bag:= is empty; give a bag"):
+    with pytest.raises(InputError, match=r"^bag:= is empty; give a bag"):
         replayed(by_default(REPLAY_ARGUMENTS))
 
 
