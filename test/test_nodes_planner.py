@@ -435,3 +435,30 @@ def test_markers_show_where_the_goal_step_leads(graph: Graph) -> None:
     lit = {mark.ns: mark for mark in marks[-1].markers}
     assert len(lit["sectors"].points) == 6
     assert lit["candidates"].action == lit["candidates"].DELETE
+
+
+def test_markers_read_at_a_glance(graph: Graph) -> None:
+    marks = graph.hear(topics.MARKERS)
+    talk = Talk(graph, {**LOCKSTEP, "view_period_s": 1e-9})
+    talk.answer(odom(1, 1.0, 2.0), sectors(1))
+    talk.answer(odom(2, 1.0, 2.0), sectors(2, (0.5,) * 3 + FREE[3:]))
+    graph.settle()
+    free, lit = ({mark.ns: mark for mark in message.markers} for message in marks)
+    reach_m = sectors(1).range_max
+    for mark in (free["ring"], lit["ring"]):
+        around = {round(math.hypot(p.x - 1.0, p.y - 2.0), 3) for p in mark.points}
+        assert around == {round(reach_m, 3)}
+    assert len(free["spokes"].points) == 2 * 12
+    assert len(lit["lit"].points) == 3 * 3 * 4, "three sectors of four triangles"
+    assert {free[name].action for name in ("lit", "gap")} == {free["lit"].DELETE}
+    assert (free["mode"].text, lit["mode"].text) == ("path generation", "obstacle avoidance")
+    tail, head = lit["gap"].points
+    step = lit["goal_step"].points[1]
+    assert (tail.x, tail.y) == (1.0, 2.0)
+    along = math.atan2(head.y - tail.y, head.x - tail.x)
+    assert along == pytest.approx(math.atan2(step.y - tail.y, step.x - tail.x))
+    for name in ("velocity", "gap"):
+        assert (lit[name].type, len(lit[name].points)) == (lit[name].ARROW, 2)
+    colors = {name: (m[name].color.r, m[name].color.g) for name in ("ring", "mode") for m in [lit]}
+    assert len(set(colors.values())) == 1, "the colour is the mode's"
+    assert lit["ring"].color != free["ring"].color

@@ -51,12 +51,15 @@ class Goals:
         if not isinstance(pose, str):
             before = self.errands.leg
             if self.errands.pass_by(pose.position, tolerance_m):
-                self._node.get_logger().info(f"goal {before} reached: on to {self.errands.goal}")
+                self._tell(f"goal {before} reached: on to {self.errands.goal}")
         return self.errands.goal
 
     def is_under_way(self) -> bool:
         """Whether somebody gives goals, of which a planner this young has not heard the last."""
         return not self.heard_any and self._node.count_publishers(topics.GOAL_POSE.name) > 0
+
+    def _tell(self, text: str) -> None:
+        self._node.get_logger().info(text)
 
     def _on_goal(self, message: Any) -> None:
         self._order("goal_pose", lambda: (goal_point(message, self._frame),))
@@ -73,9 +76,11 @@ class Goals:
         self.heard_any = True
         if self.errands.order(goals, over=self._is_over()):
             self._on_new()
+            self._tell(f"{name}: on to {self.errands.goal}, goal {self.errands.leg}")
 
     def _on_cancel(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         goal = self.errands.cancel()
         response.success = goal is not None
         response.message = f"no longer on the way to {goal}" if goal else "there was no goal"
+        self._tell(f"cancel: {response.message}")
         return response

@@ -97,6 +97,7 @@ class PlannerNode(ManagedNode):
         self._take("odom", message, robot_pose, self._inputs.odom)
 
     def _on_sectors(self, message: Any) -> None:
+        self._say.reach_m = message.range_max
         self._take("sectors", message, sector_ranges, self._inputs.sectors)
 
     def _take(self, name: str, message: Any, read: Any, add: Any) -> None:

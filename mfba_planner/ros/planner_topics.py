@@ -27,6 +27,7 @@ class PlannerTopics:
         self._plan = node.advertise(topics.PLAN)
         self._decision = node.advertise(topics.DECISION)
         self._markers = node.advertise(topics.MARKERS)
+        self.reach_m = 0.0  # of the sectors: what the ring shows
         self._view = markers.Seldom(settings.view_period_s)
         stamped = TwistStamped if settings.enable_stamped_cmd_vel else None
         self._cmd_vel = node.advertise(topics.CMD_VEL, stamped)
@@ -41,7 +42,7 @@ class PlannerTopics:
         reason = convert.decision_msg(decision, algorithm, refused, self._who, more)
         self._decision.publish(reason)
         if self._view.due(decision.stamp_ns):
-            self._markers.publish(markers.decision_markers(decision, frame))
+            self._markers.publish(markers.decision_markers(decision, frame, self.reach_m))
 
     def move(self, decision: Decision) -> None:
         """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
