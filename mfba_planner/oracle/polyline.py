@@ -19,20 +19,25 @@ def lengths(points: np.ndarray) -> np.ndarray:
 
 def gaps(points: np.ndarray, speed_mps: float, legs: Legs) -> np.ndarray:
     """Smallest gap (b, p - 1, m) in metres of every robot leg to every obstacle leg."""
+    x, y, begin, end, ux, uy = (column[:, :, None] for column in _edges(points, speed_mps))
+    return edge_gaps(x, y, begin, end, ux, uy, legs)
+
+
+def pair_gaps(points: np.ndarray, speed_mps: float, rows: np.ndarray, legs: Legs) -> np.ndarray:
+    """Smallest gap (b, m) of robot leg rows[k] to obstacle leg k only, the same bits as gaps()."""
+    x, y, begin, end, ux, uy = (column[:, rows] for column in _edges(points, speed_mps))
+    return edge_gaps(x, y, begin, end, ux, uy, legs)
+
+
+def _edges(points: np.ndarray, speed_mps: float) -> tuple[np.ndarray, ...]:
+    """The robot's legs, all (b, p - 1): x, y, begin, end, velocity."""
     step = points[:, 1:] - points[:, :-1]
-    way = np.sqrt((step * step).sum(axis=2))
+    dx, dy = step[:, :, 0], step[:, :, 1]
+    way = np.sqrt(dx * dx + dy * dy)
     end = np.cumsum(way, axis=1) / speed_mps
     begin = end - way / speed_mps
-    u = step * (speed_mps / np.maximum(way, 1e-12))[:, :, None]
-    return edge_gaps(
-        points[:, :-1, 0, None],
-        points[:, :-1, 1, None],
-        begin[:, :, None],
-        end[:, :, None],
-        u[:, :, 0, None],
-        u[:, :, 1, None],
-        legs,
-    )
+    per_m = speed_mps / np.maximum(way, 1e-12)
+    return points[:, :-1, 0], points[:, :-1, 1], begin, end, dx * per_m, dy * per_m
 
 
 def edge_gaps(
@@ -46,7 +51,7 @@ def edge_gaps(
 ) -> np.ndarray:
     """Smallest gap of robot legs (from x, y at begin, velocity u, until end) to obstacle legs.
 
-    The robot's arrays have a last axis of 1, over which the m obstacle legs are broadcast.
+    The m obstacle legs are broadcast over the robot's arrays: their last axis is 1, or m.
     """
     low = np.maximum(begin, legs.t0)
     span = np.minimum(end, legs.t1) - low
