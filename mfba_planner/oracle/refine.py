@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.legs import Legs
 from ..core.world import Walls
-from .polyline import gaps, lengths, pair_gaps, within
+from .polyline import gaps, lengths, one_way_gaps, pair_gaps, within
 from .tangents import CLEAR_M
 
 _NEAR_M = 1.5  # obstacle legs further away are looked at only in the end
@@ -113,6 +113,9 @@ class _Problem:
         self.points, self.v, self.margin = points, speed_mps, margin
         self.rows, columns = np.nonzero(pairs)
         self.legs = Legs(*(values[columns] for values in legs))  # one for each pair
+        first, last = self.points[0].tolist(), self.points[-1].tolist()
+        self._ends = [tuple(first)], [tuple(last)]
+        self._plain = self.rows.tolist(), list(zip(*(values.tolist() for values in self.legs[:7])))
 
     def solve(self, inside: Walls | None) -> np.ndarray:
         """The via points that SLSQP ends with, feasible or not."""
@@ -155,7 +158,9 @@ class _Problem:
 
     def slack(self, x: np.ndarray) -> np.ndarray:
         """Gaps of the pairs above the margin, metres."""
-        return self._slacks(x[None])[0]
+        (first, last), (rows, legs), via = self._ends, self._plain, x.tolist()
+        points = first + list(zip(via[::2], via[1::2])) + last
+        return np.array(one_way_gaps(points, self.v, rows, legs)) - self.margin
 
     def slack_gradient(self, x: np.ndarray) -> np.ndarray:
         """Of slack(), (pairs, via coordinates), by differences, all at once."""
