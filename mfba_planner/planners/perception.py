@@ -15,7 +15,7 @@ from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, distance
 from ..core.options import did_you_mean
 from ..core.planner import Circle, Observation
-from ..core.sensing import Ranges, Scan, SensorParams, sense_scan
+from ..core.sensing import FARTHER, Ranges, Scan, SensorParams, sense_scan
 from ..core.world import velocity_at
 
 SENSOR_STREAM = 2  # spawn key of the noise's SeedSequence child; the planner's is 1
@@ -64,7 +64,7 @@ class Perception:
         self.noise_m = noise_m
         self.seed = seed
         self._beams = BEAMS.get(name, 0)
-        self._sectors = sectors
+        self._sectors = sectors or name == "sectors"
         self._past: deque[tuple[int, Pose2D, Sensed]] = deque(maxlen=latency_ticks + 1)
 
     def __call__(self, world: World, sensor: SensorParams) -> Observation:
@@ -100,9 +100,12 @@ class Perception:
 
     def _circles(self, world: World, sensor: SensorParams) -> tuple[Circle, ...]:
         scenario, t_s = world.scenario, world.time_s
+        reach, (px, py) = sensor.sensing_range_m, world.pose.position
         circles = []
         for obstacle, (center, radius) in zip(scenario.obstacles, world.enlarged()):
-            if distance(world.pose.position, center) <= radius + sensor.sensing_range_m:
+            dx, dy = center[0] - px, center[1] - py
+            square, far = dx * dx + dy * dy, (radius + reach) * FARTHER
+            if square <= far * far and math.sqrt(square) <= radius + reach:
                 velocity = velocity_at(obstacle, t_s, scenario.walls)
                 circles.append(Circle(center_m=center, radius_m=radius, velocity_mps=velocity))
         if not self.noise_m or not circles:

@@ -78,6 +78,8 @@ class Predictive(Steering):
     weighed again at every tick, so that the bats' search goes on from tick to tick.
     """
 
+    reads_sectors = False
+
     def __init__(
         self,
         params: PlannerParams,

@@ -42,8 +42,11 @@ class Steering:
     """A planner that moves by move() and stands still for the reasons the paper's does.
 
     Subclasses define move(), and where they remember anything forget(), which is called
-    before the first observation and by reset().
+    before the first observation and by reset(). Who never reads ranges_m where circles or a scan
+    are given sets reads_sectors to False: sweeps then spare themselves what sectors cost.
     """
+
+    reads_sectors = True
 
     def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
         """Start idle; ConfigError for a negative seed."""
