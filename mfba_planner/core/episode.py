@@ -38,6 +38,12 @@ class Episode:
     driver: str
     ticks: tuple[Decision, ...]
     outcome: Outcome
+    brain: str = ""  # who decided, where that is not what planner's own options name
+
+    @property
+    def label(self) -> str:
+        """Who decided, for people."""
+        return self.brain or self.planner.label
 
     def time_s(self, stamp_ns: int) -> float:
         """Time since the first tick in seconds, the t of the obstacles' motion."""

@@ -121,13 +121,10 @@ def _free_steps(
         step = origin[:, None] * len(u) + np.arange(len(u))
         which = np.nonzero(asked[step])
         step, near, heading = step[which], leg[which[0]], u[which[1]]
-        gap = edge_gaps(
-            *here[step // len(u)].T,
-            np.full(len(step), t),
-            np.full(len(step), end),
-            *heading.T,
-            Legs(*(column[near] for column in legs)),
-        )
+        (x, y), (ux, uy) = here[step // len(u)].T, heading.T
+        begin, until = np.full(len(step), t), np.full(len(step), end)
+        those = Legs(*(column[near] for column in legs))
+        gap = edge_gaps(x, y, begin, until, ux, uy, those)
         touched[step[gap < 0.0]] = True
     free: np.ndarray = ~touched[steps]
     return free

@@ -79,6 +79,7 @@ class Predictive(Steering):
     """
 
     reads_sectors = False
+    preset = staticmethod(preset)
 
     def __init__(
         self,

@@ -119,7 +119,7 @@ def parts_of(order: Order) -> list[Runs | Optima]:
                 Runs(
                     name=f"{order.suite}-{_plain(planner)}-{first}-{len(worlds)}",
                     runs=tuple(order.runs(planner, worlds)),
-                    setting=order.setting,
+                    setting=order.setting_of(planner),
                 )
             )
     return parts

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..core.episode import Episode, Look, Outcome, look
 from ..core.episode import run as drive
@@ -55,6 +55,8 @@ def play(run: Run, setting: Setting, *, whole: bool = True) -> Played:
             ticks=tuple(guard.decisions),
             outcome=Outcome.INTERRUPTED,
         )
+    if run.planner != "paper":
+        episode = replace(episode, brain=run.planner)
     return Played(episode=episode, fault=fault, times_ns=tuple(guard.times_ns))
 
 
