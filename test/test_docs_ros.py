@@ -89,7 +89,8 @@ def test_parameters_and_files_that_are_named_exist() -> None:
     shortened = {"wait_s", "slow_within_m"}
     assert len(named) > 8
     assert named - shortened <= declared
-    assert starting("ros2", "run")[0][-1].endswith("share/mfba_planner/layout/mfba.rviz")
+    for file in re.findall(r"(?:config|layout|test)/[\w.]+", PAGE):
+        assert (ROOT / file).is_file(), file
 
 
 def test_the_bound_is_the_one_that_is_printed() -> None:
