@@ -64,6 +64,7 @@ setup(
         ],
         "orca": ["pyrvo>=0.4"],
         "parquet": ["pyarrow>=15"],
+        "view": ["rerun-sdk>=0.28,<0.31"],
         "test": [
             "distributed>=2024.1",
             "hypothesis>=6.100",
@@ -73,6 +74,7 @@ setup(
             "pytest>=8",
             "pytest-cov>=6",
             "pytest-xdist>=3.6",
+            "rerun-sdk>=0.28,<0.31",
             "rosbags>=0.10",
             "small-mcap>=0.10",
         ],
