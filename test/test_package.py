@@ -64,7 +64,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "verification": ({"core", "messages", "planners", "recording", "verification"}, set()),
     "report": (
-        {"core", "outputs", "paper", "report", "statistics", "sweep"},
+        {"core", "outputs", "paper", "report", "scenarios", "statistics", "sweep"},
         {"matplotlib", "numpy", "rich"},
     ),
     "ros": (
