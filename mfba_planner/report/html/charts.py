@@ -27,6 +27,8 @@ from .data import MOST_RUNS, clearances, speeds
 # (narrowest screen it is for in CSS pixels, width and height in points)
 SHEETS = ((0, 290.0, 300.0), (500, 470.0, 300.0), (900, 860.0, 280.0))
 _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 34.0, 10.0, 20.0, 24.0, 34.0  # points
+# Of the runs, in line widths: who cannot tell colours apart can tell these.
+DASHES: tuple[tuple[float, ...], ...] = ((), (5, 2), (1.5, 1.5), (7, 2, 1.5, 2), (10, 3), (3, 3))
 _SHARE = 0.6  # of the height, for clearance
 _POINTS_PER_INCH = 72.0
 
@@ -36,7 +38,6 @@ _VARIABLES = [
     *(f"run-{number}" for number in range(1, MOST_RUNS + 1)),
     *(f"mode-{mode.value}" for mode in Mode),
 ]  # fmt: skip
-_DASHES = [(0, dashes) for dashes in ((), (5, 2), (1.5, 1.5), (7, 2, 1.5, 2), (10, 3), (3, 3))]
 _STAND_IN = {name: f"#fe{number:02x}a7" for number, name in enumerate(_VARIABLES)}
 
 
@@ -60,7 +61,7 @@ def _chart(
         upper.tick_params(labelbottom=False)
         upper.axhline(0.0, color=_STAND_IN["bad"], linewidth=0.9, linestyle=(0, (2, 2)))
         for number, episode in enumerate(episodes, start=1):
-            looks = {"color": _STAND_IN[f"run-{number}"], "linestyle": _DASHES[number - 1]}
+            looks = {"color": _STAND_IN[f"run-{number}"], "linestyle": (0, DASHES[number - 1])}
             if len(episodes) == 1:
                 looks["color"] = _STAND_IN["ink"]  # the bands bring colour enough
             _steps(upper, episode, clearances(episode), looks)
@@ -93,7 +94,7 @@ def _axes(figure: Figure, title: str, bottom: float, height: float) -> Axes:
     for name, spine in ax.spines.items():
         spine.set_visible(name == "bottom")
         spine.set_color(_STAND_IN["faint"])
-    ax.tick_params(length=0.0, pad=4.0, labelcolor=_STAND_IN["quiet"])
+    ax.tick_params(length=0.0, pad=4.0, labelsize=style.NORMAL, labelcolor=_STAND_IN["quiet"])
     ax.locator_params(axis="y", nbins=5)
     ax.locator_params(axis="x", nbins=max(4, int(whole_w / 70.0)))
     return ax

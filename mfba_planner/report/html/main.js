@@ -48,7 +48,7 @@ function legend() {
     entry("obstacle, and its edge enlarged by the robot",
       svg("circle", { cx: 11, cy: 8, r: 7, class: "enlarged" }),
       svg("circle", { cx: 11, cy: 8, r: 4, class: "body" })),
-    entry(`where it goes in ${AHEAD} s`, svg("path", { d: "M1 8H20M14 4L20 8L14 12", class: "motion" })),
+    entry(`how far it goes in ${AHEAD} s`, svg("path", { d: "M1 8H20M14 4L20 8L14 12", class: "motion" })),
     entry("sensing range, sector that is set",
       svg("path", { d: "M2 14A18 18 0 0 1 20 14L11 2Z", class: "sector lit" }),
       svg("path", { d: "M1 14A18 18 0 0 1 21 14", class: "ring" })),
@@ -61,6 +61,17 @@ function legend() {
       svg("path", { d: "M16 3L21 8L16 13L11 8Z", class: "waypoint" })),
   );
   return html("ul", { class: "legend", "aria-label": "Legend" }, ...items);
+}
+
+/** Whose line is whose, where there are several. */
+function chartKey() {
+  if (runs.length === 1) return [];
+  const entries = runs.map((run, number) => {
+    const dashes = DATA.dashes[number].map((length) => 2 * length).join(" ") || "none";
+    const style = `stroke: var(--run-${number + 1}); stroke-width: 2; stroke-dasharray: ${dashes}`;
+    return entry(run.name, svg("path", { d: "M-6 8H28", style }));
+  });
+  return [html("ul", { class: "legend key", "aria-label": "Runs in the charts" }, ...entries)];
 }
 
 function entry(text, ...shapes) {
@@ -88,9 +99,9 @@ document.getElementById("app").append(
   html(
     "main",
     {},
-    html("section", { class: "runs", "data-count": runs.length, "aria-label": "Replay" }, ...views.map(card)),
-    legend(),
-    html("section", { "aria-label": "Charts", class: "panel" }, charts.element),
+    html("section", { class: "runs", "aria-label": "Runs" }, ...views.map(card)),
+    ...(runs.length > 1 ? [legend()] : []),
+    html("section", { "aria-label": "Charts", class: "panel" }, ...chartKey(), charts.element),
     html("section", { class: "panel" }, html("h2", {}, "Result"), resultTable(runs)),
     html("section", { class: "panel" }, configurationTable(runs)),
     html("section", { class: "panel" }, html("h2", {}, "Decision digest"), digestTable(runs)),
@@ -100,6 +111,9 @@ document.getElementById("app").append(
     html("p", { class: "keys" }, "Keys: space plays and pauses; ← → step, with shift by ten; Home and End; + and − change the speed."),
     html("p", {}, `mfba_planner ${DATA.version}`)),
 );
+root.dataset.count = runs.length;
+root.style.setProperty("--rows", runs.length);
+if (runs.length === 1) views[0].readout.element.append(legend());
 clock.listeners.push(show);
 show();
 charts.fit();

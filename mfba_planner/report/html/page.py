@@ -18,7 +18,7 @@ from mfba_planner.core.errors import InputError
 from mfba_planner.outputs import write_new
 from mfba_planner.report import words
 
-from .charts import charts
+from .charts import DASHES, charts
 from .data import MOST_RUNS, MOST_TICKS, pages_data
 
 # One script in the page; each file uses only what stands before it.
@@ -44,7 +44,9 @@ def page(runs: Sequence[tuple[str, Episode]]) -> str:
         title=escape(words.one_line(names, 80)),
         policy=_policy(script),
         style=_own("page.css"),
-        data=as_json({**pages_data(runs, __version__), "charts": charts(episodes)}),
+        data=as_json(
+            {**pages_data(runs, __version__), "charts": charts(episodes), "dashes": DASHES}
+        ),
         script=script,
     )
 

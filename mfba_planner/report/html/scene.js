@@ -17,6 +17,7 @@ class Scene {
       role: "img",
       "aria-label": `${run.title}: the world to scale`,
     });
+    this.grain = this.width / 4000; // m: what is nearer than this is one point of a line
     this.fixed = []; // [element, x, y]: what keeps its size on the screen
     this.drawGround(world);
     this.drawObstacles(world);
@@ -41,11 +42,14 @@ class Scene {
     const lines = [];
     for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
       lines.push(`M${x} ${-top}V${-bottom}`);
-      this.label(String(round(x)), x, bottom, { class: "axis", dx: 3, dy: -4 });
+      const fits = x + 0.06 * this.width < right;
+      const looks = fits ? { dx: 3 } : { dx: -3, "text-anchor": "end" };
+      this.label(String(round(x)), x, bottom, { class: "axis", dy: -4, ...looks });
     }
     for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
       lines.push(`M${left} ${-y}H${right}`);
-      this.label(y === 0 ? "0 m" : String(round(y)), left, y, { class: "axis", dx: 3, dy: -4 });
+      const unit = y + step > top ? " m" : "";
+      this.label(`${round(y)}${unit}`, left, y, { class: "axis", dx: 3, dy: -4 });
     }
     this.element.prepend(svg("path", { class: "grid", d: lines.join("") }));
     if (!world.walls) return;
@@ -107,7 +111,7 @@ class Scene {
   /** The whole way, faint, and on top the part that lies behind, coloured by mode. */
   drawPath() {
     const { x, y, mode } = this.run.ticks;
-    this.whole = this.add("path", { class: "way", d: line(x, y, 0, x.length - 1) });
+    this.whole = this.add("path", { class: "way", d: line(x, y, 0, x.length - 1, this.grain) });
     this.stretches = [];
     for (let first = 0, k = 1; k <= mode.length; k++) {
       if (k < mode.length && mode[k] === mode[first]) continue;
@@ -137,9 +141,9 @@ class Scene {
 
   /** How large a pixel is decides the size of letters and marks. */
   measure() {
-    const { width } = this.element.getBoundingClientRect();
-    if (!width) return;
-    this.pixel = this.width / width;
+    const scale = this.element.getScreenCTM();
+    if (!scale || !scale.a) return;
+    this.pixel = 1 / scale.a;
     for (const [element, x, y] of this.fixed) {
       set(element, { transform: `translate(${x} ${-y}) scale(${this.pixel})` });
     }
@@ -163,7 +167,7 @@ class Scene {
     for (const { first, end, element } of this.stretches) {
       const until = Math.min(k, end);
       const tip = until === k && k < end && x !== null ? `L${x} ${-y}` : "";
-      set(element, { d: first > k ? "" : line(ticks.x, ticks.y, first, until) + tip });
+      set(element, { d: first > k ? "" : line(ticks.x, ticks.y, first, until, this.grain) + tip });
     }
   }
 
@@ -182,8 +186,11 @@ class Scene {
     this.place(group, x, y);
     const { time } = this.run.ticks;
     const first = indexAt(time, time[k] - BEHIND);
-    set(this.wakes[i], { d: `${line(obstacle.x, obstacle.y, first, k)}L${x} ${-y}` });
-    set(motion, { d: this.arrow(0, 0, AHEAD * obstacle.vx[k], AHEAD * obstacle.vy[k]) });
+    const wake = line(obstacle.x, obstacle.y, first, k, this.grain);
+    set(this.wakes[i], { d: `${wake}L${x} ${-y}` });
+    const [vx, vy] = [obstacle.vx[k], obstacle.vy[k]];
+    const edge = obstacle.radius / (Math.hypot(vx, vy) || 1);
+    set(motion, { d: this.arrow(edge * vx, edge * vy, AHEAD * vx, AHEAD * vy) });
     group.classList.toggle("near", this.run.ticks.near[k].includes(i + 1));
   }
 
@@ -240,11 +247,15 @@ function polar(radius, angle) {
   return [radius * Math.cos(angle), -radius * Math.sin(angle)];
 }
 
-/** The path through points first to last; one that is not known is left out. */
-function line(x, y, first, last) {
+/** The path through points first to last, without those that are not known or add nothing. */
+function line(x, y, first, last, grain) {
   const parts = [];
+  let [ax, ay] = [Infinity, Infinity];
   for (let k = first; k <= last; k++) {
-    if (x[k] !== null && y[k] !== null) parts.push(`${parts.length ? "L" : "M"}${x[k]} ${-y[k]}`);
+    if (x[k] === null || y[k] === null) continue;
+    if (k < last && Math.hypot(x[k] - ax, y[k] - ay) < grain) continue;
+    [ax, ay] = [x[k], y[k]];
+    parts.push(`${parts.length ? "L" : "M"}${ax} ${-ay}`);
   }
   return parts.join("");
 }

@@ -43,7 +43,7 @@ function configurationTable(runs) {
   const changed = rows.filter(({ values }) => values.some(([, , , isDefault]) => !isDefault));
   const differing = rows.filter(({ differs }) => differs).length;
   const told = [`${changed.length} of ${rows.length} not at their default`];
-  if (runs.length > 1) told.push(`${differing} differ between the runs`);
+  if (runs.length > 1) told.push(`${differing} not the same in all runs`);
   return html(
     "details",
     {},
