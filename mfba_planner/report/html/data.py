@@ -16,7 +16,7 @@ import numpy as np
 from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Episode
 from mfba_planner.core.gaps import gap_heading
-from mfba_planner.core.metrics import evaluate, tick_clearances, within_range
+from mfba_planner.core.metrics import evaluate, within_range
 from mfba_planner.core.motion import Motion
 from mfba_planner.core.options import walk
 from mfba_planner.core.planner import Mode, PlannerParams
@@ -134,9 +134,11 @@ def _obstacles(episode: Episode) -> list[Plain]:
 
 
 def clearances(episode: Episode) -> list[float]:
-    """The smallest gap (m) from each tick to the next: see tick_clearances; inf after the last."""
-    smallest = [min(gaps, default=math.inf) for gaps in tick_clearances(episode)]
-    return smallest + [math.inf] * (len(episode.ticks) - len(smallest))
+    """The smallest gap (m) from each tick to the next, as metrics.tick_clearances; then inf."""
+    times_s = np.array([episode.time_s(tick.stamp_ns) for tick in episode.ticks])
+    positions_m = np.array([tick.pose.position for tick in episode.ticks]).T
+    gaps = Motion(episode.scenario).steps(times_s, positions_m).gap_m
+    return [*gaps.min(axis=1, initial=math.inf).tolist(), math.inf]
 
 
 def speeds(episode: Episode) -> list[float]:

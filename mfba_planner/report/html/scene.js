@@ -17,7 +17,9 @@ class Scene {
       role: "img",
       "aria-label": `${run.title}: the world to scale`,
     });
-    this.grain = this.width / 4000; // m: what is nearer than this is one point of a line
+    const grain = this.width / 1500; // m: what is nearer than this is one point of a line
+    this.kept = thinned(run.ticks.x, run.ticks.y, grain);
+    this.keptOf = world.obstacles.map(({ x, y }) => thinned(x, y, grain));
     this.fixed = []; // [element, x, y]: what keeps its size on the screen
     this.drawGround(world);
     this.drawObstacles(world);
@@ -111,7 +113,7 @@ class Scene {
   /** The whole way, faint, and on top the part that lies behind, coloured by mode. */
   drawPath() {
     const { x, y, mode } = this.run.ticks;
-    this.whole = this.add("path", { class: "way", d: line(x, y, 0, x.length - 1, this.grain) });
+    this.whole = this.add("path", { class: "way", d: line(x, y, this.kept, 0, x.length - 1) });
     this.stretches = [];
     for (let first = 0, k = 1; k <= mode.length; k++) {
       if (k < mode.length && mode[k] === mode[first]) continue;
@@ -167,7 +169,7 @@ class Scene {
     for (const { first, end, element } of this.stretches) {
       const until = Math.min(k, end);
       const tip = until === k && k < end && x !== null ? `L${x} ${-y}` : "";
-      set(element, { d: first > k ? "" : line(ticks.x, ticks.y, first, until, this.grain) + tip });
+      set(element, { d: first > k ? "" : line(ticks.x, ticks.y, this.kept, first, until) + tip });
     }
   }
 
@@ -186,7 +188,7 @@ class Scene {
     this.place(group, x, y);
     const { time } = this.run.ticks;
     const first = indexAt(time, time[k] - BEHIND);
-    const wake = line(obstacle.x, obstacle.y, first, k, this.grain);
+    const wake = line(obstacle.x, obstacle.y, this.keptOf[i], first, k);
     set(this.wakes[i], { d: `${wake}L${x} ${-y}` });
     const [vx, vy] = [obstacle.vx[k], obstacle.vy[k]];
     const edge = obstacle.radius / (Math.hypot(vx, vy) || 1);
@@ -247,16 +249,30 @@ function polar(radius, angle) {
   return [radius * Math.cos(angle), -radius * Math.sin(angle)];
 }
 
-/** The path through points first to last, without those that are not known or add nothing. */
-function line(x, y, first, last, grain) {
-  const parts = [];
+/** Numbers of the points that a line needs: those that are known, and apart by a grain. */
+function thinned(x, y, grain) {
+  const kept = [];
   let [ax, ay] = [Infinity, Infinity];
-  for (let k = first; k <= last; k++) {
-    if (x[k] === null || y[k] === null) continue;
-    if (k < last && Math.hypot(x[k] - ax, y[k] - ay) < grain) continue;
-    [ax, ay] = [x[k], y[k]];
-    parts.push(`${parts.length ? "L" : "M"}${ax} ${-ay}`);
+  x.forEach((px, k) => {
+    if (px === null || y[k] === null) return;
+    if ((px - ax) ** 2 + (y[k] - ay) ** 2 < grain ** 2) return;
+    [ax, ay] = [px, y[k]];
+    kept.push(k);
+  });
+  return kept;
+}
+
+/** The path through points first to last, by way of those that are kept. */
+function line(x, y, kept, first, last) {
+  const parts = [];
+  const add = (k) => {
+    if (x[k] !== null && y[k] !== null) parts.push(`${parts.length ? "L" : "M"}${x[k]} ${-y[k]}`);
+  };
+  add(first);
+  for (let i = indexAt(kept, first); i < kept.length && kept[i] < last; i++) {
+    if (kept[i] > first) add(kept[i]);
   }
+  if (last > first) add(last);
   return parts.join("");
 }
 
