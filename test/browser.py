@@ -49,7 +49,13 @@ class Browser:
         self.driver = webdriver.Chrome(options=options, service=Service(driver))
 
     def open(
-        self, page: Path, *, width: int = 1400, height: int = 900, dark: bool = False
+        self,
+        page: Path,
+        *,
+        width: int = 1400,
+        height: int = 900,
+        dark: bool = False,
+        calm: bool = False,
     ) -> None:
         """Open a page and wait until it says that all of it is there."""
         self.command(
@@ -59,8 +65,12 @@ class Browser:
             deviceScaleFactor=1,
             mobile=width < 500,
         )
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.command("Emulation.setEmulatedMedia", features=[scheme])
+        wishes = {
+            "prefers-color-scheme": "dark" if dark else "light",
+            "prefers-reduced-motion": "reduce" if calm else "no-preference",
+        }
+        features = [{"name": name, "value": value} for name, value in wishes.items()]
+        self.command("Emulation.setEmulatedMedia", features=features)
         for kind in ("browser", "performance"):
             self.driver.get_log(kind)  # what was before is of no interest
         self.driver.get("about:blank")

@@ -198,6 +198,32 @@ def test_it_plays_and_pauses(browser: Browser, single: Path) -> None:
     assert field(browser, "mode") == "arrived"
 
 
+PLACES = """
+const done = arguments[0];
+const places = [];
+const robot = document.querySelector(".scene .robot");
+const turn = () => {
+  places.push(robot.getAttribute("transform").slice(10, -1).split(" ").map(Number));
+  const isOver = document.getElementById("play").dataset.icon === "play";
+  if (isOver || places.length > 400) done(places); else requestAnimationFrame(turn);
+};
+document.getElementById("play").click();
+turn();
+"""
+
+
+@pytest.mark.parametrize("calm", [False, True], ids=["smooth", "calm"])
+def test_between_ticks_things_move_unless_unwanted(
+    browser: Browser, single: Path, episode: Episode, calm: bool
+) -> None:
+    browser.open(single, calm=calm)
+    scrub(browser, len(episode.ticks) - 4)
+    places = {(x, y) for x, y in browser.driver.execute_async_script(PLACES)}
+    at_ticks = {(t.pose.x, -t.pose.y) for t in episode.ticks}
+    assert (places <= at_ticks) == calm
+    assert len(places) >= 4
+
+
 def test_it_is_driven_by_keyboard(browser: Browser, single: Path, episode: Episode) -> None:
     browser.open(single)
     last = len(episode.ticks) - 1

@@ -28,6 +28,6 @@ echo "installing Debian's chromium and chromium-driver for the tests of the page
 {
     "${root[@]}" apt-get update -qq &&
         "${root[@]}" env DEBIAN_FRONTEND=noninteractive \
-            apt-get install -y -qq --no-install-recommends chromium chromium-driver fonts-dejavu-core
+            apt-get install -y -qq chromium chromium-driver
 } >/dev/null 2>&1 || lacking "apt-get could not install it"
 found || lacking "apt-get installed something else"
