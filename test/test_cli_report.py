@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from launching import complete
 
 from mfba_planner import cli
 from mfba_planner.core.episode import Episode, run
@@ -136,16 +135,6 @@ def test_what_is_there_is_not_overwritten(capsys: Said, kept: Path) -> None:
     assert "report.html: exists" in refused(capsys, kept)
     assert "cannot be written" in refused(capsys, kept, "--out", "no/where.html")
     assert Path("report.html").read_text() == "mine"
-
-
-def test_the_commands_of_its_page_in_the_docs_run(tmp_path: Path) -> None:
-    text = (ROOT / "docs/report.md").read_text(encoding="utf-8")
-    commands = re.findall(r"^    (mfba .*)$", text, re.MULTILINE)
-    assert len(commands) >= 4
-    for command in commands:
-        done = complete(*command.split(), cwd=tmp_path)
-        assert (done.process.returncode, done.stderr) == (0, ""), command
-    assert len(data_of(tmp_path / "runs/two.html")["runs"]) == 2
 
 
 def test_several_runs_keep_their_order(capsys: Said, kept: Path) -> None:

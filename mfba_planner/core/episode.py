@@ -7,16 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-import numpy as np
-
 from .errors import ConfigError
 from .geometry import Point, Pose2D, distance
 from .motion import Motion
+from .nearby import Found, Nearby
 from .planner import NANO, Decision, Method, Observation, PathPlanner, Planner, PlannerParams
 from .sensing import Ranges, SensorParams, sense_circles
 from .world import Scenario
-
-AHEAD_TICKS = 32
 
 
 class Outcome(Enum):
@@ -38,6 +35,12 @@ class Episode:
     driver: str
     ticks: tuple[Decision, ...]
     outcome: Outcome
+    brain: str = ""  # who decided, where that is not what planner's own options name
+
+    @property
+    def label(self) -> str:
+        """Who decided, for people."""
+        return self.brain or self.planner.label
 
     def time_s(self, stamp_ns: int) -> float:
         """Time since the first tick in seconds, the t of the obstacles' motion."""
@@ -65,26 +68,14 @@ class World:
         self.goal_tolerance_m = goal_tolerance_m
         self.tick = 0
         self.pose = Pose2D(*scenario.start_m)
-        self._motion = Motion(scenario)
-        self._ahead: list[list[tuple[Point, float]]] = []
-        self._ahead_from = 0
+        self._nearby = Nearby(Motion(scenario), tick_ns)
 
-    def enlarged(self) -> list[tuple[Point, float]]:
-        """(centre, enlarged radius) of all obstacles now, as Scenario.enlarged gives them."""
-        k = self.tick - self._ahead_from
-        if not 0 <= k < len(self._ahead):
-            self._look_ahead()
-            k = 0
-        return self._ahead[k]
+    def near(self, reach_m: float) -> Found:
+        """Indices, and (centre, enlarged radius), of whoever may be within reach of its edge now.
 
-    def _look_ahead(self) -> None:
-        """Work out many ticks at once: that is ten times as fast as one by one."""
-        self._ahead_from = self.tick
-        ticks = range(self.tick, self.tick + AHEAD_TICKS)
-        times_s = np.array([tick * self.tick_ns * NANO for tick in ticks])
-        x, y = self._motion.centers(times_s).tolist()
-        radii = self._motion.radius_m.tolist()
-        self._ahead = [list(zip(zip(xs, ys), radii)) for xs, ys in zip(x, y)]
+        In the scenario's order; nobody who is within reach is missing.
+        """
+        return self._nearby.at(self.tick, self.pose.position, reach_m)
 
     @property
     def stamp_ns(self) -> int:
@@ -112,17 +103,19 @@ class World:
 
 def sense(world: World, params: SensorParams) -> Ranges:
     """What the ring of virtual sensors measures at the present tick."""
-    return sense_circles(world.pose.position, world.enlarged(), params)
+    _, circles = world.near(params.sensing_range_m)
+    return sense_circles(world.pose.position, circles, params)
 
 
 def look(world: World, sensor: SensorParams) -> Observation:
     """What the paper's planner gets to know at the present tick: pose, sectors, goal."""
+    stamp_ns = world.stamp_ns
     return Observation(
-        stamp_ns=world.stamp_ns,
+        stamp_ns=stamp_ns,
         pose=world.pose,
         ranges_m=sense(world, sensor),
         goal=world.scenario.goal_m,
-        now_ns=world.stamp_ns,
+        now_ns=stamp_ns,
     )
 
 

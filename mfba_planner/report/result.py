@@ -55,7 +55,7 @@ def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str,
         "world": scenario_to_dict(episode.scenario),
         "seed": episode.seed,
         "driver": episode.driver,
-        "algorithm": episode.planner.label,
+        "algorithm": episode.label,
         "parameters": {
             "planner": _plain(flatten(episode.planner)),
             "sensor": _plain(flatten(episode.sensor)),
