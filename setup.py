@@ -37,7 +37,7 @@ setup(
         (SHARE, ["package.xml"]),
         (f"{SHARE}/config", glob("config/*.yaml")),
         (f"{SHARE}/config/scenarios", glob("config/scenarios/*.yaml")),
-        (f"{SHARE}/launch", glob("launch/*launch.py")),
+        (f"{SHARE}/launch", glob("launch/*launch.*")),
         (f"{SHARE}/layout", glob("layout/*")),
     ],
     entry_points={

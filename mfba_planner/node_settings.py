@@ -51,6 +51,13 @@ class WorldSimSettings:
     answer_retries: int = option(
         4, "lockstep: give up after so many repetitions", minimum=0, maximum=1_000_000
     )
+    cmd_vel_timeout_s: float = option(
+        0.5,
+        "real time: rest after so long without cmd_vel, but no less than a tick; 0: never",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+    )
     enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
     odom_frame: str = option("odom", "frame of all poses (REP-105)")
     base_frame: str = option("base_link", "frame of the robot (REP-105)")
@@ -99,6 +106,13 @@ class PlannerSettings:
     base_frame: str = option("base_link", "frame of the robot (REP-105)")
     view_period_s: float = option(
         0.2, "markers: time between two", unit="s", minimum=0.0, maximum=3600.0
+    )
+    diagnostics_period_s: float = option(
+        1.0, "/diagnostics: time between two", unit="s", minimum=0.01, maximum=3600.0
+    )
+    hardware_id: str = option("none", "hardware_id of /diagnostics, to tell robots apart")
+    autostart: bool = option(
+        True, "configure and activate at once; false: wait for ~/change_state"
     )
     wait_for: str = option("", _WAIT_FOR)
 

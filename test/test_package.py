@@ -73,7 +73,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         | {"node_settings", "planners", "scenarios"},
         {"numpy"} | ROS,
     ),
-    "launcher": ({"*"}, {"rich", "yaml"} | ROS),
+    "launcher": ({"*"}, {"launch", "launch_ros", "rich", "yaml"} | ROS),
     "cli": ({"*"}, {"pyarrow", "rich", "yaml"}),
 }
 # The core is handed the time and its random generators, and lets others do the talking.
@@ -254,7 +254,7 @@ def test_installs_every_shipped_file_in_its_place(distribution: Any) -> None:
     placed = {path: target for target, paths in distribution.data_files for path in paths}
     shipped = {
         relative(path)
-        for pattern in ("package.xml", "config/**/*.yaml", "launch/*.py", "layout/*")
+        for pattern in ("package.xml", "config/**/*.yaml", "launch/*.launch.*", "layout/*")
         for path in ROOT.glob(pattern)
     }
     assert {"config/scenarios/case1.yaml", "launch/simulate.launch.py"} <= shipped

@@ -9,6 +9,7 @@ from enum import Enum
 
 from .errors import ConfigError
 from .geometry import Point, Pose2D, distance
+from .guarded import Guarded
 from .motion import Motion
 from .nearby import Found, Nearby
 from .planner import NANO, Decision, Method, Observation, PathPlanner, Planner, PlannerParams
@@ -146,7 +147,7 @@ def run(
             raise ConfigError(
                 f"method={planner.method.value}: not the core's own; use planners.method.simulate"
             )
-        brain = Planner(planner, seed)
+        brain = Guarded(Planner(planner, seed))
     ticks = [brain.plan(look(world, sensor))]
     while (outcome := world.outcome()) is None and go_on(world):
         world.step(ticks[-1].velocity)

@@ -12,10 +12,12 @@ from typing import Protocol
 import numpy as np
 
 from .bat import BatParams, BatSwarm, Bounds, Disc, Vector, minimize
+from .caution import CautionParams
 from .errors import ConfigError
 from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
 from .geometry import Point, Pose2D, bearing, distance, towards
 from .options import check, option
+from .recovery import RecoveryParams
 from .sensing import Bits, Ranges, Scan, sensory_vector
 
 NANO = 1e-9
@@ -100,6 +102,8 @@ class PlannerParams:
     gap_heading: GapHeading = option(GapHeading.BOUNDARY, "where a gap leads, in its two sectors")
     swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
     bat: BatParams = field(default_factory=BatParams)
+    caution: CautionParams = field(default_factory=CautionParams)
+    recovery: RecoveryParams = field(default_factory=RecoveryParams)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range."""

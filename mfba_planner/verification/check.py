@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,15 @@ from ..core.geometry import Point, Pose2D
 from ..core.planner import Decision, Mode, observe
 from ..core.sensing import sense_circles, sensory_vector
 from ..messages import decision as read_decision
-from ..messages import obstacle_centers, or_refused, robot_pose, rotated, sector_ranges, velocity
+from ..messages import (
+    decision_value,
+    obstacle_centers,
+    or_refused,
+    robot_pose,
+    rotated,
+    sector_ranges,
+    velocity,
+)
 from ..planners.method import brain
 from ..recording.episode import Setup, read_setup
 from ..recording.integrity import check_data
@@ -66,27 +75,34 @@ def verify(path: str | Path) -> Report:
         for file in reader.file_paths:
             check_data(file)
         setup = read_setup(reader)
-        evidence = gather(reader, setup.planner.tick_ns if setup.lockstep else None)
+        tick_ns = setup.planner.tick_ns if setup.lockstep else None
+        evidence = gather(reader, tick_ns, setup.odom_frame)
     return _check(setup, evidence)
 
 
 def _check(setup: Setup, evidence: Evidence) -> Report:
     faults, notes = [*evidence.faults], [*evidence.notes]
+    read_odom = partial(robot_pose, frame=setup.odom_frame)
+    read_sectors = partial(sector_ranges, frame=setup.odom_frame)
     planner = brain(setup.planner, setup.sensor, setup.seed)
     goals = deque(evidence.goals)
     goal: Point | None = None
     pose = Pose2D(0.0, 0.0)
     recorded, decided = [], []
-    unchecked = 0
+    unchecked, errand = 0, ""
     for tick in evidence.ticks:
         if DECISION not in tick.said or SECTORS not in tick.said:
             continue  # named by evidence where it must not be
-        ranges = or_refused(sector_ranges, tick.said[SECTORS])
+        ranges = or_refused(read_sectors, tick.said[SECTORS])
         try:
             was = read_decision(tick.said[DECISION], () if isinstance(ranges, str) else ranges)
         except InputError as error:
             faults.append(f"stamp {tick.stamp_ns} ns: {error}")
             continue
+        before, errand = errand, decision_value(tick.said[DECISION], "errand")
+        if errand != before:
+            planner.reset()  # ordered anew, be it to the same goal, or cancelled
+            goal = goal if was.goal else None
         if was.goal != goal:
             while goals and goal != was.goal:
                 goal = goals.popleft()
@@ -100,7 +116,7 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
                 goal = was.goal
         seen: Any = was.pose
         if setup.lockstep:
-            seen = or_refused(robot_pose, tick.said[ODOM]) if ODOM in tick.said else pose
+            seen = or_refused(read_odom, tick.said[ODOM]) if ODOM in tick.said else pose
         elif was.mode is Mode.STOPPED:
             unchecked += 1  # what was refused or how old it was is not recorded
             continue
