@@ -28,7 +28,10 @@ setup(
     maintainer_email="maintainers@mfba-planner.example",
     license="Apache-2.0",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"]},
+    package_data={
+        NAME: ["py.typed"],
+        f"{NAME}.report.html": ["*.css", "*.html", "*.js"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
@@ -76,6 +79,7 @@ setup(
             "pytest-xdist>=3.6",
             "rerun-sdk>=0.28,<0.31",
             "rosbags>=0.10",
+            "selenium>=4.25",
             "small-mcap>=0.10",
         ],
         "peers": [
