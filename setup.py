@@ -67,7 +67,6 @@ setup(
         ],
         "orca": ["pyrvo>=0.4"],
         "parquet": ["pyarrow>=15"],
-        "view": ["rerun-sdk>=0.28,<0.31"],
         "test": [
             "distributed>=2024.1",
             "hypothesis>=6.100",
@@ -77,7 +76,6 @@ setup(
             "pytest>=8",
             "pytest-cov>=6",
             "pytest-xdist>=3.6",
-            "rerun-sdk>=0.28,<0.31",
             "rosbags>=0.10",
             "selenium>=4.25",
             "small-mcap>=0.10",
