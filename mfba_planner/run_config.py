@@ -78,6 +78,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     # In lockstep nobody watches, and markers cost more than the decisions.
     common = {"lockstep": lockstep, "wait_for": ",".join(peers)}
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
+    robot = config.scenario.robot
     radii = [obstacle.radius_m for obstacle in config.scenario.obstacles]
     return {
         "world_sim": viewed
@@ -87,15 +88,18 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             "tick_ns": config.planner.tick_ns,
             "goal_tolerance_m": config.planner.goal_tolerance_m,
             "start_paused": True,
+            "seed": config.seed,
         },
         "virtual_sensor": common
         | flatten(config.sensor)
         | {
             "robot_radius_m": config.scenario.robot_radius_m,
             **({"obstacle_radii_m": radii} if radii else {}),
+            **({"source": "scan", "scan_yaw": robot.lidar.yaw_rad} if robot.lidar.beams else {}),
         },
         "planner": viewed
         | flatten(config.planner)
+        | flatten(robot.base)
         | {"seed": config.seed}
         | ({} if lockstep else {"input_timeout_s": timeout_s}),
     }

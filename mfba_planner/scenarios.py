@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -16,8 +17,9 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .core.errors import ConfigError
-from .core.options import did_you_mean
-from .core.world import Obstacle, Scenario, Turn, Walls
+from .core.options import did_you_mean, override
+from .core.robot import Robot
+from .core.world import Kidnapping, Obstacle, Scenario, Turn, Walls
 from .resources import scenario_names, scenario_path
 
 _EXAMPLE = "compare config/scenarios/case1.yaml"
@@ -82,6 +84,14 @@ class _Walls(_Strict):
     upper_m: _Point
 
 
+class _Kidnapping(_Strict):
+    at_s: _Positive
+    to_m: _Point
+
+    def build(self) -> Kidnapping:
+        return Kidnapping(at_s=self.at_s, to_m=self.to_m)
+
+
 class _Scenario(_Strict):
     name: _Name
     description: str = _default(Scenario, "description")
@@ -91,6 +101,8 @@ class _Scenario(_Strict):
     obstacles: list[_Obstacle] = []
     walls: _Walls | None = None
     time_limit_s: _Positive = _default(Scenario, "time_limit_s")
+    robot: dict[str, Any] = {}
+    kidnappings: list[_Kidnapping] = []
 
     def build(self) -> Scenario:
         walls = self.walls
@@ -108,7 +120,25 @@ class _Scenario(_Strict):
             obstacles=tuple(obstacle.build() for obstacle in self.obstacles),
             walls=Walls(lower_m=walls.lower_m, upper_m=walls.upper_m) if walls else None,
             time_limit_s=self.time_limit_s,
+            robot=_robot(self.robot),
+            kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
         )
+
+
+def _robot(told: dict[str, Any]) -> Robot:
+    """The options of core.robot, named as there, nested or with dots."""
+    try:
+        return override(Robot(), dict(_dotted(told)))
+    except ConfigError as error:
+        raise ConfigError(f"robot.{error}") from None
+
+
+def _dotted(told: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in told.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
 
 
 def load_scenario(source: str) -> Scenario:
@@ -233,6 +263,7 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
     models: dict[Any, type[BaseModel]] = {
         "obstacles": _Obstacle,
         "turns": _Turn,
+        "kidnappings": _Kidnapping,
         "walls": _Walls,
     }
     within = [models[part] for part in location[:-1] if part in models]
@@ -241,9 +272,14 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
 
 def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
     """The scenario as plain data that load_scenario accepts and turns into an equal one."""
-    plain: dict[str, Any] = json.loads(json.dumps(asdict(scenario)))
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(scenario), default=lambda e: e.value))
+    # What a scenario does not use is left out: recordings compare scenarios as text.
+    if scenario.robot == Robot():
+        del plain["robot"]
+    if not scenario.kidnappings:
+        del plain["kidnappings"]
     for obstacle in plain["obstacles"]:
-        if not obstacle["turns"]:  # most have none, and recordings compare scenarios as text
+        if not obstacle["turns"]:
             del obstacle["turns"]
     return plain
 

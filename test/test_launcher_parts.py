@@ -58,8 +58,10 @@ def test_order_takes_readings_then_algorithm_then_single_options() -> None:
 
 def test_every_option_can_be_set_to_its_default() -> None:
     settings = [
-        f"--set={name}={getattr(default, 'value', default)}" for name, default, _ in option_rows()
+        f"--set={name}={getattr(default, 'value', default)}".replace("False", "false")
+        for name, default, _ in option_rows()
     ]
+    settings = [setting.replace("True", "true") for setting in settings]
     assert len(settings) > 10
     assert read_order(settings, "launcher").config == read_order([], "launcher").config
 

@@ -220,9 +220,7 @@ def test_three_ways_to_compute_clearance_agree(
 
 @settings(max_examples=100)
 @given(MOTIONS, st.booleans(), st.floats(0.5, 60.0))
-def test_event_by_event_is_where_core_says(
-    obstacle: Obstacle, closed: bool, until: float
-) -> None:
+def test_event_by_event_is_where_core_says(obstacle: Obstacle, closed: bool, until: float) -> None:
     walls = ROOM if closed else None
     end = 0.0
     for begin, stop, x, y, vx, vy in pieces(obstacle, walls, until):

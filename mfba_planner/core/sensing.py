@@ -38,6 +38,11 @@ def sensory_vector(ranges_m: Iterable[float]) -> Bits:
     return tuple([0 if r == math.inf else 1 for r in ranges_m])
 
 
+def blind(sector: int, range_m: float) -> str:
+    """Why sectors with this range are refused; sectors are counted from 1."""
+    return f"sector {sector} holds {range_m}; the sensor was blind"
+
+
 def longest_range_m(params: SensorParams, enlarged_radius_m: float) -> float:
     """Largest finite range a sector can report: along the tangent of a circle at SR.
 

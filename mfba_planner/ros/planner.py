@@ -6,8 +6,6 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from geometry_msgs.msg import TwistStamped
-
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner import NANO, Decision, Mode, PlannerParams, observe
@@ -15,6 +13,7 @@ from ..messages import goal_point, robot_pose, sector_ranges, stamp_ns
 from ..node_settings import PlannerSettings, names
 from ..planners.method import brain
 from . import convert, markers, params, topics
+from .cmd_vel import CmdVel
 from .inputs import Lockstep, Newest, Ready
 from .runtime import GraphNode, Refusals, spin_node
 
@@ -38,8 +37,7 @@ class PlannerNode(GraphNode):
         self._decision = self.advertise(topics.DECISION)
         self._markers = self.advertise(topics.MARKERS)
         self._view = markers.Seldom(s.view_period_s)
-        stamped = TwistStamped if s.enable_stamped_cmd_vel else None
-        self._cmd_vel = self.advertise(topics.CMD_VEL, stamped)
+        self._cmd_vel = CmdVel(self, s)
         self._inputs: Lockstep | Newest = Lockstep() if s.lockstep else Newest()
         self.listen(topics.ODOM, self._on_odom, from_anyone=not s.lockstep)
         self.listen(topics.SECTORS, self._on_sectors)
@@ -137,10 +135,7 @@ class PlannerNode(GraphNode):
         """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
         s, stamp = self.settings, decision.stamp_ns
         self._goal_step.publish(convert.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame))
-        if s.enable_stamped_cmd_vel:
-            self._cmd_vel.publish(convert.twist_stamped_msg(decision, s.base_frame))
-        else:
-            self._cmd_vel.publish(convert.twist_msg(decision))
+        self._cmd_vel.publish(decision, self.brain.params.tick_ns)
 
 
 def main(args: list[str]) -> int:

@@ -78,6 +78,7 @@ OBSTACLES = Topic(
 SCAN = Topic(
     name="scan",
     type=LaserScan,
+    writers=(WORLD_SIM,),  # where the simulated robot has a lidar
     readers=(VIRTUAL_SENSOR,),
     qos=TICK_QOS,
     least_qos=SENSOR_QOS,  # most lidars

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,17 @@ from ..core.digest import digest
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner import Decision, Mode, observe
-from ..core.sensing import sense_circles, sensory_vector
+from ..core.sensing import sense_circles, sense_scan, sensory_vector
+from ..messages import (
+    body_velocity,
+    laser_scan,
+    obstacle_centers,
+    or_refused,
+    robot_pose,
+    sector_ranges,
+    velocity,
+)
 from ..messages import decision as read_decision
-from ..messages import obstacle_centers, or_refused, robot_pose, rotated, sector_ranges, velocity
 from ..planners.method import brain
 from ..recording.episode import Setup, read_setup
 from ..recording.integrity import check_data
@@ -25,6 +34,7 @@ from .evidence import (
     DECISION,
     OBSTACLES,
     ODOM,
+    SCAN,
     SECTORS,
     STEP,
     TWIST,
@@ -128,11 +138,12 @@ def _contradictions(setup: Setup, tick: Tick, was: Decision) -> list[str]:
         (SECTORS, _intensities_agree),
         (VECTOR, _vector_agrees),
         (STEP, _step_agrees),
-        (TWIST, _twist_agrees),
+        (TWIST, partial(_twist_agrees, setup)),
     ):
         if topic in tick.said and not is_so(tick.said[topic], was):
             found.append(f"stamp {tick.stamp_ns} ns: {topic} is not what the decision says")
-    if {OBSTACLES, ODOM} <= tick.said.keys() and not _is_sensed(setup, tick, was):
+    source = SCAN if setup.scenario.robot.lidar.beams else OBSTACLES
+    if {source, ODOM} <= tick.said.keys() and not _is_sensed(setup, tick, was):
         found.append(f"stamp {tick.stamp_ns} ns: {SECTORS} is not what the sensor measures")
     return found
 
@@ -149,18 +160,24 @@ def _step_agrees(step: Any, was: Decision) -> bool:
     return (step.pose.position.x, step.pose.position.y) == was.waypoint
 
 
-def _twist_agrees(twist: Any, was: Decision) -> bool:
-    return bool(or_refused(velocity, twist) == (*rotated(was.velocity, -was.pose.yaw), 0.0))
+def _twist_agrees(setup: Setup, twist: Any, was: Decision) -> bool:
+    told = body_velocity(was, setup.scenario.robot, setup.planner.tick_ns)
+    return bool(or_refused(velocity, twist) == told)
 
 
 def _is_sensed(setup: Setup, tick: Tick, was: Decision) -> bool:
-    """Whether the obstacles of this tick give these sectors (source: obstacles)."""
+    """Whether the obstacles, or the scan, of this tick give these sectors."""
+    scenario, lidar = setup.scenario, setup.scenario.robot.lidar
     try:
-        position = robot_pose(tick.said[ODOM]).position
+        pose = robot_pose(tick.said[ODOM])
+        if lidar.beams:
+            scan, yaw = laser_scan(tick.said[SCAN]), pose.yaw + lidar.yaw_rad
+            return sense_scan(scan, yaw, scenario.robot_radius_m, setup.sensor) == was.ranges_m
         centers = obstacle_centers(tick.said[OBSTACLES])
     except InputError:
         return not was.ranges_m  # blind, as it must be
-    radii = [o.radius_m + setup.scenario.robot_radius_m for o in setup.scenario.obstacles]
+    position = pose.position
+    radii = [o.radius_m + scenario.robot_radius_m for o in scenario.obstacles]
     if len(radii) != len(centers):
         return False
     ranges = sense_circles(position, list(zip(centers, radii)), setup.sensor)
