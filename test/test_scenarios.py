@@ -3,6 +3,9 @@
 
 import json
 import math
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,7 @@ from mfba_planner.core.episode import Outcome, run
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.metrics import evaluate
 from mfba_planner.core.world import Obstacle, Scenario, Turn, Walls
+from mfba_planner.scenario_model import checked
 from mfba_planner.scenarios import (
     load_scenario,
     parse_scenario,
@@ -458,6 +462,55 @@ def test_json_and_back_is_the_same_scenario(scenario: Scenario) -> None:
     assert again == scenario
     assert scenario_to_json(again) == text
     assert json.loads(text) == scenario_to_dict(scenario)
+
+
+def outcome(door: Callable[[dict[str, Any]], Scenario], data: dict[str, Any]) -> object:
+    """What comes of plain data: a scenario, or what is said of it."""
+    try:
+        return door(data)
+    except ConfigError as error:
+        return str(error).removeprefix("x: ")
+
+
+@given(scenarios())
+def test_the_short_way_for_what_programs_write_is_the_long_one(scenario: Scenario) -> None:
+    assert outcome(checked, scenario_to_dict(scenario)) == scenario
+
+
+ODD = st.sampled_from(
+    [0.0, -0.0, -1.0, 2e6, -2e6, math.nan, math.inf, 1, True, None, "x", "a b", "\n", "x\n", "é"]
+    + [[], {}, [1.0], [1.0, 2.0], [1.0, 2.0, 3.0], [[0.5, 0.5]], {"at_s": 1.0}, "x" * 101]
+)
+
+
+@given(scenarios(), ODD, st.data())
+def test_what_is_not_as_programs_write_it_is_judged_by_the_long_way(
+    scenario: Scenario, odd: Any, data: st.DataObject
+) -> None:
+    plain = scenario_to_dict(scenario)
+    place: Any = plain
+    while True:
+        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
+        key = data.draw(st.sampled_from(keys + ["another"] * isinstance(place, dict)))
+        deeper = key != "another" and isinstance(place[key], dict | list) and place[key]
+        if not deeper or data.draw(st.booleans()):
+            break
+        place = place[key]
+    if key != "another" and data.draw(st.booleans()):
+        del place[key]
+    else:
+        place[key] = odd
+    text = json.dumps(plain)
+    assert outcome(lambda _: parse_scenario(text, "x"), plain) == outcome(checked, plain)
+
+
+def test_what_explains_mistakes_is_not_loaded_for_what_programs_write() -> None:
+    text = scenario_to_json(load_scenario("case2"))
+    code = (
+        "import sys\nfrom mfba_planner.scenarios import load_scenario\n"
+        "load_scenario(sys.argv[1])\nassert not {'pydantic', 'yaml'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code, text], check=True)
 
 
 @given(st.floats(-720.0, 720.0))

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..core.errors import BagError, OutputError
 from .reader import BagReader
-from .writer import BagWriter
+
+if TYPE_CHECKING:  # who reads a bag need not load what writes one
+    from .writer import BagWriter
 
 ATTACHMENT_NAME = "mfba_planner/configuration.json"
 MEDIA_TYPE = "application/json"

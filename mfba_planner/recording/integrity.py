@@ -11,8 +11,8 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from ..core.errors import BagError
+from .records import MAGIC
 
-_MAGIC_BYTES = 8
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offset start, summary CRC
 _DATA_END = struct.Struct("<BQI")  # opcode, length, CRC of all before it (0: not given)
 _BLOCK_BYTES = 1 << 20
@@ -26,7 +26,7 @@ def check_data(path: Path) -> bool:
     """
     with path.open("rb") as stream:
         size = stream.seek(0, os.SEEK_END)
-        tail_bytes = _FOOTER.size + _MAGIC_BYTES
+        tail_bytes = _FOOTER.size + len(MAGIC)
         stream.seek(max(0, size - tail_bytes))
         _, _, summary_start, _, _ = _FOOTER.unpack(stream.read(_FOOTER.size))
         end = (summary_start or size - tail_bytes) - _DATA_END.size

@@ -8,15 +8,14 @@ from pathlib import Path
 
 from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, ChunkIndex, Footer, Header, MetadataIndex, Statistics
-from mcap.writer import MCAP0_MAGIC
 
 from ..core.errors import BagError
 from .mcap_file import McapFile, Piece
 from .mcap_walk import walk
-from .records import FRAME, frames, parsed, reading
+from .records import FRAME, MAGIC, frames, parsed, reading
 
 _FOOTER_BYTES = FRAME.size + 20
-_TAIL_BYTES = _FOOTER_BYTES + len(MCAP0_MAGIC)
+_TAIL_BYTES = _FOOTER_BYTES + len(MAGIC)
 _OTHER_FORMATS = (
     (b"SQLite format 3\0", "a sqlite3 (.db3) bag", "rosbags-convert --dst-storage mcap"),
     (b"#ROSBAG V", "a ROS 1 bag", "rosbags-convert --dst-storage mcap"),
@@ -59,7 +58,7 @@ def _refuse_other_formats(file: McapFile) -> None:
     for magic, kind, command in _OTHER_FORMATS:
         if head.startswith(magic):
             raise BagError(f"{file.path}: {kind}, not an MCAP file; convert it with `{command}`")
-    if not head.startswith(MCAP0_MAGIC):
+    if not head.startswith(MAGIC):
         raise BagError(
             f"{file.path}: not an MCAP file (no magic bytes); give a .mcap file or a bag directory"
         )
@@ -67,7 +66,7 @@ def _refuse_other_formats(file: McapFile) -> None:
 
 def _refuse_other_profiles(file: McapFile) -> None:
     try:
-        header = Header.read(parsed(file.body(len(MCAP0_MAGIC), Opcode.HEADER)))
+        header = Header.read(parsed(file.body(len(MAGIC), Opcode.HEADER)))
     except ValueError as error:
         raise BagError(
             f"{file.path}: truncated within its header ({file.size} bytes), nothing of it can be "
@@ -85,7 +84,7 @@ def _footer(file: McapFile) -> Footer | None:
     if file.size < _TAIL_BYTES:
         return None
     tail = file.bytes_at(file.size - _TAIL_BYTES, _TAIL_BYTES)
-    if not tail.endswith(MCAP0_MAGIC) or FRAME.unpack_from(tail) != (Opcode.FOOTER, 20):
+    if not tail.endswith(MAGIC) or FRAME.unpack_from(tail) != (Opcode.FOOTER, 20):
         return None
     return Footer.read(parsed(tail[FRAME.size :]))
 
@@ -98,7 +97,7 @@ def _read_summary(file: McapFile, footer: Footer) -> bool:
     statistics: Statistics | None = None
     with reading(file.path, "the summary"):
         # The CRC covers all up to itself: the footer's last 4 bytes and the magic stay out.
-        end = file.size - len(MCAP0_MAGIC) - 4
+        end = file.size - len(MAGIC) - 4
         data = file.bytes_at(footer.summary_start, end - footer.summary_start)
         if footer.summary_crc not in (0, zlib.crc32(data)):
             raise ValueError("wrong CRC")

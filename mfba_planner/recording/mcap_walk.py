@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, Metadata, MetadataIndex
-from mcap.writer import MCAP0_MAGIC
 
 from ..core.errors import BagError
 from . import records
 from .mcap_file import McapFile, Piece
-from .records import FRAME, Message, reading
+from .records import FRAME, MAGIC, Message, reading
 
 _LOOSE_RUN_BYTES = 1 << 20  # messages outside chunks are handled in runs of about this size
 
@@ -30,13 +29,13 @@ class _Walk:
     def __init__(self, file: McapFile, salvage: bool) -> None:
         self.file = file
         self.salvage = salvage
-        self.end = file.size - (len(MCAP0_MAGIC) if file.complete else 0)
+        self.end = file.size - (len(MAGIC) if file.complete else 0)
         self.in_data = True
         self.loose: list[Message] = []
         self.loose_offset = 0
 
     def run(self) -> None:
-        position = len(MCAP0_MAGIC)
+        position = len(MAGIC)
         while position < self.end:
             opcode, after = self._frame(position)
             if opcode == 0 or after > self.end:

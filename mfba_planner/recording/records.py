@@ -20,6 +20,8 @@ from mcap.stream_reader import get_chunk_data_stream
 
 from ..core.errors import BagError
 
+# Begins and ends every file; mcap.writer has it too, but loads half of the network stack with it.
+MAGIC = b"\x89MCAP0\r\n"
 FRAME = struct.Struct("<BQ")  # opcode, length of the body
 _MESSAGE = struct.Struct("<HIQQ")  # channel id, sequence, log time, publish time
 

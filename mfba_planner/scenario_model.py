@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenarios as people write them: YAML, degrees or radians, defaults, every fault explained.
+
+Apart from `scenarios`, because what it takes to explain a fault takes 0.15 s to import, and what
+programs write has none.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Any
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .core.errors import ConfigError
+from .core.options import did_you_mean
+from .core.world import Kidnapping, Obstacle, Scenario, Turn, Walls
+from .scenarios import EXAMPLE, LIMIT, robot_of
+
+_Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
+_Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=LIMIT)]
+_NotNegative = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=0.0, le=LIMIT)]
+_Point = tuple[_Number, _Number]
+# Names end up in messages and in file names.
+_Name = Annotated[str, Field(max_length=100, pattern=r"^\w[\w .+-]*$")]
+
+
+def _default(kind: type, name: str) -> Any:
+    """The core's default; it is written down there and only there."""
+    return kind.__dataclass_fields__[name].default  # type: ignore[attr-defined]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class _Heading(_Strict):
+    heading_deg: _Number | None = None
+    heading_rad: _Number | None = None  # what programs write: degrees would lose the last bit
+
+    def heading(self) -> float:
+        if self.heading_deg is not None and self.heading_rad is not None:
+            raise ConfigError(
+                f"heading_deg={self.heading_deg:g}: heading_rad={self.heading_rad:g} is given "
+                "as well; keep one of them"
+            )
+        if self.heading_rad is None:
+            return math.radians(self.heading_deg or 0.0)
+        return self.heading_rad
+
+
+class _Turn(_Heading):
+    at_s: _Positive
+    speed_mps: _NotNegative
+
+    def build(self) -> Turn:
+        return Turn(at_s=self.at_s, speed_mps=self.speed_mps, heading_rad=self.heading())
+
+
+class _Obstacle(_Heading):
+    center_m: _Point
+    radius_m: _Positive
+    speed_mps: _NotNegative = _default(Obstacle, "speed_mps")
+    turns: list[_Turn] = []
+
+    def build(self) -> Obstacle:
+        return Obstacle(
+            center_m=self.center_m,
+            radius_m=self.radius_m,
+            speed_mps=self.speed_mps,
+            heading_rad=self.heading(),
+            turns=tuple(turn.build() for turn in self.turns),
+        )
+
+
+class _Walls(_Strict):
+    lower_m: _Point
+    upper_m: _Point
+
+
+class _Kidnapping(_Strict):
+    at_s: _Positive
+    to_m: _Point
+
+    def build(self) -> Kidnapping:
+        return Kidnapping(at_s=self.at_s, to_m=self.to_m)
+
+
+class _Scenario(_Strict):
+    name: _Name
+    description: str = _default(Scenario, "description")
+    start_m: _Point
+    goal_m: _Point
+    robot_radius_m: _Positive = _default(Scenario, "robot_radius_m")
+    obstacles: list[_Obstacle] = []
+    walls: _Walls | None = None
+    time_limit_s: _Positive = _default(Scenario, "time_limit_s")
+    robot: dict[str, Any] = {}
+    kidnappings: list[_Kidnapping] = []
+
+    def build(self) -> Scenario:
+        walls = self.walls
+        if walls and not all(a < b for a, b in zip(walls.lower_m, walls.upper_m)):
+            raise ConfigError(
+                f"walls {list(walls.lower_m)} to {list(walls.upper_m)}: "
+                "give lower_m below upper_m on both axes"
+            )
+        return Scenario(
+            name=self.name,
+            description=self.description,
+            start_m=self.start_m,
+            goal_m=self.goal_m,
+            robot_radius_m=self.robot_radius_m,
+            obstacles=tuple(obstacle.build() for obstacle in self.obstacles),
+            walls=Walls(lower_m=walls.lower_m, upper_m=walls.upper_m) if walls else None,
+            time_limit_s=self.time_limit_s,
+            robot=robot_of(self.robot),
+            kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
+        )
+
+
+def checked(data: dict[Any, Any]) -> Scenario:
+    """The scenario plain data describes. Raises ConfigError: place, value, reason, remedy."""
+    try:
+        return _Scenario.model_validate(data).build()
+    except ValidationError as error:
+        raise ConfigError(_explain(error)) from None
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML as people expect it: 1e-3 is a number, and a key given twice is a mistake."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
+        """Refuse what SafeLoader would settle in silence: the last of two equal keys."""
+        keys = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in keys:
+                    problem = f"{key.value!r} given twice"
+                    raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+                keys.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
+
+
+def from_yaml(text: str, origin: str) -> Any:
+    """What a YAML text holds. Raises ConfigError naming origin, line and reason."""
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f" line {mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or "unreadable characters"
+        raise ConfigError(f"{origin}{where}: not YAML ({problem}); {EXAMPLE}") from None
+    except (ValueError, LookupError, AttributeError, RecursionError):
+        # what PyYAML raises for an impossible date, a misused tag, a bottomless nesting
+        raise ConfigError(f"{origin}: not YAML (unreadable value); {EXAMPLE}") from None
+
+
+_REMEDIES = {
+    "finite_number": "give a finite number",
+    "dict_type": "give a mapping of options, such as {drive: differential}",
+    "float_type": "give a number",
+    "list_type": "give a list ([] for none)",
+    "missing": f"add it ({EXAMPLE})",
+    "model_type": f"give a mapping ({EXAMPLE})",
+    "string_pattern_mismatch": "give a name of letters, digits, spaces and _ . + -",
+    "string_too_long": "give at most 100 characters",
+    "string_type": "give a text",
+    "too_long": "give two numbers, [x, y]",
+    "tuple_type": "give two numbers, [x, y]",
+}
+
+
+def _explain(error: ValidationError) -> str:
+    """One fault in one line: place, value, reason, remedy.
+
+    An unknown key goes first: misspelt, it is why another one is missing.
+    """
+    faults = error.errors(include_url=False)
+    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
+    kind, location = fault["type"], fault["loc"]
+    if kind == "invalid_key":
+        return f"key {location[-1]}: not a word; remove it ({EXAMPLE})"
+    place = ".".join(str(part + 1 if isinstance(part, int) else part) for part in location)
+    if kind == "extra_forbidden":
+        return f"{place}: unknown key; {did_you_mean(str(location[-1]), _keys_at(location))}"
+    if kind == "missing":
+        return f"{place}: missing; {_REMEDIES[kind]}"
+    remedy = _REMEDIES.get(kind) or fault["msg"].replace("Input should be", "give a number")
+    value = repr(fault["input"])
+    shown = value if len(value) <= 60 else f"{value[:57]}..."
+    return f"{place}={shown}: refused; {remedy}"
+
+
+def _keys_at(location: tuple[Any, ...]) -> list[str]:
+    models: dict[Any, type[BaseModel]] = {
+        "obstacles": _Obstacle,
+        "turns": _Turn,
+        "kidnappings": _Kidnapping,
+        "walls": _Walls,
+    }
+    within = [models[part] for part in location[:-1] if part in models]
+    return list((within or [_Scenario])[-1].model_fields)
