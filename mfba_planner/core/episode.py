@@ -52,6 +52,7 @@ class Episode:
     driver: str
     ticks: tuple[Decision, ...]
     outcome: Outcome
+    truth: tuple[Pose2D, ...] = ()  # where the robot was at each tick; (): where it saw itself
 
     def time_s(self, stamp_ns: int) -> float:
         """Time since the first tick in seconds, the t of the obstacles' motion."""
@@ -207,10 +208,11 @@ def run(
                 f"method={planner.method.value}: not the core's own; use planners.method.simulate"
             )
         brain = Planner(planner, seed)
-    ticks = [brain.plan(look(world, sensor))]
+    ticks, truth = [brain.plan(look(world, sensor))], [world.pose]
     while (outcome := world.outcome()) is None and go_on(world):
         world.step(command(ticks[-1], scenario.robot, planner.tick_ns))
         ticks.append(brain.plan(look(world, sensor)))
+        truth.append(world.pose)
     return Episode(
         scenario=scenario,
         sensor=sensor,
@@ -219,4 +221,5 @@ def run(
         driver="core",
         ticks=tuple(ticks),
         outcome=outcome or Outcome.INTERRUPTED,
+        truth=tuple(truth) if scenario.robot.noise.of_odometry else (),
     )

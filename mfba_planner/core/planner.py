@@ -15,6 +15,7 @@ from .bat import BatParams, BatSwarm, Bounds, Disc, Vector, minimize
 from .errors import ConfigError
 from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
 from .geometry import Point, Pose2D, bearing, distance, towards
+from .jump import JumpWatch, explained
 from .options import check, option
 from .sensing import Bits, Ranges, Scan, sensory_vector
 
@@ -97,6 +98,10 @@ class PlannerParams:
     input_timeout_s: float = option(
         1.0, "age at which odometry or sectors are stale", unit="s", minimum=0.001, maximum=3600.0
     )
+    jump_m: float = option(
+        0.5, "odometry that moved so much farther than speed_mps allows: carried off", unit="m",
+        minimum=0.01, maximum=1e6,
+    )  # fmt: skip
     gap_heading: GapHeading = option(GapHeading.BOUNDARY, "where a gap leads, in its two sectors")
     swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
     bat: BatParams = field(default_factory=BatParams)
@@ -305,20 +310,24 @@ class Planner:
         self._goal: Point | None = None
         self._swarm: BatSwarm | None = None
         self._stamp_ns = 0
+        self._watch = JumpWatch()
 
     def reset(self) -> None:
         """Forget everything but parameters and seed (a jump of time, a new trip)."""
         self.mode, self._goal, self._swarm = Mode.IDLE, None, None
 
     def plan(self, obs: Observation) -> Decision:
-        """Answer one observation and remember the mode."""
+        """Answer one observation and remember the mode; who was carried off begins anew."""
+        carried = self._watch.noticed(obs, self.params, self.mode)
+        if carried:
+            self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
             self._goal, self._swarm = obs.goal, None
         self._stamp_ns = obs.stamp_ns
         decision = decide(obs, self.mode, self.params, self._generate)
         self.mode = decision.mode
-        return decision
+        return explained(decision, carried)
 
     def _generate(self, position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
         if self.params.swarm is Swarm.PERSISTENT:

@@ -108,6 +108,11 @@ class Noise:
         """Raise ConfigError for a value out of range."""
         check(self)
 
+    @property
+    def of_odometry(self) -> bool:
+        """Whether the robot may be elsewhere than its odometry says."""
+        return any((self.odom_m, self.odom_rad, self.odom_loss, self.odom_latency_s))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot(Base):

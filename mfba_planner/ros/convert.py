@@ -17,6 +17,7 @@ from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
 from ..core.episode import Outcome
 from ..core.geometry import Point, Pose2D, half_turn
+from ..core.jump import carried_off
 from ..core.planner import Decision, Mode
 from ..core.robot import Base
 from ..core.sensing import Bits, Ranges, Scan, SensorParams, longest_range_m
@@ -196,6 +197,8 @@ def decision_msg(decision: Decision, algorithm: str, refused: int, name: str) ->
     }
     status = DiagnosticStatus(level=_LEVELS.get(decision.mode, DiagnosticStatus.OK), name=name)
     status.message = decision.reason
+    if carried_off(decision.reason) and status.level == DiagnosticStatus.OK:
+        status.level = DiagnosticStatus.WARN
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     message = DiagnosticArray(status=[status])
     set_stamp(message.header.stamp, decision.stamp_ns)

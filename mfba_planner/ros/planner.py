@@ -8,6 +8,7 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
+from ..core.jump import carried_off
 from ..core.planner import NANO, Decision, Mode, PlannerParams, observe
 from ..messages import goal_point, robot_pose, sector_ranges, stamp_ns
 from ..node_settings import PlannerSettings, names
@@ -111,7 +112,7 @@ class PlannerNode(GraphNode):
         seen = observe(stamp, pose, ranges, self._goal, self._pose, round(age_s / NANO))
         self._pose = seen.pose
         decision = self.brain.plan(seen)
-        if decision.mode is Mode.STOPPED:
+        if decision.mode is Mode.STOPPED or carried_off(decision.reason):
             self.get_logger().warning(decision.reason, throttle_duration_sec=1.0)
         self._last = decision
         self._publish(decision)

@@ -67,6 +67,13 @@ ODOM = Topic(
     least_qos=SENSOR_QOS,
     every_tick=True,
 )
+GROUND_TRUTH = Topic(
+    # where the robot is, while its odometry errs
+    name="ground_truth",
+    type=Odometry,
+    writers=(WORLD_SIM,),
+    qos=TICK_QOS,
+)
 OBSTACLES = Topic(
     name="obstacles",
     type=PoseArray,
@@ -146,6 +153,7 @@ MARKERS = Topic(name="markers", type=MarkerArray, writers=(WORLD_SIM, PLANNER), 
 GRAPH: tuple[Topic, ...] = (
     CLOCK,
     ODOM,
+    GROUND_TRUTH,
     OBSTACLES,
     SCAN,
     SECTORS,

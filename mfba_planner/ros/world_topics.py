@@ -24,6 +24,8 @@ class WorldTopics:
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
         self._clock = node.advertise(topics.CLOCK)
         self._odom = node.advertise(topics.ODOM)
+        errs = robot.noise.of_odometry
+        self._truth = node.advertise(topics.GROUND_TRUTH) if errs else None
         # Of a robot with a lidar the sensor takes the scan; obstacles are for people and bags.
         self._scan_frame = settings.scan_frame
         self._scan = node.advertise(topics.SCAN) if robot.lidar.beams else None
@@ -69,6 +71,10 @@ class WorldTopics:
         self._obstacles.publish(convert.obstacles_msg(centers, stamp_ns, frame))
         if self._tf:
             self._tf.publish(markers.tf_msg(odom))
+        if self._truth:
+            self._truth.publish(
+                convert.odometry_msg(world.pose, velocity, stamp_ns, frame, self._base_frame, turn)
+            )
         if self._scan and reading.scan:
             self._scan.publish(convert.scan_msg(reading.scan, stamp_ns, self._scan_frame))
         self._odom.publish(odom)
