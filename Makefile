@@ -12,12 +12,13 @@ WORKERS ?= 2
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH RMW_IMPLEMENTATION
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help demo test lint colcon venv clean
+.PHONY: help demo test lint docs colcon venv clean
 
 help:
 	@echo "make demo    run case study 1 and record it under runs/"
 	@echo "make test    lint, then all tests with branch coverage"
 	@echo "make lint    ruff and mypy"
+	@echo "make docs    build the documentation under build/docs, warnings as errors"
 	@echo "make colcon  build with colcon under build/colcon and check what it installed"
 	@echo "make venv    only set up .venv (PYTHON=/path/to/python3 chooses the interpreter)"
 	@echo "make clean   remove what the other targets made, recordings under runs/ excepted"
@@ -31,6 +32,11 @@ test: lint
 lint: $(VENV)/.dev
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/mypy
+
+docs: $(VENV)/.dev
+	$(VENV)/bin/python -m sphinx --builder html --nitpicky --fail-on-warning --keep-going \
+	  --quiet docs build/docs
+	@echo "wrote build/docs/index.html"
 
 colcon: $(VENV)/.dev
 	tools/colcon_check.sh $(VENV)
@@ -53,5 +59,5 @@ $(VENV)/.runtime: setup.py requirements-ros.txt | $(VENV)/bin/pip
 
 $(VENV)/.dev: $(VENV)/.runtime requirements-colcon.txt
 	$(PIP) --no-build-isolation -r requirements-ros.txt -r requirements-colcon.txt \
-	  -e '.[lint,test]'
+	  -e '.[docs,lint,test]'
 	@touch $@

@@ -57,6 +57,11 @@ setup(
     # Not tests_require: with it `colcon test` runs no test and stays green.
     extras_require={
         "dask": ["distributed>=2024.1"],
+        "docs": [
+            "furo>=2024.8",
+            "myst-parser>=4",
+            "sphinx>=8",
+        ],
         "orca": ["pyrvo>=0.4"],
         "parquet": ["pyarrow>=15"],
         "test": [

@@ -54,6 +54,9 @@ def arguments() -> argparse.ArgumentParser:
         help=f"of paper, predictive and orca in {', '.join(HEADLINE)}; seeds of each of the "
         "paper's cases, 1000 at most (default: 20)",
     )  # fmt: skip
+    parser.add_argument(
+        "--first", type=int, default=0, metavar="N", help="first world of every suite (default: 0)"
+    )
     parser.add_argument("--others", type=int, metavar="N", help="in other suites (default: all)")
     parser.add_argument(
         "--few", type=int, metavar="N",
@@ -77,6 +80,8 @@ def main(args: list[str] | None = None) -> None:
     found = arguments().parse_args(args)
     if min(found.worlds, found.others or 2, found.few or 2) < 2:
         arguments().error("--worlds, --others, --few: give at least 2")
+    if found.first < 0:
+        arguments().error("--first: give at least 0")
     counts = Counts(
         worlds=found.worlds,
         others=found.others or found.worlds,
@@ -88,7 +93,7 @@ def main(args: list[str] | None = None) -> None:
     _between(target.read_text(encoding="utf-8"), "")  # before the work is done
     say(f"results go to {out}")
     with _pool(found.workers) as executor:
-        results = Results(out, found.workers, executor)
+        results = Results(out, found.workers, executor, found.first)
         results.make_all(suites, counts)
     costs = measure_costs(found.rounds)
     images = found.docs / "images"
@@ -101,7 +106,7 @@ def main(args: list[str] | None = None) -> None:
 
 def _command(found: argparse.Namespace) -> str:
     words = [f"--worlds {found.worlds}"]
-    words += [f"--{k} {v}" for k in ("others", "few", "out") if (v := getattr(found, k))]
+    words += [f"--{k} {v}" for k in ("first", "others", "few", "out") if (v := getattr(found, k))]
     words += [f"--suite {name}" for name in found.suite or ()]
     words += [f"--rounds {found.rounds}", f"--workers {found.workers}"]
     return " ".join(["python bench/benchmark.py", *words])

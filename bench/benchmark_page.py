@@ -111,7 +111,8 @@ def _facts(results: Results, suites: Sequence[str], counts: Counts, command: str
         f"Made by\n\n```sh\n{command}\n```\n",
         f"- Python {platform.python_version()}, {versions}; {platform.machine()}, "
         f"{os.cpu_count()} cores, which other jobs may have shared: trust ratios of times",
-        "- suite seed 0; worlds 0 to N - 1, seed 0 in each; in `paper` a seed for each repeat",
+        f"- suite seed 0; N worlds from {results.first} on, seed 0 in each; in `paper` a seed for "
+        "each repeat",
     ]
     for suite in suites:
         rows = [r for e in LEAD for r in results.of(0, suite, e, counts.lead(suite))]

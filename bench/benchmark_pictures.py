@@ -153,7 +153,7 @@ def _ablation(results: Results, suites: Sequence[str], counts: Counts) -> Figure
     sheet, axes = _panels(
         2,
         "What each ingredient buys",
-        f"the first {counts.rest(suites[0])} worlds of each suite; 95 % intervals",
+        f"{counts.rest(suites[0])} worlds of each suite; 95 % intervals",
         2.6,
         _LEGEND,
     )

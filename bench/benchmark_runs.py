@@ -18,6 +18,7 @@ from mfba_planner.sweep.order import Order, Setting
 from mfba_planner.sweep.parts import Optima, parts_of
 from mfba_planner.sweep.run import open_store, sweep
 from mfba_planner.sweep.summary import Standing, Versus, standings, versus
+from mfba_planner.worlds import suite as suite_of
 from mfba_planner.worlds.suites import SPEED_MPS
 
 ORACLE = ("core", "oracle", "worlds")  # their code decides the optima
@@ -97,17 +98,20 @@ class Counts:
 class Results:
     """Sweeps that are made (or read back) on demand, judged by optima that they share."""
 
-    def __init__(self, out: Path, workers: int, executor: Executor | None) -> None:
-        self.out, self.workers, self.executor = out, workers, executor
+    def __init__(self, out: Path, workers: int, executor: Executor | None, first: int = 0) -> None:
+        """Every suite begins with its world number `first`."""
+        self.out, self.workers, self.executor, self.first = out, workers, executor, first
         self.directories: dict[tuple[str, str, Setting], Path] = {}
         self._found: dict[tuple[str, str, Setting], tuple[list[Row], list[Row]]] = {}
         self._optima: dict[str, dict[int, Row]] = {}
 
     def judge(self, suite: str, worlds: int) -> None:
         """Ask the oracle about a suite."""
-        order = Order(suite=suite, planners=("straight",), worlds=worlds, setting=FINE)
+        order = Order(
+            suite=suite, planners=("straight",), worlds=worlds, first=self.first, setting=FINE
+        )
         parts = [part for part in parts_of(order) if isinstance(part, Optima)]
-        facts = {"suite": suite, "worlds": worlds}
+        facts = {"suite": suite, "first": self.first, "worlds": worlds}
         store = Store(
             self.out / f"{suite}-optima", parts, facts, command="benchmark", packages=ORACLE
         )
@@ -120,17 +124,17 @@ class Results:
         """Make the runs of one line."""
         key = (suite, entry.planner, entry.setting)
         order = Order(
-            suite=suite, planners=(entry.planner,), worlds=worlds, oracle=False,
-            setting=entry.setting,
+            suite=suite, planners=(entry.planner,), worlds=worlds, first=self.first,
+            oracle=False, setting=entry.setting,
         )  # fmt: skip
         plain = "".join(c if c.isalnum() or c in ".-" else "-" for c in entry.label)
         self.directories[key] = self.out / f"{suite}-{plain}"
         store = open_store(self.directories[key], order)
         swept = sweep(order, workers=self.workers, executor=self.executor, store=store, say=say)
         say(f"{suite}: {entry.label}, {worlds} worlds")
-        optima, count = self._optima[suite], len(self._optima[suite])
+        optima, number = self._optima[suite], suite_of(suite).world_number
         rows = [
-            judged(row, optima[row["world"] % count], entry.setting.params.speed_mps)
+            judged(row, optima[number(row["world"])], entry.setting.params.speed_mps)
             for row in swept.rows
         ]
         self._found[key] = rows, swept.timings
@@ -155,7 +159,7 @@ class Results:
         return [
             {**row, "planner": entry.label}
             for row in self._found[suite, entry.planner, entry.setting][kind]
-            if row["world"] < worlds and case in (0, row["world"] % 2 + 1)
+            if row["world"] < self.first + worlds and case in (0, row["world"] % 2 + 1)
         ]
 
     def make_all(self, suites: Sequence[str], counts: Counts) -> None:

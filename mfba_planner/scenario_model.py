@@ -121,6 +121,36 @@ class _Scenario(_Strict):
         )
 
 
+_MEANINGS = {
+    "name": "letters, digits, spaces and _ . + -; what pictures and bags call it",
+    "description": "what it is about, in a sentence",
+    "start_m": "where the robot begins, m",
+    "goal_m": "where it shall go, m",
+    "robot_radius_m": "added to every obstacle (Fig. 4), m",
+    "obstacles": "circles that stand or move",
+    "walls": "a rectangle that obstacles bounce from; the robot may cross it",
+    "time_limit_s": "simulated time after which the run has failed, s",
+    "center_m": "its centre at the beginning, m",
+    "radius_m": "its own radius, m",
+    "speed_mps": "how fast it moves, m/s",
+    "heading_deg": "where it moves, degrees from +x, counter-clockwise",
+    "heading_rad": "the same in radians, instead",
+    "turns": "moments from which on it moves otherwise, in order of time",
+    "at_s": "when, in simulated time from the beginning, s",
+    "lower_m": "its corner with the smaller x and y, m",
+    "upper_m": "its corner with the larger x and y, m",
+}
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of a scenario file, each key with what it means."""
+    found = _Scenario.model_json_schema()
+    for part in (found, *found["$defs"].values()):
+        for key, entry in part["properties"].items():
+            entry["description"] = _MEANINGS[key]
+    return found
+
+
 def checked(data: dict[Any, Any]) -> Scenario:
     """The scenario plain data describes. Raises ConfigError: place, value, reason, remedy."""
     try:

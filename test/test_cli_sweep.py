@@ -5,6 +5,7 @@ import csv
 import os
 import re
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,10 +16,12 @@ from mfba_planner import cli
 from mfba_planner.cli.sweep import command
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.entry import guarded_main
+from mfba_planner.planners.predictive import preset
 from mfba_planner.recording.episode import read_episode
 from mfba_planner.sweep import parts
 from mfba_planner.sweep.order import Order, Setting
 from mfba_planner.sweep.run import sweep
+from mfba_planner.worlds.suites import SPEED_MPS
 
 Said = pytest.CaptureFixture[str]
 HASH = re.compile(r"^sorted hash ([0-9a-f]{64})$", re.MULTILINE)
@@ -167,6 +170,22 @@ def test_the_command_of_a_report_makes_the_same_order() -> None:
     from mfba_planner.cli.sweep import _order, _parser
 
     assert _order(_parser().parse(words[2:])) == order
+
+
+def test_predictive_has_its_own_step_and_swarm_unless_others_are_given() -> None:
+    from mfba_planner.cli.sweep import _order, _parser
+
+    told = ["random-3", "--planner", "paper", "--planner", "predictive", "--worlds", "1"]
+    order = _order(_parser().parse(told))
+    usual = PlannerParams(speed_mps=SPEED_MPS)
+    assert order.setting_of("paper").params == usual
+    assert order.setting_of("predictive").params == preset(usual)
+    assert command(order) == "mfba sweep " + " ".join(told)
+    told += ["--set", "planner.step_length_m=0.3"]
+    order = _order(_parser().parse(told))
+    assert order.setting_of("paper").params == usual
+    assert order.setting_of("predictive").params == replace(preset(usual), step_length_m=0.3)
+    assert command(order) == "mfba sweep " + " ".join(told)
 
 
 def interrupted(out: Path, tmp_path: Path, send: signal.Signals, *, group: bool) -> Program:

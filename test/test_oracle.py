@@ -18,8 +18,8 @@ from mfba_planner.core.planner import PlannerParams
 from mfba_planner.core.world import Obstacle, Scenario, Turn, Walls, center_at, step_clearances
 from mfba_planner.oracle import Certificate, Solution, inspect, solve
 from mfba_planner.oracle.check import clearance, pieces
-from mfba_planner.oracle.lattice import LatticeParams, lattice_ways
-from mfba_planner.oracle.polyline import FAR_M, gaps, lengths
+from mfba_planner.oracle.lattice import LatticeParams, _free, _free_steps, lattice_ways
+from mfba_planner.oracle.polyline import FAR_M, gaps, lengths, one_way_gaps, pair_gaps
 from mfba_planner.oracle.reach import ReachParams, unreachable
 from mfba_planner.oracle.refine import refine
 from mfba_planner.oracle.solution import Waypoint
@@ -391,3 +391,32 @@ def test_slow_and_fast_robots(speed: float) -> None:
     found = solve(world, speed)
     assert found.certificate is Certificate.FEASIBLE
     assert_sound(world, found, speed)
+
+
+def test_gaps_of_pairs_and_of_one_way_are_those_of_all_to_the_last_bit() -> None:
+    rng = np.random.default_rng(5)
+    legs = uniform_legs(suite("random-20").world(5), 40.0)
+    points = rng.uniform(0.0, 12.0, (6, 9, 2))
+    points[2, 4] = points[2, 3]  # a leg of no length
+    rows, columns = rng.integers(0, 8, 60), rng.integers(0, legs.t0.size, 60)
+    some = type(legs)(*(values[columns] for values in legs))
+    found = pair_gaps(points, V, rows, some)
+    assert np.array_equal(found, gaps(points, V, legs)[:, rows, columns])
+    plain = list(zip(*(values.tolist() for values in some[:7])))
+    for way, expected in zip(points, found):
+        ends = [(x, y) for x, y in way.tolist()]
+        assert one_way_gaps(ends, V, rows.tolist(), plain) == expected.tolist()
+
+
+@pytest.mark.parametrize("name", ["random-30", "dynabarn-like"])
+def test_the_lattice_leaves_out_only_what_is_too_far_away(name: str) -> None:
+    rng = np.random.default_rng(6)
+    legs = uniform_legs(suite(name).world(6), 40.0)
+    angles = np.arange(8) * (math.pi / 4.0)
+    u = V * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    for t in (0.0, 3.1, 17.0):
+        here, steps = rng.uniform(0.0, 12.0, (80, 2)), rng.permutation(640)[:500]
+        expected = _free(here[steps // 8], u[steps % 8], t, np.full(500, t + 0.6), legs)
+        found = _free_steps(here, u, t, t + 0.6, steps, legs)
+        assert np.array_equal(found, expected)
+        assert 0 < found.sum() < 500

@@ -6,6 +6,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..outputs import new_run_directory, refuse_existing, write_new
 from ..sweep.columns import Row, made_row
 from ..sweep.explain import contact_index, explain
 from ..sweep.guard import HungError
-from ..sweep.order import Order, Run, Setting, read_run
+from ..sweep.order import Order, Run, Setting, own_preset, read_run
 from ..sweep.play import Played, play
 from ..sweep.read import ReadSweep, read_sweep
 
@@ -68,7 +69,7 @@ def _why(row: Row) -> str:
 
 def _show(swept: ReadSweep | None, word: str, out: Path | None, *, bag: bool) -> int:
     run, row = _chosen(swept, word)
-    setting = swept.order.setting if swept else Setting()
+    setting = swept.order.setting_of(run.planner) if swept else _usual(run)
     Order(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)  # or it raises
     directory = refuse_existing(out or new_run_directory(stem="show"))
     with _patience(setting.patience_s):
@@ -82,6 +83,11 @@ def _show(swept: ReadSweep | None, word: str, out: Path | None, *, bag: bool) ->
     names = _write(directory, run, played, lines, bag=bag)
     print(f"wrote {directory}: {', '.join(names)}")
     return 0
+
+
+def _usual(run: Run) -> Setting:
+    plain = Setting()
+    return replace(plain, params=own_preset(run.planner, plain.params))
 
 
 def _chosen(swept: ReadSweep | None, word: str) -> tuple[Run, Row | None]:

@@ -9,9 +9,10 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from ..arguments import Parser
-from ..core.options import flatten
+from ..core.options import Scalar, flatten
 from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
 from ..launcher.options import add_set_argument, with_settings
@@ -19,7 +20,7 @@ from ..outputs import new_run_directory, write_same
 from ..planners.registry import PLANNERS
 from ..study.compute import check_workers
 from ..sweep.columns import COLUMNS, TIMINGS
-from ..sweep.order import PATIENCE_S, PERCEPTIONS, Order, Setting
+from ..sweep.order import PATIENCE_S, PERCEPTIONS, Order, Setting, own_preset
 from ..sweep.parts import parts_of
 from ..sweep.run import Swept, dask_executor, open_store, sweep
 from ..sweep.table import write
@@ -101,12 +102,16 @@ def _parser() -> Parser:
 
 
 def _order(found: argparse.Namespace) -> Order:
-    params, sensor = with_settings(
-        PlannerParams(speed_mps=SPEED_MPS), SensorParams(), found.settings
-    )
+    usual, planners = PlannerParams(speed_mps=SPEED_MPS), tuple(found.planners or ["paper"])
+    params, sensor = with_settings(usual, SensorParams(), found.settings)
+    # What was said on the command line holds for all, whatever a planner is made for.
+    own = {
+        name: with_settings(own_preset(name, usual), sensor, found.settings)[0]
+        for name in planners
+    }
     return Order(
         suite=found.suite,
-        planners=tuple(found.planners or ["paper"]),
+        planners=planners,
         worlds=found.worlds,
         first=found.first,
         seeds=found.seeds,
@@ -120,6 +125,7 @@ def _order(found: argparse.Namespace) -> Order:
             suite_seed=found.suite_seed,
             patience_s=found.patience,
         ),
+        own={name: one for name, one in own.items() if one != params},
     )
 
 
@@ -151,15 +157,20 @@ def command(order: Order) -> str:
         if value != default:
             words += [name, str(value)]
     words += [] if order.oracle else ["--no-oracle"]
-    for group, mine, theirs in (
-        ("planner", one.params, plain.params),
-        ("sensor", one.sensor, plain.sensor),
-    ):
-        usual = flatten(theirs)
-        for name, value in flatten(mine).items():
-            if value != usual[name]:
-                words += ["--set", f"{group}.{name}={value}"]
+    said = {f"sensor.{name}": value for name, value in _changed(one.sensor, plain.sensor)}
+    for planner in order.planners:
+        params = order.setting_of(planner).params
+        for name, value in _changed(params, own_preset(planner, plain.params)):
+            said[f"planner.{name}"] = value
+    for name, value in said.items():
+        words += ["--set", f"{name}={value}"]
     return shlex.join(words)
+
+
+def _changed(one: Any, plain: Any) -> Iterator[tuple[str, Scalar]]:
+    """Options that are not the usual ones."""
+    usual = flatten(plain)
+    yield from ((name, value) for name, value in flatten(one).items() if value != usual[name])
 
 
 def _report(swept: Swept, directory: Path) -> None:

@@ -8,13 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-import numpy as np
-
 from .drive import Speeds, command, obey
 from .errors import ConfigError, InputError
 from .geometry import Point, Pose2D, distance
 from .instruments import Instruments, Reading
 from .motion import Motion
+from .nearby import Found, Nearby
 from .planner import (
     NANO,
     Decision,
@@ -29,7 +28,6 @@ from .planner import (
 from .sensing import Ranges, SensorParams, blind, sense_circles, sense_scan
 from .world import Scenario
 
-AHEAD_TICKS = 32
 DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
 
 
@@ -53,6 +51,12 @@ class Episode:
     ticks: tuple[Decision, ...]
     outcome: Outcome
     truth: tuple[Pose2D, ...] = ()  # where the robot was at each tick; (): where it saw itself
+    brain: str = ""  # who decided, where that is not what planner's own options name
+
+    @property
+    def label(self) -> str:
+        """Who decided, for people."""
+        return self.brain or self.planner.label
 
     def time_s(self, stamp_ns: int) -> float:
         """Time since the first tick in seconds, the t of the obstacles' motion."""
@@ -85,26 +89,14 @@ class World:
         self.speeds = Speeds()  # of a differential drive
         self._instruments = Instruments(scenario.robot, scenario.walls, tick_ns, seed)
         self._read: tuple[int, Reading] | None = None
-        self._motion = Motion(scenario)
-        self._ahead: list[list[tuple[Point, float]]] = []
-        self._ahead_from = 0
+        self._nearby = Nearby(Motion(scenario), tick_ns)
 
-    def enlarged(self) -> list[tuple[Point, float]]:
-        """(centre, enlarged radius) of all obstacles now, as Scenario.enlarged gives them."""
-        k = self.tick - self._ahead_from
-        if not 0 <= k < len(self._ahead):
-            self._look_ahead()
-            k = 0
-        return self._ahead[k]
+    def near(self, reach_m: float, position: Point | None = None) -> Found:
+        """Indices, and (centre, enlarged radius), of whoever may be within reach of its edge now.
 
-    def _look_ahead(self) -> None:
-        """Work out many ticks at once: that is ten times as fast as one by one."""
-        self._ahead_from = self.tick
-        ticks = range(self.tick, self.tick + AHEAD_TICKS)
-        times_s = np.array([tick * self.tick_ns * NANO for tick in ticks])
-        x, y = self._motion.centers(times_s).tolist()
-        radii = self._motion.radius_m.tolist()
-        self._ahead = [list(zip(zip(xs, ys), radii)) for xs, ys in zip(x, y)]
+        In the scenario's order; nobody who is within reach is missing.
+        """
+        return self._nearby.at(self.tick, position or self.pose.position, reach_m)
 
     @property
     def stamp_ns(self) -> int:
@@ -145,13 +137,16 @@ class World:
 
     def read(self) -> Reading:
         """What the robot's instruments say at the present tick: the same however often."""
+        robot = self.scenario.robot
+        if not (robot.lidar.beams or robot.noise.of_odometry):
+            return Reading(self.pose, None)
         if self._read is None or self._read[0] != self.tick:
             surfaces: list[tuple[float, float, float]] = []
-            if self.scenario.robot.lidar.beams:
+            if robot.lidar.beams:
                 obstacles = self.scenario.obstacles
                 surfaces = [
-                    (*center, obstacle.radius_m)
-                    for obstacle, (center, _) in zip(obstacles, self.enlarged())
+                    (*center, obstacles[index].radius_m)
+                    for index, (center, _) in zip(*self.near(robot.lidar.range_max_m))
                 ]
             self._read = self.tick, self._instruments.read(self.stamp_ns, self.pose, surfaces)
         return self._read[1]
@@ -164,7 +159,9 @@ def sense(world: World, params: SensorParams) -> Ranges:
     """
     seen, robot = world.read(), world.scenario.robot
     if seen.scan is None:
-        return sense_circles(seen.received.position, world.enlarged(), params)
+        position = seen.received.position
+        _, circles = world.near(params.sensing_range_m, position)
+        return sense_circles(position, circles, params)
     yaw = seen.received.yaw + robot.lidar.yaw_rad
     return sense_scan(seen.scan, yaw, world.scenario.robot_radius_m, params)
 

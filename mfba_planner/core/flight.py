@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .bat_params import BatParams, Bounds, Velocity, Walk
-from .region import Box, Region, Vector
+from .region import Box, Disc, Region, Vector
 
 Bats = Iterable[Any]
 Pair = tuple[Vector, Vector]
@@ -30,6 +30,7 @@ class Law:
     high: Vector
     clamp: Callable[[Vector], Vector]
     is_box: bool
+    disc: Disc | None
 
     @classmethod
     def of(cls, params: BatParams, region: Region) -> Law:
@@ -42,8 +43,13 @@ class Law:
         sign = 1.0 if params.velocity is Velocity.TOWARDS_BEST else -1.0
         f_span, from_best = params.f_max - params.f_min, params.walk is Walk.BEST
         # Not a subclass: its clamp may be another one.
-        is_box = type(region) is Box and params.bounds is Bounds.CLAMP
-        return cls(params.f_min, f_span, sign, params.inertia, from_best, low, high, clamp, is_box)
+        bounded = params.bounds is Bounds.CLAMP
+        is_box, disc = type(region) is Box and bounded, None
+        if type(region) is Disc and bounded:
+            disc = region
+        return cls(
+            params.f_min, f_span, sign, params.inertia, from_best, low, high, clamp, is_box, disc
+        )
 
     def flight(self, d: int) -> Flight:
         """What moves n bats in d dimensions: (bats, t, best, scale, pairs) -> candidates.
@@ -82,6 +88,9 @@ class Law:
         f_min, f_span, sign, inertia = self.f_min, self.f_span, self.sign, self.inertia
         clamp, is_box, from_best, (bx, by) = self.clamp, self.is_box, self.from_best, best
         (left, bottom), (right, top) = self.low, self.high
+        disc = self.disc
+        if disc is not None:
+            (cx, cy), radius = disc.center, disc.radius
         points: list[Vector] = []
         for (x, y), v, r, decay, pulse, ex, ey in bats:
             f = sign * (f_min + f_span * (t * decay))  # eq. 4
@@ -109,6 +118,13 @@ class Law:
             elif is_box:  # as Box.clamp, without its call
                 x = left if not x > left else x if x < right else right
                 y = bottom if not y > bottom else y if y < top else top
+                points.append([x, y])
+            elif disc is not None:  # as Disc.clamp
+                dx, dy = x - cx, y - cy
+                norm = math.sqrt(dx * dx + dy * dy)
+                if norm > radius:
+                    scaled = radius / norm
+                    x, y = cx + dx * scaled, cy + dy * scaled
                 points.append([x, y])
             else:
                 points.append(clamp([x, y]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from enum import Enum
+from functools import cache
 
 from .geometry import wrap_angle
 from .sensing import Bits
@@ -37,11 +38,16 @@ def nearest_free_gap(
 
     None when every gap is closed: the robot then holds its position (the paper is silent).
     """
-    n = len(vg)
     best, smallest = None, math.inf
-    for gap, closed in enumerate(vg, start=1):
+    for gap, (closed, heading) in enumerate(zip(vg, _headings(len(vg), rule)), start=1):
         if not closed:
-            turn = abs(wrap_angle(gap_heading(gap, n, rule) - goal_heading_rad))
+            turn = abs(wrap_angle(heading - goal_heading_rad))
             if turn < smallest - TIE_RAD:
                 best, smallest = gap, turn
     return best
+
+
+@cache
+def _headings(count: int, rule: GapHeading) -> tuple[float, ...]:
+    """gap_heading() of every gap."""
+    return tuple(gap_heading(gap, count, rule) for gap in range(1, count + 1))

@@ -209,17 +209,12 @@ def velocity_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> P
         t_s -= since_s
     if walls is None:
         return obstacle.velocity
-    vx, vy = (
-        _folded_speed(
-            obstacle.center_m[axis],
-            obstacle.velocity[axis],
-            t_s,
-            walls.lower_m[axis] + obstacle.radius_m,
-            walls.upper_m[axis] - obstacle.radius_m,
-        )
-        for axis in (0, 1)
+    (x, y), (vx, vy), r = obstacle.center_m, obstacle.velocity, obstacle.radius_m
+    (x0, y0), (x1, y1) = walls.lower_m, walls.upper_m
+    return (
+        _folded_speed(x, vx, t_s, x0 + r, x1 - r),
+        _folded_speed(y, vy, t_s, y0 + r, y1 - r),
     )
-    return (vx, vy)
 
 
 def _folded_speed(position: float, speed: float, t_s: float, low: float, high: float) -> float:

@@ -7,6 +7,7 @@ For worlds where tangents find nothing, and as a second opinion on those where t
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,9 @@ from ..core.world import Walls
 from .polyline import edge_gaps, within
 from .tangents import CLEAR_M
 
-_CHUNK = 2_000_000  # pairs of edge and leg looked at together: memory
+_CHUNK = 20_000  # pairs of edge and leg looked at together: what a cache holds
+_AT_ONCE = 300  # the same for pairs of a place and a leg, which have many headings
+_SLACK_M = 1e-6  # of what is near: rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,23 +60,21 @@ def lattice_ways(
         for n in np.flatnonzero(_free(here, home, t, t + rest, inner)).tolist():
             arrivals.append((t + float(rest[n]), layer, n))
             limit_s = min(limit_s, t + float(rest[n]) + params.slack_s)
-        origin = np.repeat(np.arange(len(here)), len(u))
-        velocity = np.tile(u, (len(here), 1))
-        there = here[origin] + velocity * params.step_s
+        there = (here[:, None] + u * params.step_s).reshape(-1, 2)
         left = np.array(goal) - there
         f = t + params.step_s + np.hypot(left[:, 0], left[:, 1]) / speed_mps
-        order = np.argsort(f, kind="stable")
-        order = order[(f <= limit_s)[order] & within(inside, *there[order].T)]
-        cells = np.floor(there[order] / params.cell_m).astype(np.int64)
+        order = np.flatnonzero((f <= limit_s) & within(inside, *there.T))
+        order = order[np.argsort(f[order], kind="stable")]
+        column, row = np.floor(there[order] / params.cell_m).astype(np.int64).T
+        cells = (column << 32) + row  # one number each: rows would be sorted as bytes
         # edges first: the best place of a cell may be out of reach
-        end = np.full(len(order), t + params.step_s)
         now = _during(inner, t, t + params.step_s)
-        free = _free(here[origin[order]], velocity[order], t, end, now)
+        free = _free_steps(here, u, t, t + params.step_s, order, now)
         order, cells = order[free], cells[free]
-        _, first = np.unique(cells, axis=0, return_index=True)
+        _, first = np.unique(cells, return_index=True)
         order = order[np.sort(first)]
         places.append(there[order])
-        parents.append(origin[order])
+        parents.append(order // len(u))
         t += params.step_s
     return [_way(places, parents, one, goal) for one in sorted(arrivals)[: params.ways]]
 
@@ -105,6 +106,41 @@ def _free(
         )
         parts.append(gap.min(axis=1) >= 0.0)
     return np.concatenate(parts) if parts else np.zeros(0, dtype=bool)
+
+
+def _free_steps(
+    here: np.ndarray, u: np.ndarray, t: float, end: float, steps: np.ndarray, legs: Legs
+) -> np.ndarray:
+    """_free() of some steps with velocities u (h, 2) until end; step n begins at here[n // h].
+
+    Most legs are too far from a place to touch a step from there: they are not looked at.
+    """
+    asked, touched = np.zeros((2, len(here) * len(u)), dtype=bool)
+    asked[steps] = True
+    for origin, leg in _met(here, float(np.hypot(*u[0])), t, end, legs):
+        step = origin[:, None] * len(u) + np.arange(len(u))
+        which = np.nonzero(asked[step])
+        step, near, heading = step[which], leg[which[0]], u[which[1]]
+        (x, y), (ux, uy) = here[step // len(u)].T, heading.T
+        begin, until = np.full(len(step), t), np.full(len(step), end)
+        those = Legs(*(column[near] for column in legs))
+        gap = edge_gaps(x, y, begin, until, ux, uy, those)
+        touched[step[gap < 0.0]] = True
+    free: np.ndarray = ~touched[steps]
+    return free
+
+
+def _met(
+    here: np.ndarray, speed_mps: float, t: float, end: float, legs: Legs
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Pairs of a place and a leg that whoever is there at t may touch until end; in parts."""
+    seen = np.clip(t, legs.t0, legs.t1)
+    x, y = legs.x + legs.vx * (seen - legs.t0), legs.y + legs.vy * (seen - legs.t0)
+    reach = legs.radius + (speed_mps + np.hypot(legs.vx, legs.vy)) * (end - t) + _SLACK_M
+    dx, dy = x - here[:, :1], y - here[:, 1:]
+    origin, leg = np.nonzero(dx * dx + dy * dy <= reach * reach)
+    for k in range(0, len(origin), _AT_ONCE):
+        yield origin[k : k + _AT_ONCE], leg[k : k + _AT_ONCE]
 
 
 def _way(

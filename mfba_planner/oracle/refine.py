@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.legs import Legs
 from ..core.world import Walls
-from .polyline import gaps, lengths, within
+from .polyline import gaps, lengths, one_way_gaps, pair_gaps, within
 from .tangents import CLEAR_M
 
 _NEAR_M = 1.5  # obstacle legs further away are looked at only in the end
@@ -110,8 +110,12 @@ class _Problem:
         pairs: np.ndarray,
         margin: float,
     ) -> None:
-        self.points, self.v, self.legs, self.margin = points, speed_mps, legs, margin
-        self.rows, self.columns = np.nonzero(pairs)
+        self.points, self.v, self.margin = points, speed_mps, margin
+        self.rows, columns = np.nonzero(pairs)
+        self.legs = Legs(*(values[columns] for values in legs))  # one for each pair
+        first, last = self.points[0].tolist(), self.points[-1].tolist()
+        self._ends = [tuple(first)], [tuple(last)]
+        self._plain = self.rows.tolist(), list(zip(*(values.tolist() for values in self.legs[:7])))
 
     def solve(self, inside: Walls | None) -> np.ndarray:
         """The via points that SLSQP ends with, feasible or not."""
@@ -154,7 +158,9 @@ class _Problem:
 
     def slack(self, x: np.ndarray) -> np.ndarray:
         """Gaps of the pairs above the margin, metres."""
-        return self._slacks(x[None])[0]
+        (first, last), (rows, legs), via = self._ends, self._plain, x.tolist()
+        points = first + list(zip(via[::2], via[1::2])) + last
+        return np.array(one_way_gaps(points, self.v, rows, legs)) - self.margin
 
     def slack_gradient(self, x: np.ndarray) -> np.ndarray:
         """Of slack(), (pairs, via coordinates), by differences, all at once."""
@@ -164,6 +170,4 @@ class _Problem:
         return gradient
 
     def _slacks(self, x: np.ndarray) -> np.ndarray:
-        all_gaps = gaps(self.full(x), self.v, self.legs)
-        slacks: np.ndarray = all_gaps[:, self.rows, self.columns] - self.margin
-        return slacks
+        return pair_gaps(self.full(x), self.v, self.rows, self.legs) - self.margin

@@ -23,6 +23,8 @@ class PotentialField(Steering):
     edge at distance d < SR.
     """
 
+    reads_sectors = False
+
     def move(self, obs: Observation, goal: Point) -> Move:
         """Follow the force."""
         px, py = obs.pose.position

@@ -25,6 +25,8 @@ class DynamicWindow(Steering):
     PROGRESS times the way gained towards the goal, minus CLEARANCE over the smallest gap.
     """
 
+    reads_sectors = False
+
     def __init__(self, *args: object) -> None:
         """Prepare the samples."""
         super().__init__(*args)  # type: ignore[arg-type]

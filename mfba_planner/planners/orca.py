@@ -21,6 +21,8 @@ ROUNDS = 4
 class Orca(Steering):
     """One agent among others that keep their velocities; needs known circles."""
 
+    reads_sectors = False
+
     def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
         """Raise ConfigError where pyrvo is not installed."""
         try:

@@ -64,16 +64,17 @@ class Perception:
         self.noise_m = noise_m
         self.seed = seed
         self._beams = BEAMS.get(name, 0)
-        self._sectors = sectors
+        self._sectors = sectors or name == "sectors"
         self._past: deque[tuple[int, Pose2D, Sensed]] = deque(maxlen=latency_ticks + 1)
 
     def __call__(self, world: World, sensor: SensorParams) -> Observation:
         """Look at the world at its present tick; ticks that do not rise begin anew."""
-        if self._past and world.stamp_ns <= self._past[-1][0]:
+        now_ns = world.stamp_ns
+        if self._past and now_ns <= self._past[-1][0]:
             self._past.clear()
-        self._past.append((world.stamp_ns, world.pose, self._sense(world, sensor)))
+        self._past.append((now_ns, world.pose, self._sense(world, sensor)))
         stamp_ns, pose, (circles, scan) = self._past[0]
-        late = stamp_ns != world.stamp_ns
+        late = stamp_ns != now_ns
         ranges: Ranges = ()
         if self._sectors:
             if scan is None:
@@ -81,11 +82,11 @@ class Perception:
             else:
                 ranges = sense_scan(scan, 0.0, world.scenario.robot_radius_m, sensor)
         return Observation(
-            stamp_ns=world.stamp_ns,
+            stamp_ns=now_ns,
             pose=world.pose,
             ranges_m=ranges,
             goal=world.scenario.goal_m,
-            now_ns=world.stamp_ns,
+            now_ns=now_ns,
             circles=circles,
             scan=scan,
             sensed=(stamp_ns, pose) if late else None,
@@ -100,10 +101,12 @@ class Perception:
 
     def _circles(self, world: World, sensor: SensorParams) -> tuple[Circle, ...]:
         scenario, t_s = world.scenario, world.time_s
+        reach, (px, py) = sensor.sensing_range_m, world.pose.position
         circles = []
-        for obstacle, (center, radius) in zip(scenario.obstacles, world.enlarged()):
-            if distance(world.pose.position, center) <= radius + sensor.sensing_range_m:
-                velocity = velocity_at(obstacle, t_s, scenario.walls)
+        for index, (center, radius) in zip(*world.near(reach)):
+            dx, dy = center[0] - px, center[1] - py
+            if math.sqrt(dx * dx + dy * dy) <= radius + reach:
+                velocity = velocity_at(scenario.obstacles[index], t_s, scenario.walls)
                 circles.append(Circle(center_m=center, radius_m=radius, velocity_mps=velocity))
         if not self.noise_m or not circles:
             return tuple(circles)
@@ -117,9 +120,10 @@ class Perception:
         scenario = world.scenario
         longest = sensor.sensing_range_m + scenario.robot_radius_m
         near = []
-        for obstacle, (center, _) in zip(scenario.obstacles, world.enlarged()):
-            if distance(world.pose.position, center) <= longest + obstacle.radius_m:
-                near.append((*center, obstacle.radius_m))
+        for index, (center, _) in zip(*world.near(sensor.sensing_range_m)):
+            radius = scenario.obstacles[index].radius_m
+            if distance(world.pose.position, center) <= longest + radius:
+                near.append((*center, radius))
         ranges = cast_rays(world.pose.position, near, self._beams, longest)
         if self.noise_m:
             noisy = np.maximum(ranges + self._noise(world.stamp_ns, self._beams), 0.0)

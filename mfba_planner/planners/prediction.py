@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from ..core.sensing import Ranges
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12
-_Row = tuple[float, float, float, float, float, float, float]
+_Row = tuple[float, float, float, float, float, float, float, float]
+_nearness = itemgetter(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,33 +73,45 @@ class Prediction:
         px, py = position
         tau, per_mps = params.horizon_s, params.margin_ticks * tick_s
         self._rows: list[_Row] = []
+        self._weights = tau, params.close_m, params.contact_m, params.urgent_m
         for circle in circles:
             (x, y), (vx, vy), r = circle.center_m, circle.velocity_mps, circle.radius_m
             own = math.sqrt(vx * vx + vy * vy)
             margin = params.margin_m + per_mps * own
             x, y, outer = x - px, y - py, r + margin
             meets = outer + (speed_mps + own) * tau
-            if x * x + y * y <= meets * meets:
-                self._rows.append((x, y, vx, vy, r, margin, outer * outer))
-        # The nearest first: it refuses most.
-        self._rows.sort(key=lambda row: row[0] * row[0] + row[1] * row[1] - row[6])
+            away, outer = x * x + y * y, outer * outer
+            if away <= meets * meets:
+                self._rows.append((away - outer, x, y, vx, vy, r, margin, outer))
+        # The nearest first: it refuses most. Of equally near ones the first told.
+        self._rows.sort(key=_nearness)
         self._weighed = self._rows
 
     def closed(self, ux: np.ndarray, uy: np.ndarray) -> np.ndarray:
         """Bits (m,): 1 where a robot with velocity (ux, uy) comes too close within tau."""
         if not self._rows:
             return np.zeros(ux.shape, dtype=int)
-        x, y, vx, vy, _, _, outer = np.array(self._rows).T[:, :, None]
+        _, x, y, vx, vy, _, _, outer = np.array(self._rows).T[:, :, None]
         wx, wy = vx - ux, vy - uy
         b = x * wx
         b += y * wy
-        a = wx * wx
-        a += wy * wy
+        wx *= wx
+        wy *= wy
+        a = wx
+        a += wy
         a += _TINY
-        t = np.minimum(np.maximum(-b / a, 0.0), self.params.horizon_s)
+        t = -b
+        t /= a
+        np.maximum(t, 0.0, out=t)
+        np.minimum(t, self.params.horizon_s, out=t)
         away = x * x + y * y
-        closest = (a * t + 2.0 * b) * t + away
-        near: np.ndarray = (closest < np.minimum(away, outer) * _ROUNDING).any(axis=0)
+        # (a t + 2 b) t + away, in place: this is done for 72 headings and every circle
+        a *= t
+        b *= 2.0
+        a += b
+        a *= t
+        a += away
+        near: np.ndarray = (a < np.minimum(away, outer) * _ROUNDING).any(axis=0)
         return near.astype(int)
 
     def narrow(self, to_goal: Point, bound: float) -> None:
@@ -109,7 +123,7 @@ class Prediction:
         """
         (gx, gy), tau, kept = to_goal, self.params.horizon_s, []
         for row in self._weighed:
-            x, y, vx, vy, r, margin, _ = row
+            _, x, y, vx, vy, r, margin, _ = row
             hx, hy = x - gx, y - gy
             near = math.sqrt(x * x + y * y) or _TINY
             far = math.sqrt(hx * hx + hy * hy) or _TINY
@@ -130,15 +144,15 @@ class Prediction:
         full speed. Where the cost is not below the bound, a smaller number may be returned
         that is not below it either.
         """
-        p, tau = self.params, self.params.horizon_s
         (qx, qy), (gx, gy) = way, to_goal
         rx, ry = gx - qx, gy - qy
         first, second = math.sqrt(qx * qx + qy * qy), math.sqrt(rx * rx + ry * ry)
-        total = first + second + p.waiting * (speed * t1 - first)
+        total = first + second + self.params.waiting * (speed * t1 - first)
         if total >= bound:
             return total
-        left = bound - total
-        risk = self._leg(0.0, 0.0, 0.0, 0.0, qx / t1, qy / t1, min(t1, tau), left)
+        left, tau = bound - total, self.params.horizon_s
+        lasts = t1 if t1 < tau else tau
+        risk = self._leg(0.0, 0.0, 0.0, 0.0, qx / t1, qy / t1, lasts, left)
         driven = first / speed  # what is put off by waiting is no less of a risk
         if risk < left and driven < tau and second > 0.0:
             ux, uy = rx * speed / second, ry * speed / second
@@ -163,10 +177,12 @@ class Prediction:
         closest approach costs close_m x times the share of the margin that is missing. Who is
         within a margin already may leave it in any direction, but not go deeper.
         """
-        p, worst = self.params, 0.0
-        tau, close, contact, urgent = p.horizon_s, p.close_m, p.contact_m, p.urgent_m
-        for x, y, vx, vy, r, margin, outer in self._weighed:
-            dx, dy, wx, wy = x + vx * t0 - qx, y + vy * t0 - qy, vx - ux, vy - uy
+        worst, (tau, close, contact, urgent) = 0.0, self._weights
+        for _, x, y, vx, vy, r, margin, outer in self._weighed:
+            dx = x + vx * t0 - qx
+            dy = y + vy * t0 - qy
+            wx = vx - ux
+            wy = vy - uy
             b = dx * wx + dy * wy
             if b >= 0.0:
                 continue

@@ -78,6 +78,9 @@ class Predictive(Steering):
     weighed again at every tick, so that the bats' search goes on from tick to tick.
     """
 
+    reads_sectors = False
+    preset = staticmethod(preset)
+
     def __init__(
         self,
         params: PlannerParams,
@@ -103,7 +106,7 @@ class Predictive(Steering):
         circles = self._circles(obs)
         if not circles:
             return Move(velocity=straight, reason="no obstacle within SR")
-        tick_s = self.params.tick_ns * NANO
+        tick_s = self.tick_s
         (x, y), (gx, gy) = here, goal
         to_goal, left = (gx - x, gy - y), distance(here, goal)
         world = Prediction(here, circles, self.options.risk, tick_s, speed)
@@ -215,8 +218,7 @@ class Predictive(Steering):
         self, world: Prediction, center: Point, to_goal: Point, bound: float, stamp_ns: int
     ) -> BatSwarm:
         """Bats around the best waypoint so far; what cannot be below the bound is not weighed."""
-        bat, speed = self.params.bat, self.params.speed_mps
-        tick_s = self.params.tick_ns * NANO
+        bat, speed, tick_s = self.params.bat, self.params.speed_mps, self.tick_s
         disc = Disc(self.options.search_m, center)
         swarm = BatSwarm(bat, disc, stream(self.seed, stamp_ns), ahead=bat.iterations)
         for _ in range(bat.iterations + 1):

@@ -55,7 +55,21 @@ def make(
 
     Raises ConfigError for an unknown name, with the nearest known one, and a negative seed.
     """
+    return known(name)(params or PlannerParams(), sensor or SensorParams(), seed)
+
+
+def known(name: str) -> Factory:
+    """What makes the planner of that name. Raises ConfigError as make() does."""
     factory = PLANNERS.get(name)
     if factory is None:
         raise ConfigError(f"planner {name!r}: unknown; {did_you_mean(name, list(PLANNERS))}")
-    return factory(params or PlannerParams(), sensor or SensorParams(), seed)
+    return factory
+
+
+def preset_of(factory: Factory, params: PlannerParams) -> PlannerParams:
+    """The options a planner is made for, where it says so by an attribute `preset`.
+
+    That is called with the given ones and changes what it has to.
+    """
+    preset: Callable[[PlannerParams], PlannerParams] | None = getattr(factory, "preset", None)
+    return params if preset is None else preset(params)

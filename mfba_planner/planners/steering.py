@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..core.errors import ConfigError
-from ..core.geometry import Point, distance
+from ..core.geometry import Point
 from ..core.jump import JumpWatch, explained
 from ..core.planner import (
     NANO,
@@ -43,8 +44,11 @@ class Steering:
     """A planner that moves by move() and stands still for the reasons the paper's does.
 
     Subclasses define move(), and where they remember anything forget(), which is called
-    before the first observation and by reset().
+    before the first observation and by reset(). Who never reads ranges_m where circles or a scan
+    are given sets reads_sectors to False: sweeps then spare themselves what sectors cost.
     """
+
+    reads_sectors = True
 
     def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
         """Start idle; ConfigError for a negative seed."""
@@ -54,6 +58,7 @@ class Steering:
         self.sensor = sensor
         self.seed = seed
         self._watch = JumpWatch()
+        self.tick_s = params.tick_ns * NANO
         self.reset()
 
     def reset(self) -> None:
@@ -92,17 +97,16 @@ class Steering:
     def straight(self, position: Point, target: Point, speed_mps: float) -> Point:
         """The velocity that leads to the target at most at this speed, and not beyond it."""
         dx, dy = target[0] - position[0], target[1] - position[1]
-        left = distance(position, target)
+        left = math.sqrt(dx * dx + dy * dy)
         reach = speed_mps * self.params.tick_ns * NANO
-        scale = 1.0 / (self.params.tick_ns * NANO) if left <= reach else speed_mps / left
+        scale = 1.0 / self.tick_s if left <= reach else speed_mps / left
         return (dx * scale, dy * scale)
 
     def _decision(self, obs: Observation, move: Move) -> Decision:
         waypoint = move.waypoint
         if waypoint is None:
-            dt = self.params.tick_ns * NANO
-            x, y = obs.pose.position
-            waypoint = (x + move.velocity[0] * dt, y + move.velocity[1] * dt)
+            dt, pose, (vx, vy) = self.tick_s, obs.pose, move.velocity
+            waypoint = (pose.x + vx * dt, pose.y + vy * dt)
         return Decision(
             stamp_ns=obs.stamp_ns,
             mode=self.mode,

@@ -11,6 +11,8 @@ from .steering import Move, Steering
 class Straight(Steering):
     """Drives at the goal at full speed."""
 
+    reads_sectors = False
+
     def move(self, obs: Observation, goal: Point) -> Move:
         """Straight on, never looking."""
         velocity = self.straight(obs.pose.position, goal, self.params.speed_mps)

@@ -24,6 +24,8 @@ class VectorFieldHistogram(Steering):
     heading before.
     """
 
+    reads_sectors = False
+
     def forget(self) -> None:
         """No heading before the first."""
         self._last: float | None = None

@@ -88,6 +88,6 @@ def _cells(episode: Episode, result: Result) -> list[tuple[str, str, str]]:
         ("min clearance", words.clearance(result), touched),
         ("collisions", str(result.collisions), touched),
         ("mode switches", str(result.mode_switches), style.INK),
-        ("algorithm", episode.planner.label, style.INK),
+        ("algorithm", episode.label, style.INK),
         ("seed", words.one_line(str(episode.seed), 12), style.INK),
     ]

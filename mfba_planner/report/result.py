@@ -50,7 +50,7 @@ def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str,
         "scenario": episode.scenario.name,
         "seed": episode.seed,
         "driver": episode.driver,
-        "algorithm": episode.planner.label,
+        "algorithm": episode.label,
         "parameters": {
             "planner": _plain(flatten(episode.planner)),
             "sensor": _plain(flatten(episode.sensor)),

@@ -72,6 +72,6 @@ def one_line(text: str, limit: int) -> str:
 def run_title(episode: Episode) -> str:
     """One line that names the run: scenario, algorithm, seed, driver."""
     return (
-        f"{one_line(episode.scenario.name, 40)}, {episode.planner.label},"
+        f"{one_line(episode.scenario.name, 40)}, {episode.label},"
         f" seed {one_line(str(episode.seed), 24)}, {episode.driver} driver"
     )

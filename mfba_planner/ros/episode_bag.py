@@ -93,7 +93,7 @@ def _tick_messages(
     )
     yield topics.SENSORY_VECTOR, convert.sensory_vector_msg(sensory_vector(ranges))
     yield topics.PLAN, convert.plan_msg(tick, _FRAME)
-    law = episode.planner.label
+    law = episode.label
     yield topics.DECISION, convert.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
     yield topics.GOAL_STEP, convert.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
     yield topics.CMD_VEL, convert.twist_msg(tick, scenario.robot, episode.planner.tick_ns)

@@ -6,7 +6,8 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ..core.errors import ConfigError
@@ -15,7 +16,7 @@ from ..core.planner import PathPlanner, PlannerParams
 from ..core.sensing import SensorParams
 from ..core.world import Scenario
 from ..planners.perception import NAMES, Perception
-from ..planners.registry import make
+from ..planners.registry import Factory, known, preset_of
 from ..worlds import suite
 from ..worlds.suites import SPEED_MPS
 
@@ -91,6 +92,7 @@ class Order:
     """Worlds first .. first + worlds - 1 of a suite, each planner in each, seeds 0 .. seeds - 1.
 
     Where a suite repeats its worlds, each round of them has the next seed; seeds is 1 there.
+    own holds the options of planners whose options are not the setting's, by name.
     """
 
     suite: str
@@ -100,6 +102,7 @@ class Order:
     seeds: int = 1
     oracle: bool = True
     setting: Setting = field(default_factory=Setting)
+    own: Mapping[str, PlannerParams] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for what cannot be, with the nearest name where one is unknown."""
@@ -119,9 +122,14 @@ class Order:
         if not self.planners:
             raise ConfigError("--planner: none given; name at least one")
         for k, name in enumerate(self.planners):
-            make_planner(name, self.setting.params, self.setting.sensor, 0)
+            self.setting_of(name).brain(Run(self.suite, 0, name, 0))
             if name in self.planners[:k]:
                 raise ConfigError(f"--planner {name}: given twice; name each planner once")
+
+    def setting_of(self, planner: str) -> Setting:
+        """How the runs of one planner go."""
+        own = self.own.get(planner)
+        return self.setting if own is None else replace(self.setting, params=own)
 
     @property
     def world_range(self) -> range:
@@ -144,24 +152,33 @@ class Order:
 
 
 def make_planner(name: str, params: PlannerParams, sensor: SensorParams, seed: int) -> PathPlanner:
-    """A planner of ours by name, or anybody's as MODULE:NAME, called with the same arguments.
+    """A fresh planner of ours by name, or anybody's as MODULE:NAME, called as ours are.
 
-    Modules are also looked for in the working directory. Raises ConfigError for what is unknown.
+    Raises ConfigError for what is unknown.
     """
+    return _factory(name)(params, sensor, seed)
+
+
+def own_preset(name: str, params: PlannerParams) -> PlannerParams:
+    """The options that a planner is made for, else the given ones. Raises as make_planner()."""
+    return preset_of(_factory(name), params)
+
+
+def _factory(name: str) -> Factory:
+    """What makes a planner; modules are also looked for in the working directory."""
     if ":" not in name:
-        return make(name, params, sensor, seed)
+        return known(name)
     module_name, _, attribute = name.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
-        factory = getattr(importlib.import_module(module_name), attribute)
+        factory: Factory = getattr(importlib.import_module(module_name), attribute)
     except (ImportError, ValueError, AttributeError) as error:
         raise ConfigError(
             f"planner {name}: cannot be imported ({error}); give MODULE:NAME of something that "
             "is called with PlannerParams, SensorParams and a seed"
         ) from None
-    planner: PathPlanner = factory(params, sensor, seed)
-    return planner
+    return factory
 
 
 def read_run(text: str) -> Run:

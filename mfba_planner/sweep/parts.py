@@ -55,7 +55,7 @@ class Runs:
 def make(run: Run, setting: Setting) -> Row:
     """Make one run here; its row and its timing."""
     begun = perf_counter()
-    played = play(run, setting)
+    played = play(run, setting, whole=False)
     wall_ms = 1e3 * (perf_counter() - begun)
     return {**timing_row(played.times_ns, wall_ms), **made_row(run, played)}
 
@@ -119,7 +119,7 @@ def parts_of(order: Order) -> list[Runs | Optima]:
                 Runs(
                     name=f"{order.suite}-{_plain(planner)}-{first}-{len(worlds)}",
                     runs=tuple(order.runs(planner, worlds)),
-                    setting=order.setting,
+                    setting=order.setting_of(planner),
                 )
             )
     return parts

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..core.episode import Episode, Look, Outcome, look
 from ..core.episode import run as drive
@@ -26,10 +26,11 @@ class Played:
         return f"tick {len(self.episode.ticks)}: {self.fault}" if self.fault else ""
 
 
-def play(run: Run, setting: Setting) -> Played:
+def play(run: Run, setting: Setting, *, whole: bool = True) -> Played:
     """Make a run in this process, however long a planner takes over it.
 
     After a fault of the planner the Episode holds what was decided before, which may be nothing.
+    whole=False: the record may lack sectors that the planner does not read; its way is the same.
     """
     scenario, fault = setting.scenario(run), ""
     guard = Guard(setting.params)
@@ -41,7 +42,7 @@ def play(run: Run, setting: Setting) -> Played:
             sensor=setting.sensor,
             seed=run.seed,
             brain=guard,
-            look=_look(brain, run, setting),
+            look=_look(brain, run, setting, whole),
         )
     except (PlannerFault, HungError) as error:
         fault = str(error)
@@ -54,12 +55,14 @@ def play(run: Run, setting: Setting) -> Played:
             ticks=tuple(guard.decisions),
             outcome=Outcome.INTERRUPTED,
         )
+    if run.planner != "paper":
+        episode = replace(episode, brain=run.planner)
     return Played(episode=episode, fault=fault, times_ns=tuple(guard.times_ns))
 
 
-def _look(brain: object, run: Run, setting: Setting) -> Look:
+def _look(brain: object, run: Run, setting: Setting, whole: bool) -> Look:
     # The paper's planner reads bits alone, and they are the same without circles beside them.
     if isinstance(brain, Planner) and setting.perception == "known":
         return look
     # A planner that never reads the sectors may say so, and is spared what they cost.
-    return setting.look(run.seed, sectors=getattr(brain, "reads_sectors", True))
+    return setting.look(run.seed, sectors=whole or getattr(brain, "reads_sectors", True))

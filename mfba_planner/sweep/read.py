@@ -60,4 +60,5 @@ def _order(facts: dict[str, Any]) -> Order:
         seeds=facts["seeds"],
         oracle=facts["oracle"],
         setting=Setting(params=params, sensor=sensor, **told),
+        own={name: override(PlannerParams(), options) for name, options in facts["own"].items()},
     )

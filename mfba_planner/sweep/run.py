@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import ConfigError, MfbaError
+from ..core.options import flatten
 from ..study.compute import compute
 from ..study.part import Part
 from ..study.store import Store
@@ -48,6 +49,7 @@ def order_facts(order: Order) -> dict[str, Any]:
         "seeds": order.seeds,
         "oracle": order.oracle,
         "setting": order.setting.facts(),
+        "own": {name: flatten(params) for name, params in order.own.items()},
     }
 
 

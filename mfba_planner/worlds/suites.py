@@ -12,7 +12,6 @@ import numpy as np
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
 from ..core.world import Scenario
-from ..scenarios import load_scenario
 from .adversarial import FAMILIES, hostile
 from .crowd import CrowdParams, Motion, crowd
 from .trip import ROOM, Trip, scenario
@@ -78,6 +77,8 @@ _CASES = ("case1", "case2")
 
 
 def _paper(_: Suite, k: int, __: float) -> Scenario:
+    from ..scenarios import load_scenario  # takes a third of the start of a process that needs it
+
     return load_scenario(_CASES[k])
 
 

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands and code that the README and the docs show, as their readers would try them."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+MFBA = Path(sys.executable).parent / "mfba"
+# Whole lines of a page that name the file a block of YAML goes into.
+_SAVED = re.compile(r"^[^`\n]*\b[Ss]aved? (?:this )?as `([\w.]+)`", re.MULTILINE)
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """What stands in fences of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def commands(text: str) -> list[list[str]]:
+    """The shell commands of a page, in words, those joined by && apart."""
+    lines = [line for block in blocks(text, "sh") for line in block.splitlines() if line.strip()]
+    words = [shlex.split(line, comments=True) for line in lines]
+    return [part for line in words for part in _split_at_and(line)]
+
+
+def _split_at_and(words: list[str]) -> list[list[str]]:
+    parts: list[list[str]] = [[]]
+    for word in words:
+        if word == "&&":
+            parts.append([])
+        else:
+            parts[-1].append(word)
+    return parts
+
+
+def ours(command: list[str]) -> list[str] | None:
+    """The arguments of a command of ours, None for another's."""
+    return command[1:] if command[0] in (".venv/bin/mfba", "mfba") else None
+
+
+def mfba(arguments: list[str], cwd: Path, *, code: int = 0) -> str:
+    """Run it; return what it said on both channels."""
+    done = subprocess.run(
+        [MFBA, *arguments],
+        cwd=cwd,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=180,
+        check=False,
+    )
+    assert done.returncode == code, f"mfba {arguments}\n{done.stdout}"
+    return done.stdout
+
+
+def python(code: str, cwd: Path) -> str:
+    """Run a block of Python; return what it printed."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=cwd, capture_output=True, text=True, timeout=90
+    )
+    assert done.returncode == 0, f"{code}\n{done.stderr}"
+    return done.stdout
+
+
+def follow(text: str, cwd: Path) -> None:
+    """Do what a page says: save its YAML, run its commands, then its Python.
+
+    A block of `console` must print just what it shows.
+    """
+    for name in ("config", "test"):
+        (cwd / name).symlink_to(ROOT / name)
+    files = dict(zip(_SAVED.findall(text), blocks(text, "yaml"), strict=True))
+    for name, content in files.items():
+        (cwd / name).write_text(content, encoding="utf-8")
+    for command in commands(text):
+        arguments = ours(command)
+        if arguments is not None:
+            mfba(arguments, cwd)
+    for shown in blocks(text, "console"):
+        line, _, expected = shown.removeprefix("$ ").partition("\n")
+        arguments = ours(shlex.split(line))
+        assert arguments is not None
+        assert mfba(arguments, cwd, code=int(expected.startswith("mfba: "))) == expected
+    for code in blocks(text, "python"):
+        python(code, cwd)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The documentation builds without a warning, and what its pages show works as shown."""
+
+import html
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import shown
+from shown import ROOT, ours
+
+from mfba_planner import cli, scenario_model
+
+DOCS = ROOT / "docs"
+PAGES = {
+    str(path.relative_to(DOCS)): path.read_text(encoding="utf-8")
+    for path in sorted(DOCS.glob("**/*.md"))
+    if path.parent.name != "reference"  # written by the build
+}
+# Their commands take hours, or have tests of their own that know what they must print.
+ELSEWHERE = {"benchmark.md", "planners.md", "optimizer.md"}
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("docs")
+    command = [sys.executable, "-m", "sphinx", "-b", "html", "-n", "-W", "--keep-going", "-q"]
+    done = subprocess.run(
+        [*command, str(DOCS), str(out)], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr
+    return out
+
+
+def test_every_page_is_built_and_can_be_reached(built: Path) -> None:
+    start = (built / "index.html").read_text(encoding="utf-8")
+    for name in PAGES:
+        target = name.removesuffix(".md") + ".html"
+        assert (built / target).is_file()
+        assert name == "index.md" or f'href="{target}"' in start
+
+
+def test_the_reference_holds_every_command_and_every_key(built: Path) -> None:
+    commands = (built / "reference/cli.html").read_text(encoding="utf-8")
+    for name in cli.COMMANDS:
+        assert f"mfba {name}<" in commands
+    assert commands.count("usage: ") >= len(cli.COMMANDS)
+    keys = (built / "reference/scenario.html").read_text(encoding="utf-8")
+    schema = scenario_model.schema()
+    for part in (schema, *schema["$defs"].values()):
+        for key, entry in part["properties"].items():
+            assert f">{key}<" in keys
+            assert entry["description"] in html.unescape(keys)
+
+
+@pytest.mark.parametrize("name", [n for n in PAGES if n not in ELSEWHERE])
+def test_a_page_does_what_it_shows(name: str, tmp_path: Path) -> None:
+    shown.follow(PAGES[name], tmp_path)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_other_commands_name_what_there_is(name: str) -> None:
+    for command in shown.commands(PAGES[name]):
+        program, *words = command
+        if ours(command) is not None or program in {"ros2", "cd", "source", "pip", "colcon"}:
+            continue  # run above; ros2: test_readme
+        if program == "make":
+            targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+            assert words[0] in targets
+        else:
+            assert program in ("python", ".venv/bin/python")
+            script = (ROOT / words[0]).read_text(encoding="utf-8")
+            assert all(f'"{word}"' in script for word in words if word.startswith("--"))
