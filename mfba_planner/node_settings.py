@@ -110,6 +110,9 @@ class PlannerSettings:
     view_period_s: float = option(
         0.2, "markers: time between two", unit="s", minimum=0.0, maximum=3600.0
     )
+    scan_yaw: float = option(
+        0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
+    )
     wait_for: str = option("", _WAIT_FOR)
 
     def __post_init__(self) -> None:

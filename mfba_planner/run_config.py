@@ -48,6 +48,11 @@ class RunConfig:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range, or a planner that would stop every tick."""
         check(self)
+        if self.planner.tracks_scan and not self.scenario.robot.lidar.beams:
+            raise ConfigError(
+                f"planner.scan_radius_m={self.planner.scan_radius_m:g}: the robot has no lidar; "
+                "give robot.lidar.beams=360, or 0"
+            )
         tick_s, timeout_s = self.planner.tick_ns * NANO, self.planner.input_timeout_s
         if self.real_time and timeout_s <= tick_s:
             raise ConfigError(
@@ -100,6 +105,6 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
         "planner": viewed
         | flatten(config.planner)
         | flatten(robot.base)
-        | {"seed": config.seed}
+        | {"seed": config.seed, "scan_yaw": robot.lidar.yaw_rad}
         | ({} if lockstep else {"input_timeout_s": timeout_s}),
     }

@@ -190,7 +190,9 @@ def test_circles_are_sensed_from_where_the_robot_sees_itself() -> None:
     world = World(replace(load_scenario("case1"), robot=robot), TICK_NS, 0.02, seed=1)
     wide = SensorParams(sensing_range_m=20.0)
     assert world.read().pose != world.pose
-    assert sense(world, wide) == sense_circles(world.read().pose.position, world.enlarged(), wide)
+    assert sense(world, wide) == sense_circles(
+        world.read().pose.position, world.scenario.enlarged(0.0), wide
+    )
 
 
 NOISY = Robot(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from .drive import Speeds, command, obey
@@ -25,7 +25,7 @@ from .planner import (
     Refused,
     observe,
 )
-from .sensing import Ranges, SensorParams, blind, sense_circles, sense_scan
+from .sensing import Ranges, SensorParams, aligned, blind, sense_circles, sense_scan
 from .world import Scenario
 
 DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
@@ -175,6 +175,15 @@ def look(world: World, sensor: SensorParams) -> Observation:
         ranges = blind(1, math.nan)  # the sensor says so by sectors of NaN
     pose = world.read().received
     return observe(world.stamp_ns, pose, ranges, world.scenario.goal_m, pose)
+
+
+def look_at_scan(world: World, sensor: SensorParams) -> Observation:
+    """look(), and the scan itself, in a frame aligned with odom."""
+    obs, scan = look(world, sensor), world.read().scan
+    if scan is None or obs.refused:
+        return obs
+    yaw = obs.pose.yaw + world.scenario.robot.lidar.yaw_rad
+    return replace(obs, scan=aligned(scan, yaw))
 
 
 Look = Callable[[World, SensorParams], Observation]

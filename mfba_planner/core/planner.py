@@ -17,6 +17,7 @@ from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
 from .geometry import Point, Pose2D, bearing, distance, towards
 from .jump import JumpWatch, explained
 from .options import check, option
+from .seen import SeenParams
 from .sensing import Bits, Ranges, Scan, sensory_vector
 
 NANO = 1e-9
@@ -84,7 +85,7 @@ class Method(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerParams:
+class PlannerParams(SeenParams):
     """The reading `section6` of Algorithm 1 and section 6.2."""
 
     method: Method = option(Method.PAPER, "Algorithm 1, or our planner that predicts")
@@ -98,10 +99,6 @@ class PlannerParams:
     input_timeout_s: float = option(
         1.0, "age at which odometry or sectors are stale", unit="s", minimum=0.001, maximum=3600.0
     )
-    jump_m: float = option(
-        0.5, "odometry that moved so much farther than speed_mps allows: carried off", unit="m",
-        minimum=0.01, maximum=1e6,
-    )  # fmt: skip
     gap_heading: GapHeading = option(GapHeading.BOUNDARY, "where a gap leads, in its two sectors")
     swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
     bat: BatParams = field(default_factory=BatParams)
@@ -115,6 +112,11 @@ class PlannerParams:
         """Who decides, for people: the law of beta in Algorithm 1, or the other method."""
         paper = self.method is Method.PAPER
         return self.bat.algorithm.value if paper else self.method.value
+
+    @property
+    def tracks_scan(self) -> bool:
+        """Whether it wants the scan beside the sectors."""
+        return self.method is Method.PREDICTIVE and self.scan_radius_m > 0.0
 
     @property
     def tick_ns(self) -> int:

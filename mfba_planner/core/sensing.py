@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -115,6 +115,11 @@ class Scan:
     angle_increment_rad: float
     range_min_m: float
     range_max_m: float
+
+
+def aligned(scan: Scan, yaw_rad: float) -> Scan:
+    """The scan in a frame that its own is turned against by yaw_rad."""
+    return replace(scan, angle_min_rad=scan.angle_min_rad + yaw_rad)
 
 
 def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: SensorParams) -> Ranges:

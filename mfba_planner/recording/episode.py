@@ -29,7 +29,7 @@ T = TypeVar("T")
 TRUTH = "/ground_truth"
 
 # Options younger than the oldest bags: what they default to is what was done then.
-LATER = {"method", "jump_m"}
+LATER = {"method", "jump_m", "scan_radius_m"}
 
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:

@@ -17,6 +17,7 @@ from . import convert, markers, params, topics
 from .cmd_vel import CmdVel
 from .inputs import Lockstep, Newest, Ready
 from .runtime import GraphNode, Refusals, spin_node
+from .sight import Sight
 
 
 class PlannerNode(GraphNode):
@@ -41,7 +42,8 @@ class PlannerNode(GraphNode):
         self._cmd_vel = CmdVel(self, s)
         self._inputs: Lockstep | Newest = Lockstep() if s.lockstep else Newest()
         self.listen(topics.ODOM, self._on_odom, from_anyone=not s.lockstep)
-        self.listen(topics.SECTORS, self._on_sectors)
+        yaw = s.scan_yaw if self.brain.params.tracks_scan else None
+        self._sight = Sight(self, self._refusals, self._on_sectors, yaw)
         self.listen(topics.GOAL_POSE, self._on_goal)
         self.offer_ready(names(s.wait_for))
         self.on_time_set_back(self._start_afresh)
@@ -63,6 +65,7 @@ class PlannerNode(GraphNode):
         self.brain.reset()
         self._last = None
         self._inputs = type(self._inputs)()
+        self._sight.forget()
 
     def _on_goal(self, message: Any) -> None:
         self.brain.reset()
@@ -111,7 +114,7 @@ class PlannerNode(GraphNode):
             return  # restarted: the world asks again
         seen = observe(stamp, pose, ranges, self._goal, self._pose, round(age_s / NANO))
         self._pose = seen.pose
-        decision = self.brain.plan(seen)
+        decision = self.brain.plan(self._sight.seen(seen))
         if decision.mode is Mode.STOPPED or carried_off(decision.reason):
             self.get_logger().warning(decision.reason, throttle_duration_sec=1.0)
         self._last = decision

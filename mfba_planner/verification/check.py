@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,8 @@ from typing import Any
 from ..core.digest import digest
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner import Decision, Mode, observe
-from ..core.sensing import sense_circles, sense_scan, sensory_vector
+from ..core.planner import Decision, Mode, Observation, observe
+from ..core.sensing import aligned, sense_circles, sense_scan, sensory_vector
 from ..messages import (
     body_velocity,
     laser_scan,
@@ -117,7 +117,7 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         observation = observe(tick.stamp_ns, seen, ranges, goal, pose)
         pose = observation.pose
         recorded.append(was)
-        decided.append(planner.plan(observation))
+        decided.append(planner.plan(_with_scan(setup, tick, observation)))
         faults += _contradictions(setup, tick, was)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
@@ -129,6 +129,14 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         faults=tuple(faults),
         notes=tuple(notes),
     )
+
+
+def _with_scan(setup: Setup, tick: Tick, obs: Observation) -> Observation:
+    """What a planner that tracks scans was shown besides."""
+    if not setup.planner.tracks_scan or obs.refused or SCAN not in tick.said:
+        return obs
+    yaw = obs.pose.yaw + setup.scenario.robot.lidar.yaw_rad
+    return replace(obs, scan=aligned(laser_scan(tick.said[SCAN]), yaw))
 
 
 def _contradictions(setup: Setup, tick: Tick, was: Decision) -> list[str]:
