@@ -137,6 +137,9 @@ _MEANINGS = {
     "heading_rad": "the same in radians, instead",
     "turns": "moments from which on it moves otherwise, in order of time",
     "at_s": "when, in simulated time from the beginning, s",
+    "robot": "its base, lidar and noise, where they are not those of the paper",
+    "kidnappings": "moments at which the robot is carried elsewhere, in order of time",
+    "to_m": "where it is put, m",
     "lower_m": "its corner with the smaller x and y, m",
     "upper_m": "its corner with the larger x and y, m",
 }
