@@ -2,7 +2,10 @@
 """The page of a run in a real browser: it plays, scrubs and shows what the run holds."""
 
 import json
+import math
 import re
+import shutil
+import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +19,7 @@ from selenium.webdriver.common.keys import Keys
 from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Episode, run
 from mfba_planner.core.errors import InputError, OutputError
+from mfba_planner.core.gaps import gap_heading
 from mfba_planner.core.metrics import evaluate
 from mfba_planner.core.planner import Mode
 from mfba_planner.recording.episode import read_episode
@@ -154,6 +158,12 @@ def test_the_world_is_drawn_as_the_tick_has_it(
           lit: all(".sector").map((s) => Number(s.classList.contains("lit"))),
           closed: all(".gap").map((g) => Number(g.classList.contains("closed"))),
           taken: one(".taken").getAttribute("d"),
+          rooms: all(".sector").map((sector, i, { length }) => {
+            const middle = (2 * Math.PI * (i + 0.5)) / length;
+            return sector.isPointInFill(
+              new DOMPoint(0.5 * Math.cos(middle), -0.5 * Math.sin(middle)));
+          }),
+          motions: all(".obstacle .motion").map((m) => m.getAttribute("d")),
           obstacles: all(".obstacle").map(place),
           radii: all(".obstacle .body").map((c) => Number(c.getAttribute("r"))),
           enlarged: all(".obstacle .enlarged").map((c) => Number(c.getAttribute("r"))),
@@ -165,7 +175,15 @@ def test_the_world_is_drawn_as_the_tick_has_it(
     assert drawn["robot"] == pytest.approx([decision.pose.x, -decision.pose.y])
     assert tuple(drawn["lit"]) == decision.vs
     assert tuple(drawn["closed"]) == decision.vg
-    assert drawn["taken"].startswith("M0 0L")
+    heading = gap_heading(decision.gap, len(decision.vg), episode.planner.gap_heading)
+    tip = [float(word) for word in drawn["taken"].removeprefix("M0 0L").split()]
+    reach = episode.sensor.sensing_range_m
+    assert tip == pytest.approx([reach * math.cos(heading), -reach * math.sin(heading)])
+    assert drawn["rooms"] == [True] * len(decision.vs)
+    for obstacle, arrow in zip(episode.scenario.obstacles, drawn["motions"], strict=True):
+        x0, y0, x1, y1 = map(float, arrow[1:].split("M")[0].replace("L", " ").split())
+        vx, vy = obstacle.velocity  # in case 2 nobody bounces or turns
+        assert [x1 - x0, y0 - y1] == pytest.approx([2.0 * vx, 2.0 * vy], abs=1e-3)
     centers = episode.scenario.centers(episode.time_s(decision.stamp_ns))
     assert drawn["obstacles"] == [pytest.approx([x, -y], abs=1e-3) for x, y in centers]
     assert drawn["radii"] == [o.radius_m for o in episode.scenario.obstacles]
@@ -469,3 +487,19 @@ def test_what_is_too_much_is_refused(episode: Episode, tmp_path: Path) -> None:
     (tmp_path / "page.html").write_text("mine")
     with pytest.raises(OutputError, match="already exists"):
         write_page([("run", episode)], tmp_path / "page.html")
+
+
+def test_without_a_chromium_one_line_says_what_to_install(tmp_path: Path) -> None:
+    for name in ("bash", "env"):
+        (tmp_path / name).symlink_to(str(shutil.which(name)))
+    done = subprocess.run(
+        [Path(__file__).parents[1] / "tools/chromium.sh"],
+        env={"PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("no Chromium with chromedriver on PATH: ")
+    assert done.stderr.count("\n") == 1
