@@ -76,10 +76,12 @@ setup(
             "pytest>=8",
             "pytest-cov>=6",
             "pytest-xdist>=3.6",
+            "rerun-sdk>=0.29",
             "rosbags>=0.10",
             "selenium>=4.25",
             "small-mcap>=0.10",
         ],
+        "view": ["rerun-sdk>=0.29"],
         "peers": [
             "mealpy>=3.0.2,<4",
             "niapy>=2.7,<3",

@@ -13,7 +13,7 @@ from mfba_planner.ros.virtual_sensor import VirtualSensor
 from mfba_planner.ros.world_sim import WorldSim
 
 TICK_NS = 100_000_000
-SPEED_FACTOR = 0.5  # slow motion: a busy machine must not look like a fault
+SPEED_FACTOR = 0.25  # slow motion: a busy machine must not look like a fault
 TIMEOUT_S = 0.16  # of simulated time
 
 Tamper = Callable[[Any], Any]  # what becomes of a message; None: it is lost

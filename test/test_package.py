@@ -66,7 +66,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "verification": ({"core", "messages", "planners", "recording", "verification"}, set()),
     "report": (
         {"core", "outputs", "paper", "report", "scenarios", "statistics", "sweep"},
-        {"matplotlib", "numpy", "rich"},
+        {"matplotlib", "numpy", "rerun", "rich"},
     ),
     "ros": (
         {"arguments", "core", "messages", "outputs", "recording", "ros", "run_config"}
@@ -229,7 +229,7 @@ def test_every_import_is_declared_and_every_dependency_justified(distribution: A
         if not requirement.startswith("#")
     }
     ros = {element.text for element in manifest() if element.tag.endswith("_depend")}
-    modules = {"PyYAML": "yaml", "mcap-ros2-support": "mcap_ros2"}
+    modules = {"PyYAML": "yaml", "mcap-ros2-support": "mcap_ros2", "rerun-sdk": "rerun"}
     declared = {modules.get(name, name) for name in wheels} | ros
     imported = {name.split(".")[0] for path in SOURCES for name in imports_of(path)}
     used = imported - sys.stdlib_module_names - {"mfba_planner"}

@@ -39,7 +39,6 @@ ROBOT: dict[str, dict[str, Any]] = {
         "step_length_m": 0.05,  # a decision is for 0.1 s
         "goal_tolerance_m": 0.1,
         "input_timeout_s": 0.25,
-        "caution.slow_within_m": 0.5,
         "recovery.enabled": True,
     },
 }

@@ -37,7 +37,12 @@ def run(order: Order) -> int:
             if not attempt.has_begun:
                 attempt.directory.discard()
     if failure is None:
-        conclude(attempt, episode).judge()
+        conclusion = conclude(attempt, episode)
+        if order.view:
+            from ..report.viewer import show
+
+            show([(conclusion.directory.name, conclusion.episode)])
+        conclusion.judge()
         return 0
     if attempt.has_begun:
         with suppress(BagError):  # nothing to tell of; the failure is told below

@@ -32,9 +32,9 @@ class Status(NamedTuple):
     values: dict[str, str]
 
     @property
-    def gist(self) -> tuple[str, Level]:
+    def gist(self) -> tuple[str, Level, str]:
         """What makes it another status, figures aside."""
-        return (self.name, self.level)
+        return (self.name, self.level, self.values.get("silent", ""))
 
 
 class Pulse:
@@ -74,22 +74,26 @@ class Health:
         self, now_s: float, timeout_s: float, refused: Mapping[str, int], fault: str
     ) -> Status:
         """Rates, ages and refusals; fault is what is wrong with the newest input, "": nothing."""
-        values, silent = {}, []
+        values: dict[str, str] = {}
+        silent: dict[str, str] = {}
         for name, pulse in self.pulses.items():
             age_s = pulse.age_s(now_s)
             if age_s is None:
-                silent.append(f"no {name} yet")
+                silent[name] = f"no {name} yet"
             elif age_s > timeout_s:
-                silent.append(f"{name} stale for {age_s:.2f} s (input_timeout_s={timeout_s:g})")
+                silent[name] = f"{name} stale for {age_s:.2f} s (input_timeout_s={timeout_s:g})"
             values[f"{name}: rate [Hz]"] = f"{pulse.rate_hz(now_s):.2f}"
             values[f"{name}: age [s]"] = "never" if age_s is None else f"{age_s:.3f}"
+        values["silent"] = " ".join(silent)
         values["input_timeout_s"] = f"{timeout_s:g}"
         values["refused"] = str(sum(refused.values()))
         values |= {f"refused {kind}": str(n) for kind, n in sorted(refused.items())}
         if fault:
-            return Status("inputs", Level.ERROR, "; ".join([f"refused: {fault}", *silent]), values)
+            return Status(
+                "inputs", Level.ERROR, "; ".join([f"refused: {fault}", *silent.values()]), values
+            )
         if silent:
-            return Status("inputs", Level.STALE, "; ".join(silent), values)
+            return Status("inputs", Level.STALE, "; ".join(silent.values()), values)
         return Status("inputs", Level.OK, "odom and sectors are sound", values)
 
 

@@ -148,9 +148,7 @@ OUTCOME = Topic(
 INITIALPOSE = Topic(
     name="initialpose", type=PoseWithCovarianceStamped, readers=(WORLD_SIM,), qos=VIEW_QOS
 )
-WAYPOINTS = Topic(
-    name="waypoints", type=Path, readers=(PLANNER,), qos=LATCHED_QOS, least_qos=VIEW_QOS
-)
+WAYPOINTS = Topic(name="waypoints", type=Path, readers=(PLANNER,), qos=VIEW_QOS)
 DIAGNOSTICS = Topic(name="/diagnostics", type=DiagnosticArray, writers=(PLANNER,), qos=VIEW_QOS)
 MARKERS = Topic(name="markers", type=MarkerArray, writers=(WORLD_SIM, PLANNER), qos=VIEW_QOS)
 
