@@ -13,10 +13,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from .core.drive import command
 from .core.errors import FrameError, InputError
-from .core.geometry import Point, Pose2D
+from .core.geometry import Point, Pose2D, yaw_of
 from .core.planner import Decision, Mode, Refused
-from .core.sensing import Bits, Ranges, Scan
+from .core.robot import Base
+from .core.sensing import Bits, Ranges, Scan, blind
 
 SECOND_NS = 1_000_000_000
 
@@ -53,8 +55,7 @@ def pose2d(pose: Any, what: str) -> Pose2D:
     norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
     if not 1e-6 < norm < 1e6:
         raise InputError(f"{what} orientation has norm {norm:g}; send a unit quaternion (w=1)")
-    yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y) / norm, 1.0 - 2.0 * (q.y**2 + q.z**2) / norm)
-    return Pose2D(p.x, p.y, yaw)
+    return Pose2D(p.x, p.y, yaw_of(q.x, q.y, q.z, q.w))
 
 
 def require_frame(message: Any, frame: str, what: str) -> None:
@@ -119,7 +120,7 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
         raise InputError(f"sectors hold {len(ranges)} ranges; send one per sector, at least 3")
     for number, r in enumerate(ranges, start=1):
         if math.isnan(r) or r < 0.0:
-            raise InputError(f"sector {number} holds {r}; the sensor was blind")
+            raise InputError(blind(number, r))
     return ranges
 
 
@@ -148,6 +149,18 @@ def rotated(vector: Point, angle_rad: float) -> Point:
         return vector
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1])
+
+
+def body_velocity(decision: Decision, base: Base, tick_ns: int) -> tuple[float, float, float]:
+    """What cmd_vel says for a decision: (vx, vy, wz) in the body frame."""
+    told = command(decision, base, tick_ns)
+    return (told[0], 0.0, told[1]) if base.turns else (*rotated(told, -decision.pose.yaw), 0.0)
+
+
+def told(twist: Any, base: Base, yaw_rad: float) -> Point:
+    """The inverse: what World.step takes, of a base with this heading; raises as velocity()."""
+    vx, vy, wz = velocity(twist)
+    return (vx, wz) if base.turns else rotated((vx, vy), yaw_rad)
 
 
 def bits_text(bits: Bits) -> str:

@@ -11,6 +11,7 @@ from enum import Enum
 
 from .core.options import check, option
 from .core.planner import PlannerParams
+from .core.robot import Base, Robot
 from .core.world import Scenario
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
@@ -59,8 +60,10 @@ class WorldSimSettings:
         maximum=3600.0,
     )
     enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
+    seed: int = option(0, "seed of the instruments' noise", minimum=0, maximum=2**63 - 1)
     odom_frame: str = option("odom", "frame of all poses (REP-105)")
     base_frame: str = option("base_link", "frame of the robot (REP-105)")
+    scan_frame: str = option("base_scan", "frame of the simulated lidar")
     view_period_s: float = option(
         0.2, "markers and trail: simulated time between two", unit="s", minimum=0.0, maximum=3600.0
     )
@@ -69,6 +72,13 @@ class WorldSimSettings:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range."""
         check(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rig:
+    """The robot of world_sim's scenario, option by option: its parameters robot.*."""
+
+    robot: Robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +106,7 @@ class VirtualSensorSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerSettings:
+class PlannerSettings(Base):
     """Settings of planner; PlannerParams are its parameters too."""
 
     seed: int = option(0, "seed of all its randomness", minimum=0, maximum=2**63 - 1)
@@ -106,6 +116,9 @@ class PlannerSettings:
     base_frame: str = option("base_link", "frame of the robot (REP-105)")
     view_period_s: float = option(
         0.2, "markers: time between two", unit="s", minimum=0.0, maximum=3600.0
+    )
+    scan_yaw: float = option(
+        0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )
     diagnostics_period_s: float = option(
         1.0, "/diagnostics: time between two", unit="s", minimum=0.01, maximum=3600.0

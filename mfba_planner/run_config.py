@@ -48,6 +48,11 @@ class RunConfig:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range, or a planner that would stop every tick."""
         check(self)
+        if self.planner.tracks_scan and not self.scenario.robot.lidar.beams:
+            raise ConfigError(
+                f"planner.scan_radius_m={self.planner.scan_radius_m:g}: the robot has no lidar; "
+                "give robot.lidar.beams=360, or 0"
+            )
         tick_s, timeout_s = self.planner.tick_ns * NANO, self.planner.input_timeout_s
         if self.real_time and timeout_s <= tick_s:
             raise ConfigError(
@@ -78,6 +83,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     # In lockstep nobody watches, and markers cost more than the decisions.
     common = {"lockstep": lockstep, "wait_for": ",".join(peers)}
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
+    robot = config.scenario.robot
     radii = [obstacle.radius_m for obstacle in config.scenario.obstacles]
     return {
         "world_sim": viewed
@@ -87,15 +93,18 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             "tick_ns": config.planner.tick_ns,
             "goal_tolerance_m": config.planner.goal_tolerance_m,
             "start_paused": True,
+            "seed": config.seed,
         },
         "virtual_sensor": common
         | flatten(config.sensor)
         | {
             "robot_radius_m": config.scenario.robot_radius_m,
             **({"obstacle_radii_m": radii} if radii else {}),
+            **({"source": "scan", "scan_yaw": robot.lidar.yaw_rad} if robot.lidar.beams else {}),
         },
         "planner": viewed
         | flatten(config.planner)
-        | {"seed": config.seed}
+        | flatten(robot.base)
+        | {"seed": config.seed, "scan_yaw": robot.lidar.yaw_rad}
         | ({} if lockstep else {"input_timeout_s": timeout_s}),
     }

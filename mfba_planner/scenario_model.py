@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .core.errors import ConfigError
 from .core.options import did_you_mean
-from .core.world import Obstacle, Scenario, Turn, Walls
-from .scenarios import EXAMPLE, LIMIT
+from .core.world import Kidnapping, Obstacle, Scenario, Turn, Walls
+from .scenarios import EXAMPLE, LIMIT, robot_of
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
 _Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=LIMIT)]
@@ -80,6 +80,14 @@ class _Walls(_Strict):
     upper_m: _Point
 
 
+class _Kidnapping(_Strict):
+    at_s: _Positive
+    to_m: _Point
+
+    def build(self) -> Kidnapping:
+        return Kidnapping(at_s=self.at_s, to_m=self.to_m)
+
+
 class _Scenario(_Strict):
     name: _Name
     description: str = _default(Scenario, "description")
@@ -89,6 +97,8 @@ class _Scenario(_Strict):
     obstacles: list[_Obstacle] = []
     walls: _Walls | None = None
     time_limit_s: _Positive = _default(Scenario, "time_limit_s")
+    robot: dict[str, Any] = {}
+    kidnappings: list[_Kidnapping] = []
 
     def build(self) -> Scenario:
         walls = self.walls
@@ -106,6 +116,8 @@ class _Scenario(_Strict):
             obstacles=tuple(obstacle.build() for obstacle in self.obstacles),
             walls=Walls(lower_m=walls.lower_m, upper_m=walls.upper_m) if walls else None,
             time_limit_s=self.time_limit_s,
+            robot=robot_of(self.robot),
+            kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
         )
 
 
@@ -125,6 +137,9 @@ _MEANINGS = {
     "heading_rad": "the same in radians, instead",
     "turns": "moments from which on it moves otherwise, in order of time",
     "at_s": "when, in simulated time from the beginning, s",
+    "robot": "its base, lidar and noise, where they are not those of the paper",
+    "kidnappings": "moments at which the robot is carried elsewhere, in order of time",
+    "to_m": "where it is put, m",
     "lower_m": "its corner with the smaller x and y, m",
     "upper_m": "its corner with the larger x and y, m",
 }
@@ -185,6 +200,7 @@ def from_yaml(text: str, origin: str) -> Any:
 
 _REMEDIES = {
     "finite_number": "give a finite number",
+    "dict_type": "give a mapping of options, such as {drive: differential}",
     "float_type": "give a number",
     "list_type": "give a list ([] for none)",
     "missing": f"add it ({EXAMPLE})",
@@ -222,6 +238,7 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
     models: dict[Any, type[BaseModel]] = {
         "obstacles": _Obstacle,
         "turns": _Turn,
+        "kidnappings": _Kidnapping,
         "walls": _Walls,
     }
     within = [models[part] for part in location[:-1] if part in models]

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -13,8 +14,9 @@ from typing import Any
 
 from .core.errors import ConfigError
 from .core.geometry import Point
-from .core.options import did_you_mean
-from .core.world import Obstacle, Scenario, Turn, Walls
+from .core.options import did_you_mean, override
+from .core.robot import Robot
+from .core.world import Kidnapping, Obstacle, Scenario, Turn, Walls
 from .resources import scenario_names, scenario_path
 
 EXAMPLE = "compare config/scenarios/case1.yaml"
@@ -79,9 +81,14 @@ def _plain(text: str, origin: str) -> Any:
 
 def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
     """The scenario as plain data that load_scenario accepts and turns into an equal one."""
-    plain: dict[str, Any] = json.loads(json.dumps(asdict(scenario)))
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(scenario), default=lambda e: e.value))
+    # What a scenario does not use is left out: recordings compare scenarios as text.
+    if scenario.robot == Robot():
+        del plain["robot"]
+    if not scenario.kidnappings:
+        del plain["kidnappings"]
     for obstacle in plain["obstacles"]:
-        if not obstacle["turns"]:  # most have none, and recordings compare scenarios as text
+        if not obstacle["turns"]:
             del obstacle["turns"]
     return plain
 
@@ -89,6 +96,22 @@ def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
 def scenario_to_json(scenario: Scenario) -> str:
     """One line of JSON that load_scenario accepts; the same scenario always gives the same."""
     return json.dumps(scenario_to_dict(scenario), sort_keys=True)
+
+
+def robot_of(told: dict[str, Any]) -> Robot:
+    """The robot of a scenario: options of core.robot, nested or with dots; ConfigError if bad."""
+    try:
+        return override(Robot(), dict(_dotted(told)))
+    except ConfigError as error:
+        raise ConfigError(f"robot.{error}") from None
+
+
+def _dotted(told: dict[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in told.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
 
 
 class _UnusualError(Exception):
@@ -106,7 +129,10 @@ def _as_written(data: dict[str, Any]) -> Scenario:
         raise _UnusualError
     if not isinstance(description, str):
         raise _UnusualError
-    _require_keys(data, Scenario)
+    _require_keys(data, Scenario, "robot", "kidnappings")
+    robot = data.get("robot", {})
+    if not isinstance(robot, dict):
+        raise _UnusualError
     return Scenario(
         name=name,
         description=description,
@@ -116,11 +142,18 @@ def _as_written(data: dict[str, Any]) -> Scenario:
         obstacles=tuple(_obstacle(entry) for entry in _list(data["obstacles"])),
         walls=None if walls is None else _walls(walls),
         time_limit_s=_positive(data["time_limit_s"]),
+        robot=robot_of(robot),
+        kidnappings=tuple(_kidnapping(entry) for entry in _list(data.get("kidnappings", []))),
     )
 
 
+def _kidnapping(data: Any) -> Kidnapping:
+    _require_keys(data, Kidnapping)
+    return Kidnapping(at_s=_positive(data["at_s"]), to_m=_point(data["to_m"]))
+
+
 def _obstacle(data: Any) -> Obstacle:
-    _require_keys(data, Obstacle, optional="turns")
+    _require_keys(data, Obstacle, "turns")
     return Obstacle(
         center_m=_point(data["center_m"]),
         radius_m=_positive(data["radius_m"]),
@@ -147,9 +180,9 @@ def _walls(data: Any) -> Walls:
     return walls
 
 
-def _require_keys(data: Any, kind: type, optional: str = "") -> None:
+def _require_keys(data: Any, kind: type, *optional: str) -> None:
     wanted = set(kind.__dataclass_fields__)  # type: ignore[attr-defined]
-    if not isinstance(data, dict) or not wanted - {optional} <= set(data) <= wanted:
+    if not isinstance(data, dict) or not wanted - {*optional} <= set(data) <= wanted:
         raise _UnusualError
 
 

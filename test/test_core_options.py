@@ -235,6 +235,8 @@ def test_section_6_2_gives_the_defaults() -> None:
         (PlannerParams, "step_length_m", 0.001, 100.0),
         (PlannerParams, "goal_tolerance_m", 1e-6, 10.0),
         (PlannerParams, "input_timeout_s", 0.001, 3600.0),
+        (PlannerParams, "jump_m", 0.01, 1e6),
+        (PlannerParams, "scan_radius_m", 0.0, 10.0),
         (SensorParams, "sectors", 3, 3600),
         (SensorParams, "sensing_range_m", 0.01, 1000.0),
     ],

@@ -299,9 +299,10 @@ def test_at_a_wall_or_a_turn_the_velocity_is_the_one_that_follows() -> None:
 def test_a_contact_just_at_a_turn_is_noticed() -> None:
     # comes to within 0.1 m of the robot's centre line at 2 s and leaves again
     obstacle = Obstacle(
-        center_m=(0.0, 0.0), radius_m=0.5, speed_mps=1.0, turns=(
-            Turn(at_s=2.0, speed_mps=1.0, heading_rad=math.pi),
-        )
+        center_m=(0.0, 0.0),
+        radius_m=0.5,
+        speed_mps=1.0,
+        turns=(Turn(at_s=2.0, speed_mps=1.0, heading_rad=math.pi),),
     )
     gap = step_clearances(world(obstacle), 0.0, 4.0, (2.1, 0.0), (2.1, 0.0))
     assert gap == pytest.approx([0.1 - 0.8])

@@ -13,11 +13,12 @@ from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Outcome, World, run
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
+from mfba_planner.core.lidar import cast_rays
 from mfba_planner.core.metrics import evaluate
 from mfba_planner.core.planner import Mode, Observation, PlannerParams
 from mfba_planner.core.sensing import SensorParams
 from mfba_planner.core.world import Obstacle, Scenario, Walls, center_at, velocity_at
-from mfba_planner.planners.perception import Perception, cast_rays
+from mfba_planner.planners.perception import Perception
 from mfba_planner.planners.registry import PLANNERS, make
 from mfba_planner.planners.straight import Straight
 from mfba_planner.scenarios import load_scenario

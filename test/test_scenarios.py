@@ -72,7 +72,7 @@ def test_case_study_2_is_table_6() -> None:
     ]
 
 
-@pytest.mark.parametrize("name", ["case1", "case2", "empty", "walled"])
+@pytest.mark.parametrize("name", ["case1", "case2", "empty", "kidnapped", "walled"])
 def test_every_shipped_scenario_has_its_name_and_can_be_won(name: str) -> None:
     scenario = load_scenario(name)
     assert scenario.name == name
@@ -166,8 +166,16 @@ def test_a_shipped_name_is_not_confused_with_what_lies_about(
     ("source", "message"),
     [
         ("cas1", "'cas1': no such scenario; did you mean 'case1'? (or give a .yaml file)"),
-        ("", "'': no such scenario; known: case1, case2, empty, walled (or give a .yaml file)"),
-        (".", "'.': no such scenario; known: case1, case2, empty, walled (or give a .yaml file)"),
+        (
+            "",
+            "'': no such scenario; known: case1, case2, empty, kidnapped, walled "
+            "(or give a .yaml file)",
+        ),
+        (
+            ".",
+            "'.': no such scenario; known: case1, case2, empty, kidnapped, walled "
+            "(or give a .yaml file)",
+        ),
         ("nope.yaml", "nope.yaml: No such file or directory; give a readable scenario .yaml"),
         ("folder.yaml", "folder.yaml: Is a directory; give a readable scenario .yaml"),
         ("picture.yml", "picture.yml: not a text file; give a readable scenario .yaml"),
@@ -249,8 +257,8 @@ def test_not_yaml(text: str, problem: str) -> None:
     ("text", "message"),
     [
         (TASK + "goal: 3", "goal: unknown key; did you mean 'goal_m'?"),
-        (TASK + "zzzz: 3", "zzzz: unknown key; known: description, goal_m, name, obstacles, "
-                           "robot_radius_m, start_m, time_limit_s, walls"),
+        (TASK + "zzzz: 3", "zzzz: unknown key; known: description, goal_m, kidnappings, "
+                           "name, obstacles, robot, robot_radius_m, start_m, time_limit_s, walls"),
         # the misspelt key is named, not the one that it leaves out
         ("name: x\nstart_m: [0, 0]\ngaol_m: [1, 1]",
          "gaol_m: unknown key; did you mean 'goal_m'?"),
@@ -521,7 +529,7 @@ def test_a_heading_keeps_its_last_bit(degrees: float) -> None:
     assert load_scenario(scenario_to_json(scenario)) == scenario
 
 
-@pytest.mark.parametrize("name", ["case1", "case2", "empty", "walled"])
+@pytest.mark.parametrize("name", ["case1", "case2", "empty", "kidnapped", "walled"])
 def test_a_run_from_json_is_the_same_run(name: str) -> None:
     scenario = load_scenario(name)
     again = load_scenario(scenario_to_json(scenario))

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.lidar import cast_rays
 from mfba_planner.core.planner import Circle
 from mfba_planner.core.sensing import Scan
-from mfba_planner.planners.perception import cast_rays
 from mfba_planner.planners.tracking import Tracker, TrackingParams
 
 TICK_NS = 100_000_000

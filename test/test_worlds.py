@@ -255,9 +255,7 @@ MOTIONS = st.builds(
         max_size=4,
         unique_by=lambda row: row[0],
     ).map(
-        lambda rows: tuple(
-            Turn(at_s=t, speed_mps=v, heading_rad=h) for t, v, h in sorted(rows)
-        )
+        lambda rows: tuple(Turn(at_s=t, speed_mps=v, heading_rad=h) for t, v, h in sorted(rows))
     ),
 )
 

@@ -24,6 +24,7 @@ from mfba_planner import cli, scenario_model
 from mfba_planner import node_settings as settings
 from mfba_planner.core.options import override, walk
 from mfba_planner.core.planner import PlannerParams
+from mfba_planner.core.robot import Robot
 from mfba_planner.core.sensing import SensorParams
 from mfba_planner.ros import topics
 
@@ -54,7 +55,7 @@ _YAML_HEAD = """\
 NODES: dict[str, tuple[Any, ...]] = {
     "planner": (settings.PlannerSettings(), PlannerParams()),
     "virtual_sensor": (settings.VirtualSensorSettings(), SensorParams()),
-    "world_sim": (settings.WorldSimSettings(),),
+    "world_sim": (settings.WorldSimSettings(), settings.Rig(robot=Robot())),
     "recorder": (settings.RecorderSettings(),),
 }
 
@@ -211,6 +212,8 @@ def _allowed(entry: dict[str, Any]) -> str:
         low = low or (f">= {entry['minimum']:g}" if "minimum" in entry else "")
         high = f"<= {entry['maximum']:g}" if "maximum" in entry else ""
         return ", ".join(["number", *filter(None, (low, high))])
+    if entry["type"] == "object":
+        return "mapping"
     return {"string": "text"}.get(entry["type"], str(entry["type"]))
 
 

@@ -82,6 +82,10 @@ class Course:
             self._third_count += len(x)
         self._last = whole[-3:]
 
+    def interrupt(self) -> None:
+        """The next point does not follow from the last: no turn, no jerk between them."""
+        self._last, self._heading = [], None
+
     @property
     def turning_rad(self) -> float:
         """Sum of all turns so far."""

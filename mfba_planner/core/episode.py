@@ -3,18 +3,33 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from .errors import ConfigError
+from .drive import Speeds, command, obey
+from .errors import ConfigError, InputError
 from .geometry import Point, Pose2D, distance
 from .guarded import Guarded
+from .instruments import Instruments, Reading
 from .motion import Motion
 from .nearby import Found, Nearby
-from .planner import NANO, Decision, Method, Observation, PathPlanner, Planner, PlannerParams
-from .sensing import Ranges, SensorParams, sense_circles
+from .planner import (
+    NANO,
+    Decision,
+    Method,
+    Observation,
+    PathPlanner,
+    Planner,
+    PlannerParams,
+    Refused,
+    observe,
+)
+from .sensing import Ranges, SensorParams, aligned, blind, sense_circles, sense_scan
 from .world import Scenario
+
+DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
 
 
 class Outcome(Enum):
@@ -36,6 +51,7 @@ class Episode:
     driver: str
     ticks: tuple[Decision, ...]
     outcome: Outcome
+    truth: tuple[Pose2D, ...] = ()  # where the robot was at each tick; (): where it saw itself
     brain: str = ""  # who decided, where that is not what planner's own options name
 
     @property
@@ -62,21 +78,26 @@ def advance(pose: Pose2D, velocity: Point, tick_ns: int) -> Pose2D:
 class World:
     """The simulated world between two ticks: all that world_sim knows, without ROS."""
 
-    def __init__(self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float) -> None:
-        """Put the robot at the start, at tick 0."""
+    def __init__(
+        self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float, seed: int = 0
+    ) -> None:
+        """Put the robot at the start, at tick 0; the seed is its instruments'."""
         self.scenario = scenario
         self.tick_ns = tick_ns
         self.goal_tolerance_m = goal_tolerance_m
         self.tick = 0
         self.pose = Pose2D(*scenario.start_m)
+        self.speeds = Speeds()  # of a differential drive
+        self._instruments = Instruments(scenario.robot, scenario.walls, tick_ns, seed)
+        self._read: tuple[int, Reading] | None = None
         self._nearby = Nearby(Motion(scenario), tick_ns)
 
-    def near(self, reach_m: float) -> Found:
+    def near(self, reach_m: float, position: Point | None = None) -> Found:
         """Indices, and (centre, enlarged radius), of whoever may be within reach of its edge now.
 
         In the scenario's order; nobody who is within reach is missing.
         """
-        return self._nearby.at(self.tick, self.pose.position, reach_m)
+        return self._nearby.at(self.tick, position or self.pose.position, reach_m)
 
     @property
     def stamp_ns(self) -> int:
@@ -90,34 +111,80 @@ class World:
 
     def outcome(self) -> Outcome | None:
         """How the run has ended by the present tick, None while it goes on."""
-        if distance(self.pose.position, self.scenario.goal_m) <= self.goal_tolerance_m:
+        # Who sees itself there need not be: the robot stops where its odometry says so.
+        doubt_m = DOUBTS * self.scenario.robot.noise.odom_m
+        if distance(self.pose.position, self.scenario.goal_m) <= self.goal_tolerance_m + doubt_m:
             return Outcome.GOAL_REACHED
         if self.time_s >= self.scenario.time_limit_s:
             return Outcome.TIME_LIMIT
         return None
 
-    def step(self, velocity: Point) -> None:
-        """Move robot and time on by one tick."""
-        self.pose = advance(self.pose, velocity, self.tick_ns)
+    def step(self, told: Point) -> None:
+        """Move robot and time on by one tick; told is what core.drive.command gives."""
+        robot = self.scenario.robot
+        if robot.turns:
+            self.pose, self.speeds = obey(self.pose, self.speeds, told, robot, self.tick_ns)
+        else:
+            self.pose = advance(self.pose, told, self.tick_ns)
+        before_s = self.time_s
         self.tick += 1
+        for kidnapping in self.scenario.kidnappings:
+            if before_s < kidnapping.at_s <= self.time_s:
+                self.put(Pose2D(*kidnapping.to_m, self.pose.yaw))
+
+    def put(self, pose: Pose2D) -> None:
+        """Put the robot somewhere else, at rest."""
+        self.pose, self.speeds, self._read = pose, Speeds(), None
+
+    def read(self) -> Reading:
+        """What the robot's instruments say at the present tick: the same however often."""
+        robot = self.scenario.robot
+        if not (robot.lidar.beams or robot.noise.of_odometry):
+            return Reading(self.pose, None)
+        if self._read is None or self._read[0] != self.tick:
+            surfaces: list[tuple[float, float, float]] = []
+            if robot.lidar.beams:
+                obstacles = self.scenario.obstacles
+                surfaces = [
+                    (*center, obstacles[index].radius_m)
+                    for index, (center, _) in zip(*self.near(robot.lidar.range_max_m))
+                ]
+            self._read = self.tick, self._instruments.read(self.stamp_ns, self.pose, surfaces)
+        return self._read[1]
 
 
 def sense(world: World, params: SensorParams) -> Ranges:
-    """What the ring of virtual sensors measures at the present tick."""
-    _, circles = world.near(params.sensing_range_m)
-    return sense_circles(world.pose.position, circles, params)
+    """What the ring of virtual sensors measures at the present tick, of circles or of a scan.
+
+    Raises InputError for a scan that cannot be used.
+    """
+    seen, robot = world.read(), world.scenario.robot
+    if seen.scan is None:
+        position = seen.received.position
+        _, circles = world.near(params.sensing_range_m, position)
+        return sense_circles(position, circles, params)
+    yaw = seen.received.yaw + robot.lidar.yaw_rad
+    return sense_scan(seen.scan, yaw, world.scenario.robot_radius_m, params)
 
 
 def look(world: World, sensor: SensorParams) -> Observation:
     """What the paper's planner gets to know at the present tick: pose, sectors, goal."""
-    stamp_ns = world.stamp_ns
-    return Observation(
-        stamp_ns=stamp_ns,
-        pose=world.pose,
-        ranges_m=sense(world, sensor),
-        goal=world.scenario.goal_m,
-        now_ns=stamp_ns,
-    )
+    ranges: Ranges | Refused
+    try:
+        ranges = sense(world, sensor)
+    except InputError:
+        ranges = blind(1, math.nan)  # the sensor says so by sectors of NaN
+    pose = world.read().received
+    return observe(world.stamp_ns, pose, ranges, world.scenario.goal_m, pose)
+
+
+def look_at_scan(world: World, sensor: SensorParams) -> Observation:
+    """look(), and the scan itself, in a frame aligned with odom."""
+    obs, scan = look(world, sensor), world.read().scan
+    if scan is None or obs.refused:
+        return obs
+    yaw = obs.pose.yaw + world.scenario.robot.lidar.yaw_rad
+    return replace(obs, scan=aligned(scan, yaw))
 
 
 Look = Callable[[World, SensorParams], Observation]
@@ -141,17 +208,18 @@ def run(
     """
     planner = planner or PlannerParams()
     sensor = sensor or SensorParams()
-    world = World(scenario, planner.tick_ns, planner.goal_tolerance_m)
+    world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
     if brain is None:
         if planner.method is not Method.PAPER:
             raise ConfigError(
                 f"method={planner.method.value}: not the core's own; use planners.method.simulate"
             )
         brain = Guarded(Planner(planner, seed))
-    ticks = [brain.plan(look(world, sensor))]
+    ticks, truth = [brain.plan(look(world, sensor))], [world.pose]
     while (outcome := world.outcome()) is None and go_on(world):
-        world.step(ticks[-1].velocity)
+        world.step(command(ticks[-1], scenario.robot, planner.tick_ns))
         ticks.append(brain.plan(look(world, sensor)))
+        truth.append(world.pose)
     return Episode(
         scenario=scenario,
         sensor=sensor,
@@ -160,4 +228,5 @@ def run(
         driver="core",
         ticks=tuple(ticks),
         outcome=outcome or Outcome.INTERRUPTED,
+        truth=tuple(truth) if scenario.robot.noise.of_odometry else (),
     )

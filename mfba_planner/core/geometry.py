@@ -28,6 +28,22 @@ def wrap_angle(angle_rad: float) -> float:
     return math.pi if wrapped == -math.pi else wrapped
 
 
+def half_turn(yaw_rad: float) -> Point:
+    """(z, w) of the unit quaternion of a planar rotation (REP-103)."""
+    return (math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad))
+
+
+def yaw_of(x: float, y: float, z: float, w: float) -> float:
+    """Yaw of a quaternion that need not be a unit one, but must not be 0."""
+    norm = x * x + y * y + z * z + w * w
+    return math.atan2(2.0 * (w * z + x * y) / norm, 1.0 - 2.0 * (y * y + z * z) / norm)
+
+
+def carried(pose: Pose2D) -> Pose2D:
+    """The pose as a message carries it, yaw as a quaternion: not the last bit is the same."""
+    return Pose2D(pose.x, pose.y, yaw_of(0.0, 0.0, *half_turn(pose.yaw))) if pose.yaw else pose
+
+
 def distance(a: Point, b: Point) -> float:
     """Euclidean distance, eq. 1 (sqrt is exact in IEEE-754, so every machine agrees)."""
     dx, dy = b[0] - a[0], b[1] - a[1]

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from .caution import allowed_share
 from .geometry import Point, bearing, distance, towards
+from .jump import carried_off
 from .planner import NANO, Decision, Mode, Observation, PathPlanner, PlannerParams
 from .recovery import Phase, Recovery, advance, most_room
 
@@ -69,6 +70,9 @@ class Guarded:
             self._forget()
             self._goal = obs.goal
         decision = self.inner.plan(obs)
+        if carried_off(decision.reason):
+            self._forget()
+            self._goal = obs.goal
         if self.params.recovery.enabled:
             decision = self._recovered(decision)
         return _slowed(decision, self.params)

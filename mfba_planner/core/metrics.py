@@ -6,15 +6,16 @@ from __future__ import annotations
 import math
 from array import array
 from collections import Counter
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
 from .conduct import Conduct, Course, Passes
 from .episode import Episode, Outcome
-from .geometry import distance
-from .motion import Array, Motion
+from .geometry import Pose2D, distance
+from .jump import carried_off
+from .motion import Array, Motion, Steps
 from .planner import NANO, Decision, Mode
 from .world import step_clearances
 
@@ -62,8 +63,8 @@ def conduct(episode: Episode) -> Conduct:
 def assess(episode: Episode) -> tuple[Result, Conduct]:
     """evaluate() and conduct() in one go."""
     tally = Tally(episode)
-    for tick in episode.ticks:
-        tally.add(tick)
+    for tick, pose in zip_longest(episode.ticks, episode.truth):
+        tally.add(tick, pose)
     return tally.result(episode.outcome), tally.conduct()
 
 
@@ -88,8 +89,10 @@ class Tally:
         self._course = Course()
         self._encounters: dict[int, None] = {}
 
-    def add(self, tick: Decision) -> None:
-        """Take the next tick."""
+    def add(self, tick: Decision, pose: Pose2D | None = None) -> None:
+        """Take the next tick, and where the robot was if it saw itself elsewhere."""
+        if pose is not None:
+            tick = replace(tick, pose=pose)
         if self._first is None:
             self._first = tick
         else:
@@ -155,16 +158,32 @@ class Tally:
         ticks = self._block
         if len(ticks) == self._looked:
             return
-        self._course.add([tick.pose.position for tick in ticks[self._looked :]])
+        driven = np.array([not carried_off(tick.reason) for tick in ticks[1:]], dtype=bool)
+        self._course_on(ticks[self._looked :])
         times_s, positions_m = self._course_of(ticks)
         steps = self._motion.steps(times_s, positions_m)
         near = steps.distance_m - self._motion.radius_m <= self._run.sensor.sensing_range_m
         self._encounters.update(dict.fromkeys(np.argwhere(near)[:, 1].tolist()))
         dx, dy = np.diff(positions_m)
         moved_m = np.sqrt(dx * dx + dy * dy)
+        begins_s = times_s[:-1]
+        if not driven.all():  # who is carried drives no way and runs into nobody
+            begins_s, moved_m = begins_s[driven], moved_m[driven]
+            steps = Steps(steps.gap_m[driven], steps.contact_s[driven], steps.distance_m)
         self._steps_m.extend(moved_m.tolist())
-        self._passes.add(steps, times_s[:-1], moved_m)
+        self._passes.add(steps, begins_s, moved_m)
         self._block, self._looked = [ticks[-1]], 1
+
+    def _course_on(self, ticks: list[Decision]) -> None:
+        """Draw the path on; where the robot was carried, a new one begins."""
+        first = 0
+        for number, tick in enumerate(ticks):
+            if carried_off(tick.reason):
+                if number > first:
+                    self._course.add([tick.pose.position for tick in ticks[first:number]])
+                self._course.interrupt()
+                first = number
+        self._course.add([tick.pose.position for tick in ticks[first:]])
 
     def _course_of(self, ticks: list[Decision]) -> tuple[Array, Array]:
         """Times (K,) and positions (2, K) of some ticks."""
@@ -181,6 +200,8 @@ def tick_clearances(episode: Episode) -> list[list[float]]:
 
 
 def _clearances(run: Episode, a: Decision, b: Decision) -> list[float]:
+    if carried_off(b.reason):
+        b = replace(b, pose=a.pose)
     times_s = run.time_s(a.stamp_ns), run.time_s(b.stamp_ns)
     return step_clearances(run.scenario, *times_s, a.pose.position, b.pose.position)
 

@@ -16,8 +16,10 @@ from .caution import CautionParams
 from .errors import ConfigError
 from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
 from .geometry import Point, Pose2D, bearing, distance, towards
+from .jump import JumpWatch, explained
 from .options import check, option
 from .recovery import RecoveryParams
+from .seen import Method, SeenParams
 from .sensing import Bits, Ranges, Scan, sensory_vector
 
 NANO = 1e-9
@@ -77,18 +79,10 @@ class Swarm(Enum):
     PERSISTENT = "persistent"
 
 
-class Method(Enum):
-    """Who decides on sectors: Algorithm 1, or the planner that predicts (planners/)."""
-
-    PAPER = "paper"
-    PREDICTIVE = "predictive"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerParams:
+class PlannerParams(SeenParams):
     """The reading `section6` of Algorithm 1 and section 6.2."""
 
-    method: Method = option(Method.PAPER, "Algorithm 1, or our planner that predicts")
     speed_mps: float = option(0.785, "robot speed", unit="m/s", minimum=0.01, maximum=100.0)
     step_length_m: float = option(
         0.3, "longest goal step, in both modes", unit="m", minimum=0.001, maximum=100.0
@@ -314,20 +308,24 @@ class Planner:
         self._goal: Point | None = None
         self._swarm: BatSwarm | None = None
         self._stamp_ns = 0
+        self._watch = JumpWatch()
 
     def reset(self) -> None:
         """Forget everything but parameters and seed (a jump of time, a new trip)."""
         self.mode, self._goal, self._swarm = Mode.IDLE, None, None
 
     def plan(self, obs: Observation) -> Decision:
-        """Answer one observation and remember the mode."""
+        """Answer one observation and remember the mode; who was carried off begins anew."""
+        carried = self._watch.noticed(obs, self.params, self.mode)
+        if carried:
+            self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
             self._goal, self._swarm = obs.goal, None
         self._stamp_ns = obs.stamp_ns
         decision = decide(obs, self.mode, self.params, self._generate)
         self.mode = decision.mode
-        return decision
+        return explained(decision, carried)
 
     def _generate(self, position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
         if self.params.swarm is Swarm.PERSISTENT:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,11 @@ class SensorParams:
 def sensory_vector(ranges_m: Iterable[float]) -> Bits:
     """Vs of eq. 11: a(i) = 0 where sector i is free (+inf), 1 for any other range."""
     return tuple([0 if r == math.inf else 1 for r in ranges_m])
+
+
+def blind(sector: int, range_m: float) -> str:
+    """Why sectors with this range are refused; sectors are counted from 1."""
+    return f"sector {sector} holds {range_m}; the sensor was blind"
 
 
 def longest_range_m(params: SensorParams, enlarged_radius_m: float) -> float:
@@ -110,6 +115,11 @@ class Scan:
     angle_increment_rad: float
     range_min_m: float
     range_max_m: float
+
+
+def aligned(scan: Scan, yaw_rad: float) -> Scan:
+    """The scan in a frame that its own is turned against by yaw_rad."""
+    return replace(scan, angle_min_rad=scan.angle_min_rad + yaw_rad)
 
 
 def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: SensorParams) -> Ranges:

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 from .errors import ConfigError
 from .geometry import Point, closest_approach, distance
+from .robot import Robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +58,14 @@ class Walls:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Kidnapping:
+    """At the first tick at or after at_s (s) the robot stands at to_m (m), its heading kept."""
+
+    at_s: float
+    to_m: Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """A task: start, goal, robot, obstacles, walls and a limit of simulated time."""
 
@@ -68,6 +77,8 @@ class Scenario:
     walls: Walls | None = None
     time_limit_s: float = 120.0
     description: str = ""
+    robot: Robot = Robot()
+    kidnappings: tuple[Kidnapping, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a task that makes no sense from the first moment."""
@@ -83,6 +94,7 @@ class Scenario:
             if self.walls is not None:
                 _check_inside(number, obstacle, self.walls)
             _check_turns(number, obstacle)
+        _check_kidnappings(self)
 
     def enlarged_radius(self, obstacle: Obstacle) -> float:
         """Obstacle radius plus robot radius (Fig. 4), metres."""
@@ -112,13 +124,28 @@ def _check_inside(number: int, obstacle: Obstacle, walls: Walls) -> None:
 
 
 def _check_turns(number: int, obstacle: Obstacle) -> None:
-    times = [0.0, *(turn.at_s for turn in obstacle.turns)]
-    for before, at_s in pairwise(times):
+    _check_order(f"obstacle {number} turns", [turn.at_s for turn in obstacle.turns])
+
+
+def _check_order(what: str, times_s: list[float]) -> None:
+    for before, at_s in pairwise([0.0, *times_s]):
         if not before < at_s:
             raise ConfigError(
-                f"obstacle {number} turns: at_s={at_s:g} does not come after {before:g}; "
-                "give the turns in order of time, the first after 0"
+                f"{what}: at_s={at_s:g} does not come after {before:g}; "
+                f"give the {what.split()[-1]} in order of time, the first after 0"
             )
+
+
+def _check_kidnappings(scenario: Scenario) -> None:
+    _check_order("kidnappings", [kidnapping.at_s for kidnapping in scenario.kidnappings])
+    for kidnapping in scenario.kidnappings:
+        for number, (center, radius) in enumerate(scenario.enlarged(kidnapping.at_s), start=1):
+            gap = distance(kidnapping.to_m, center) - radius
+            if gap < 0.0:
+                raise ConfigError(
+                    f"kidnapping to_m={list(kidnapping.to_m)}: {-gap:.3g} m inside obstacle "
+                    f"{number} at {kidnapping.at_s:g} s (radii added); choose a free place"
+                )
 
 
 @lru_cache(maxsize=4096)

@@ -15,6 +15,7 @@ from ..core.bat import Algorithm
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean, override, walk
 from ..core.planner import Method, PlannerParams
+from ..core.robot import Robot
 from ..core.sensing import SensorParams
 from ..paper import readings
 from ..planners.predictive import preset
@@ -140,7 +141,7 @@ def add_set_argument(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME=VALUE",
         dest="settings",
-        help="an option of planner or sensor, such as planner.bat.population=30; "
+        help="an option of planner, sensor or robot, such as planner.bat.population=30; "
         "`mfba options` lists them",
     )
 
@@ -154,9 +155,13 @@ def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
         planner = override(planner, {"bat.algorithm": found.algorithm})
     if found.planner == Method.PREDICTIVE.value:
         planner = preset(replace(planner, method=Method.PREDICTIVE))
-    planner, sensor = with_settings(planner, SensorParams(), found.settings)
+    scenario = load_scenario(found.scenario)
+    of_robot = [text for text in found.settings if text.startswith("robot.")]
+    rest = [text for text in found.settings if text not in of_robot]
+    planner, sensor = with_settings(planner, SensorParams(), rest)
+    robot = override(scenario.robot, _below("robot", dict(map(_setting, of_robot))))
     return RunConfig(
-        scenario=load_scenario(found.scenario),
+        scenario=replace(scenario, robot=robot),
         planner=planner,
         sensor=sensor,
         seed=found.seed,
@@ -169,6 +174,8 @@ def with_settings(
 ) -> tuple[PlannerParams, SensorParams]:
     """Both with NAME=VALUE changes of --set; ConfigError for what cannot be set so."""
     changes = dict(map(_setting, settings))
+    for name in _below("robot", changes):
+        raise ConfigError(f"--set robot.{name}: the scenario says that here; leave it out")
     return (
         override(planner, _below("planner", changes)),
         override(sensor, _below("sensor", changes)),
@@ -177,7 +184,11 @@ def with_settings(
 
 def option_rows() -> Iterable[tuple[str, Any, Any]]:
     """(name for --set, default, Spec) of every option."""
-    for group, defaults in (("planner", PlannerParams()), ("sensor", SensorParams())):
+    for group, defaults in (
+        ("planner", PlannerParams()),
+        ("sensor", SensorParams()),
+        ("robot", Robot()),
+    ):
         for name, value, item in walk(defaults):
             yield f"{group}.{name}", value, item.metadata["spec"]
 

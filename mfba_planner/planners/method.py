@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The planner that the parameters name, as the nodes run it: on sectors alone."""
+"""The planner that the parameters name, as the nodes run it: on sectors, maybe with a scan."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..core.episode import Episode, World, run
+from ..core.episode import Episode, World, look, look_at_scan, run
 from ..core.guarded import Guarded
 from ..core.planner import Method, Planner, PlannerParams
 from ..core.sensing import SensorParams
@@ -36,4 +36,5 @@ def simulate(
         seed=seed,
         go_on=go_on,
         brain=brain(planner, sensor, seed),
+        look=look_at_scan if planner.tracks_scan else look,
     )

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..core.episode import World, sense
 from ..core.errors import ConfigError
-from ..core.geometry import Point, Pose2D, distance
+from ..core.geometry import Pose2D, distance
+from ..core.lidar import cast_rays
 from ..core.options import did_you_mean
 from ..core.planner import Circle, Observation
 from ..core.sensing import Ranges, Scan, SensorParams, sense_scan
@@ -140,37 +140,3 @@ class Perception:
     def _noise(self, stamp_ns: int, count: int) -> np.ndarray:
         sequence = np.random.SeedSequence(self.seed, spawn_key=(SENSOR_STREAM, stamp_ns))
         return np.random.Generator(np.random.PCG64(sequence)).normal(0.0, self.noise_m, count)
-
-
-_RAYS: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-
-
-def rays(beams: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cosines and sines of n beams along the middles of n equal sectors, each (n,)."""
-    if beams not in _RAYS:
-        angles = (np.arange(beams) + 0.5) * (2.0 * math.pi / beams)
-        _RAYS[beams] = np.cos(angles), np.sin(angles)
-    return _RAYS[beams]
-
-
-def cast_rays(
-    position: Point, circles: Sequence[tuple[float, float, float]], beams: int, longest_m: float
-) -> np.ndarray:
-    """Range of each beam to the nearest circle (x, y, radius), inf beyond longest_m; (n,), m.
-
-    From within a circle every beam starts at its surface: 0.
-    """
-    if not circles:
-        return np.full(beams, np.inf)
-    c, s = rays(beams)
-    x, y, r = np.array(circles).T[:, :, None]
-    x, y = x - position[0], y - position[1]
-    along = x * c + y * s
-    outside = x * x + y * y - r * r
-    under_root = along * along - outside
-    ranges = along - np.sqrt(np.maximum(under_root, 0.0))
-    ranges[(under_root < 0.0) | (along <= 0.0)] = np.inf
-    ranges[np.broadcast_to(outside <= 0.0, ranges.shape)] = 0.0
-    nearest = ranges.min(axis=0)
-    nearest[nearest > longest_m] = np.inf
-    return nearest

@@ -171,7 +171,8 @@ class Predictive(Steering):
             return moved(known, (obs.stamp_ns - stamp_ns) * NANO)
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
-            return self._tracker.circles(obs.stamp_ns, self.options.robot_radius_m)
+            radius_m = self.params.scan_radius_m or self.options.robot_radius_m
+            return self._tracker.circles(obs.stamp_ns, radius_m)
         return from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
     def _nearest(self, closed: Bits, to_goal: Point) -> list[int]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
+from ..core.jump import JumpWatch, explained
 from ..core.planner import (
     NANO,
     Decision,
@@ -56,6 +57,7 @@ class Steering:
         self.params = params
         self.sensor = sensor
         self.seed = seed
+        self._watch = JumpWatch()
         self.tick_s = params.tick_ns * NANO
         self.reset()
 
@@ -73,7 +75,10 @@ class Steering:
         raise NotImplementedError
 
     def plan(self, obs: Observation) -> Decision:
-        """Answer one observation and remember the mode."""
+        """Answer one observation and remember the mode; who was carried off begins anew."""
+        carried = self._watch.noticed(obs, self.params, self.mode)
+        if carried:
+            self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
             self._goal = obs.goal
@@ -87,7 +92,7 @@ class Steering:
                 reason = f"goal was reached before; {reason}"
             move = Move(velocity=(0.0, 0.0), reason=reason, event=event)
         self.mode = transition(self.mode, move.event)
-        return self._decision(obs, move)
+        return explained(self._decision(obs, move), carried)
 
     def straight(self, position: Point, target: Point, speed_mps: float) -> Point:
         """The velocity that leads to the target at most at this speed, and not beyond it."""

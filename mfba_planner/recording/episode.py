@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from mfba_planner.core.digest import Digest
 from mfba_planner.core.episode import Episode, Outcome, World
+from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.metrics import Result, Tally
 from mfba_planner.core.options import flatten, override
 from mfba_planner.core.planner import Decision, PlannerParams
@@ -17,14 +19,17 @@ from mfba_planner.core.world import Scenario
 from mfba_planner.scenarios import load_scenario
 
 from ..core.errors import BagError, ConfigError, InputError
+from ..messages import robot_pose, stamp_ns
 from .configuration import read_configuration
 from .decisions import rising_decisions, stream_decisions
 from .reader import BagReader
 
 T = TypeVar("T")
 
+TRUTH = "/ground_truth"
+
 # Options younger than the oldest bags: what they default to is what was done then.
-LATER = ("method", "caution.", "recovery.")
+LATER = ("method", "jump_m", "scan_radius_m", "caution.", "recovery.")
 
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
@@ -38,7 +43,9 @@ def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
         ticks: dict[int, Decision] = {}
         for found, _ in stream_decisions(reader):
             ticks.setdefault(found.stamp_ns, found)
-    return setup.episode(tuple(ticks[stamp] for stamp in sorted(ticks)))
+        truth = _truth(reader)
+    decisions = tuple(ticks[stamp] for stamp in sorted(ticks))
+    return setup.episode(decisions, truth)
 
 
 def summarize(path: str | Path, *, salvage: bool = False) -> tuple[Episode, Result, str]:
@@ -47,14 +54,14 @@ def summarize(path: str | Path, *, salvage: bool = False) -> tuple[Episode, Resu
     Streams; raises as read_episode does, and where the stamp of a decision goes back.
     """
     with BagReader(path, salvage=salvage) as reader:
-        setup = read_setup(reader)
+        setup, truth = read_setup(reader), _truth(reader)
         stream = (found for found, _ in rising_decisions(reader))
         first = next(stream)  # or it raises
         tally, hashed = Tally(setup.episode((first,))), Digest()
         for tick in chain([first], stream):
-            tally.add(tick)
+            tally.add(tick, truth.get(tick.stamp_ns))
             hashed.add(tick)
-    episode = setup.episode((tick,))
+    episode = setup.episode((tick,), truth)
     return episode, tally.result(episode.outcome), hashed.hexdigest()
 
 
@@ -69,8 +76,10 @@ class Setup(NamedTuple):
     lockstep: bool
     odom_frame: str = ""  # that its inputs must be in; "": any
 
-    def episode(self, ticks: tuple[Decision, ...]) -> Episode:
-        """The Episode of these decisions, at least one."""
+    def episode(self, ticks: tuple[Decision, ...], truth: Mapping[int, Pose2D] = {}) -> Episode:
+        """The Episode of these decisions, at least one; truth is where the robot was, by stamp."""
+        true = tuple(truth.get(tick.stamp_ns, tick.pose) for tick in ticks) if truth else ()
+        last = true[-1] if true else ticks[-1].pose
         return Episode(
             scenario=self.scenario,
             sensor=self.sensor,
@@ -78,7 +87,8 @@ class Setup(NamedTuple):
             seed=self.seed,
             driver=self.driver,
             ticks=ticks,
-            outcome=_outcome(self.scenario, self.planner, ticks),
+            outcome=_outcome(self.scenario, self.planner, ticks[-1].stamp_ns, last),
+            truth=true,
         )
 
 
@@ -113,8 +123,19 @@ def _only(defaults: T, values: dict[str, Any]) -> T:
     return override(defaults, {name: values[name] for name in told})
 
 
-def _outcome(scenario: Scenario, params: PlannerParams, ticks: tuple[Decision, ...]) -> Outcome:
+def _truth(reader: BagReader) -> dict[int, Pose2D]:
+    """Where the robot really was, by stamp, in a bag that says so."""
+    if TRUTH not in reader.topics:
+        return {}
+    said = (message.message for message in reader.decoded([TRUTH]))
+    try:
+        return {stamp_ns(odom.header.stamp): robot_pose(odom) for odom in said}
+    except InputError as error:
+        raise BagError(f"{reader.path}: {TRUTH}: {error}") from None
+
+
+def _outcome(scenario: Scenario, params: PlannerParams, last_ns: int, last: Pose2D) -> Outcome:
     """How the run ended, judged as the simulated world judges it."""
     world = World(scenario, params.tick_ns, params.goal_tolerance_m)
-    world.tick, world.pose = ticks[-1].stamp_ns // params.tick_ns - 1, ticks[-1].pose
+    world.tick, world.pose = last_ns // params.tick_ns - 1, last
     return world.outcome() or Outcome.INTERRUPTED

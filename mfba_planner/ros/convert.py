@@ -17,11 +17,15 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
 from ..core.episode import Outcome
-from ..core.geometry import Point, Pose2D
+from ..core.geometry import Point, Pose2D, half_turn
+from ..core.jump import carried_off
 from ..core.planner import Decision, Mode
-from ..core.sensing import Bits, Ranges, SensorParams, longest_range_m
-from ..messages import SECOND_NS, bits_text, points_text, rotated
+from ..core.robot import Base
+from ..core.sensing import Bits, Ranges, Scan, SensorParams, longest_range_m
+from ..messages import SECOND_NS, bits_text, body_velocity, points_text, rotated
 from .health import Status
+
+OMNIDIRECTIONAL = Base()
 
 # Messages are made whole and then filled in: a value handed to a constructor is built twice, as
 # rclpy's message classes build the default as well.
@@ -50,7 +54,7 @@ def set_pose(pose: Pose, x: float, y: float, yaw_rad: float = 0.0) -> Pose:
     """Fill in a planar pose (REP-103); return it."""
     pose.position.x, pose.position.y = x, y
     if yaw_rad:  # the default is no turn at all
-        pose.orientation.z, pose.orientation.w = math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad)
+        pose.orientation.z, pose.orientation.w = half_turn(yaw_rad)
     return pose
 
 
@@ -67,7 +71,12 @@ def clock_msg(stamp_ns: int) -> Clock:
 
 
 def odometry_msg(
-    pose: Pose2D, velocity: Point, stamp_ns: int, frame_id: str, child_frame_id: str
+    pose: Pose2D,
+    velocity: Point,
+    stamp_ns: int,
+    frame_id: str,
+    child_frame_id: str,
+    turn_radps: float = 0.0,
 ) -> Odometry:
     """The robot's pose in frame_id; velocity (odom frame, m/s) is given in the body frame."""
     message = Odometry()
@@ -76,6 +85,18 @@ def odometry_msg(
     set_pose(message.pose.pose, *pose)
     linear = message.twist.twist.linear
     linear.x, linear.y = rotated(velocity, -pose.yaw)
+    message.twist.twist.angular.z = turn_radps
+    return message
+
+
+def scan_msg(scan: Scan, stamp_ns: int, frame_id: str) -> LaserScan:
+    """A scan of a simulated lidar; all beams are of one moment."""
+    message = LaserScan()
+    set_header(message.header, stamp_ns, frame_id)
+    message.angle_min, message.angle_increment = scan.angle_min_rad, scan.angle_increment_rad
+    message.angle_max = scan.angle_min_rad + (scan.ranges_m.size - 1) * scan.angle_increment_rad
+    message.range_min, message.range_max = scan.range_min_m, scan.range_max_m
+    message.ranges = array("f", scan.ranges_m)
     return message
 
 
@@ -138,16 +159,19 @@ def plan_msg(decision: Decision, frame_id: str) -> Path:
     return path_msg(points, decision.stamp_ns, frame_id)
 
 
-def twist_msg(decision: Decision) -> Twist:
-    """The goal step as a velocity in the body frame (m/s)."""
+def twist_msg(decision: Decision, base: Base = OMNIDIRECTIONAL, tick_ns: int = 0) -> Twist:
+    """The goal step as a velocity in the body frame (m/s, rad/s), as the base can drive it."""
     message = Twist()
-    message.linear.x, message.linear.y = rotated(decision.velocity, -decision.pose.yaw)
+    linear = message.linear
+    linear.x, linear.y, message.angular.z = body_velocity(decision, base, tick_ns)
     return message
 
 
-def twist_stamped_msg(decision: Decision, frame_id: str) -> TwistStamped:
+def twist_stamped_msg(
+    decision: Decision, frame_id: str, base: Base = OMNIDIRECTIONAL, tick_ns: int = 0
+) -> TwistStamped:
     """The same with a stamp, as Nav2's enable_stamped_cmd_vel."""
-    message = TwistStamped(twist=twist_msg(decision))
+    message = TwistStamped(twist=twist_msg(decision, base, tick_ns))
     set_header(message.header, decision.stamp_ns, frame_id)
     return message
 
@@ -179,6 +203,8 @@ def decision_msg(
     }
     status = DiagnosticStatus(level=_LEVELS.get(decision.mode, DiagnosticStatus.OK), name=name)
     status.message = decision.reason
+    if carried_off(decision.reason) and status.level == DiagnosticStatus.OK:
+        status.level = DiagnosticStatus.WARN
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     message = DiagnosticArray(status=[status])
     set_stamp(message.header.stamp, decision.stamp_ns)

@@ -96,4 +96,4 @@ def _tick_messages(
     law = episode.label
     yield topics.DECISION, convert.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
     yield topics.GOAL_STEP, convert.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
-    yield topics.CMD_VEL, convert.twist_msg(tick)
+    yield topics.CMD_VEL, convert.twist_msg(tick, scenario.robot, episode.planner.tick_ns)

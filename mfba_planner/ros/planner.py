@@ -20,6 +20,7 @@ from .managed import ManagedNode
 from .planner_health import PlannerHealth
 from .planner_topics import PlannerTopics
 from .runtime import Refusals, spin_node
+from .sight import Sight
 
 
 class PlannerNode(ManagedNode):
@@ -33,6 +34,8 @@ class PlannerNode(ManagedNode):
         params.follow(self, lambda: self.brain.params, self._set_params)
         self._refusals = Refusals(self)
         self.goals = Goals(self, s.odom_frame, self._refusals, self._is_over, self._set_out)
+        params_now = self.brain.params
+        self._sight = Sight(self, self._refusals, self._on_sectors, params_now, s.scan_yaw)
         self._health = PlannerHealth(self, s, self._refusals)
         self._forget()
         self.on_time_set_back(self._start_afresh)
@@ -44,9 +47,9 @@ class PlannerNode(ManagedNode):
     def set_up(self) -> None:
         """Advertise and subscribe."""
         s = self.settings
-        self._say = PlannerTopics(self, s)
+        self._say = PlannerTopics(self, s, lambda: self.brain.params.tick_ns)
         self.listen(topics.ODOM, self._on_odom, from_anyone=not s.lockstep)
-        self.listen(topics.SECTORS, self._on_sectors)
+        self._sight.listen()
         self.goals.listen()
 
     def halt(self) -> None:
@@ -82,6 +85,7 @@ class PlannerNode(ManagedNode):
 
     def _forget(self) -> None:
         self.brain.reset()
+        self._sight.forget()
         self._pose = Pose2D(0.0, 0.0)  # the last that could be used
         self._last: Decision | None = None
         self._inputs: Lockstep | Newest = Lockstep() if self.settings.lockstep else Newest()
@@ -135,9 +139,7 @@ class PlannerNode(ManagedNode):
         goal = self.goals.next_from(pose, self.brain.params.goal_tolerance_m)
         seen = observe(stamp, pose, ranges, goal, self._pose, round(age_s / NANO))
         self._pose = seen.pose
-        self._last = decision = self.brain.plan(seen)
-        if decision.mode is Mode.STOPPED:
-            self.get_logger().warning(decision.reason, throttle_duration_sec=1.0)
+        self._last = decision = self.brain.plan(self._sight.seen(seen))
         more = {"errand": str(self.goals.errands.number), "leg": self.goals.errands.leg}
         self._say.decided(decision, self.brain.params.label, self._refusals.count, more)
         self._health.decided(decision, self.brain, self.goals.errands, self.state)

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
 
 from ..core.geometry import Point
-from ..core.planner import NANO, Decision
+from ..core.jump import carried_off
+from ..core.planner import NANO, Decision, Mode
 from ..node_settings import PlannerSettings
 from . import convert, markers, topics
 from .health import Status
@@ -19,9 +20,12 @@ from .runtime import GraphNode
 class PlannerTopics:
     """The publishers of planner."""
 
-    def __init__(self, node: GraphNode, settings: PlannerSettings) -> None:
-        """Advertise them all."""
-        self._settings = settings
+    def __init__(
+        self, node: GraphNode, settings: PlannerSettings, tick_ns: Callable[[], int]
+    ) -> None:
+        """Advertise them all; cmd_vel is what the base is told for a tick."""
+        self._settings, self._tick_ns = settings, tick_ns
+        self._log = node.get_logger()
         self._who = node.get_fully_qualified_name()
         self._goal_step = node.advertise(topics.GOAL_STEP)
         self._plan = node.advertise(topics.PLAN)
@@ -37,6 +41,8 @@ class PlannerTopics:
     ) -> None:
         """What the world waits for first, everything about the decision while it moves on."""
         self.move(decision)
+        if decision.mode is Mode.STOPPED or carried_off(decision.reason):
+            self._log.warning(decision.reason, throttle_duration_sec=1.0)
         frame = self._settings.odom_frame
         self._plan.publish(convert.plan_msg(decision, frame))
         reason = convert.decision_msg(decision, algorithm, refused, self._who, more)
@@ -46,12 +52,13 @@ class PlannerTopics:
 
     def move(self, decision: Decision) -> None:
         """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
-        s, stamp = self._settings, decision.stamp_ns
+        s, stamp, tick_ns = self._settings, decision.stamp_ns, self._tick_ns()
         self._goal_step.publish(convert.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame))
         if s.enable_stamped_cmd_vel:
-            self._cmd_vel.publish(convert.twist_stamped_msg(decision, s.base_frame))
+            twist = convert.twist_stamped_msg(decision, s.base_frame, s, tick_ns)
+            self._cmd_vel.publish(twist)
         else:
-            self._cmd_vel.publish(convert.twist_msg(decision))
+            self._cmd_vel.publish(convert.twist_msg(decision, s, tick_ns))
 
     def halt(self, place: Point, stamp_ns: int) -> None:
         """Command rest, here, without having decided anything."""

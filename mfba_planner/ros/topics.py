@@ -67,6 +67,13 @@ ODOM = Topic(
     least_qos=SENSOR_QOS,
     every_tick=True,
 )
+GROUND_TRUTH = Topic(
+    # where the robot is, while its odometry errs
+    name="ground_truth",
+    type=Odometry,
+    writers=(WORLD_SIM,),
+    qos=TICK_QOS,
+)
 OBSTACLES = Topic(
     name="obstacles",
     type=PoseArray,
@@ -78,6 +85,7 @@ OBSTACLES = Topic(
 SCAN = Topic(
     name="scan",
     type=LaserScan,
+    writers=(WORLD_SIM,),  # where the simulated robot has a lidar
     readers=(VIRTUAL_SENSOR,),
     qos=TICK_QOS,
     least_qos=SENSOR_QOS,  # most lidars
@@ -147,6 +155,7 @@ MARKERS = Topic(name="markers", type=MarkerArray, writers=(WORLD_SIM, PLANNER), 
 GRAPH: tuple[Topic, ...] = (
     CLOCK,
     ODOM,
+    GROUND_TRUTH,
     OBSTACLES,
     SCAN,
     SECTORS,

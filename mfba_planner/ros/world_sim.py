@@ -12,13 +12,13 @@ from std_srvs.srv import SetBool, Trigger
 from ..core.episode import World
 from ..core.errors import InputError
 from ..core.planner import NANO
-from ..messages import pose2d, rotated, velocity
+from ..messages import pose2d, told
 from ..node_settings import WorldSimSettings, names
-from ..scenarios import load_scenario, scenario_to_json
 from . import params, topics
 from .answer_topics import AnswerTopics
 from .pace import Pace
 from .runtime import GraphNode, Refusals, spin_node
+from .world_params import declare_scenario
 from .world_topics import WorldTopics
 
 
@@ -29,12 +29,11 @@ class WorldSim(GraphNode):
         """Raise ConfigError for a scenario or parameter that cannot be accepted."""
         super().__init__(topics.WORLD_SIM, **kwargs)
         self.settings = s = params.declare(self, WorldSimSettings(), read_only=True)
-        self.scenario = load_scenario(s.scenario)
-        params.state(self, "scenario_json", scenario_to_json(self.scenario), "scenario in full")
+        self.scenario = declare_scenario(self, s.scenario)
         self.over, self._ticks_before_reset = False, 0
         self.pace = Pace(s)
         self._refusals = Refusals(self)
-        self._out = WorldTopics(self, s)
+        self._out = WorldTopics(self, s, self.scenario.robot)
         self._answers = AnswerTopics(self, s, self._obey, self._look_for_answer)
         self.listen(topics.INITIALPOSE, self._on_initialpose)
         self.create_service(SetBool, "~/pause", self._on_pause)
@@ -60,18 +59,19 @@ class WorldSim(GraphNode):
                 self._move_on()
 
     def _begin(self) -> None:
-        self.world = World(self.scenario, self.settings.tick_ns, self.settings.goal_tolerance_m)
+        s = self.settings
+        self.world = World(self.scenario, s.tick_ns, s.goal_tolerance_m, s.seed)
         self.over, self._published = False, False
-        self._velocity = (0.0, 0.0)
+        self._told = (0.0, 0.0)
         self._out.begin(self.scenario.goal_m, self.stamp_ns)
 
     def _move_on(self) -> None:
-        """Apply the newest velocity and publish the next tick, unless the run is over."""
+        """Do what was told last and publish the next tick, unless the run is over."""
         outcome = None if self.settings.run_on else self.world.outcome()
         if not self._published:
             self._publish_tick()
         elif outcome is None:
-            self.world.step(self._velocity)
+            self.world.step(self._told)
             self._publish_tick()
         else:
             self.over = True
@@ -81,12 +81,12 @@ class WorldSim(GraphNode):
     def _publish_tick(self) -> None:
         self._published = True
         self.pace.published(time.monotonic())
-        self._out.tick(self.world, self._velocity, self.stamp_ns)
+        self._out.tick(self.world, self._told, self.stamp_ns)
 
     def _on_timer(self) -> None:
         """Real time: one more tick; the first when everybody of wait_for is there."""
         if not self.pace.paused and not self.over and (self._published or not self.missing()):
-            self._velocity = self._answers.still_holds(self._velocity)
+            self._told = self._answers.still_holds(self._told)
             self._move_on()
 
     def _watch(self) -> None:
@@ -97,7 +97,7 @@ class WorldSim(GraphNode):
                 self._publish_tick()
         elif self.pace.must_repeat(time.monotonic(), self.world.tick):
             self.get_logger().warning(f"tick {self.world.tick} unanswered: published again")
-            self._out.tick(self.world, self._velocity, self.stamp_ns)
+            self._out.tick(self.world, self._told, self.stamp_ns)
 
     def _look_for_answer(self) -> None:
         message = self._answers.take(self.stamp_ns) if self.pace.is_open else None
@@ -108,15 +108,15 @@ class WorldSim(GraphNode):
                 self._move_on()
 
     def _obey(self, message: Any) -> None:
-        self._velocity = (0.0, 0.0)
+        self._told = (0.0, 0.0)
         try:
-            self._velocity = rotated(velocity(message)[:2], self.world.pose.yaw)
+            self._told = told(message, self.scenario.robot, self.world.pose.yaw)
         except InputError as error:
             self._refusals.add(error)
 
     def _on_initialpose(self, message: PoseWithCovarianceStamped) -> None:
         try:
-            self.world.pose = pose2d(message.pose.pose, "initialpose")
+            self.world.put(pose2d(message.pose.pose, "initialpose"))
         except InputError as error:
             self._refusals.add(error)
 

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 from ..core.episode import Outcome, World
-from ..core.geometry import Point
+from ..core.geometry import Point, towards
+from ..core.robot import Robot
 from ..node_settings import WorldSimSettings
 from . import convert, markers, topics
 from .runtime import GraphNode
@@ -17,12 +19,18 @@ TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is 
 class WorldTopics:
     """The publishers of world_sim."""
 
-    def __init__(self, node: GraphNode, settings: WorldSimSettings) -> None:
+    def __init__(self, node: GraphNode, settings: WorldSimSettings, robot: Robot) -> None:
         """Advertise them all."""
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
         self._clock = node.advertise(topics.CLOCK)
         self._odom = node.advertise(topics.ODOM)
-        self._obstacles = node.advertise(topics.OBSTACLES)
+        errs = robot.noise.of_odometry
+        self._truth = node.advertise(topics.GROUND_TRUTH) if errs else None
+        # Of a robot with a lidar the sensor takes the scan; obstacles are for people and bags.
+        self._scan_frame = settings.scan_frame
+        self._scan = node.advertise(topics.SCAN) if robot.lidar.beams else None
+        seen_by = () if self._scan else topics.OBSTACLES.readers
+        self._obstacles = node.advertise(replace(topics.OBSTACLES, readers=seen_by))
         self._goal = node.advertise(topics.GOAL_POSE)
         self._outcome = node.advertise(topics.OUTCOME)
         self._trail = node.advertise(topics.TRAIL)
@@ -48,13 +56,27 @@ class WorldTopics:
 
     def tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
         """One tick under one stamp; odom completes the sensor's pair, views can wait."""
-        frame = self._frame
+        frame, reading = self._frame, world.read()
         centers = world.scenario.centers(world.time_s)
-        odom = convert.odometry_msg(world.pose, velocity, stamp_ns, frame, self._base_frame)
+        turn = 0.0
+        if world.scenario.robot.turns:
+            velocity, turn = (
+                towards((0.0, 0.0), reading.pose.yaw, world.speeds.v),
+                world.speeds.omega,
+            )
+        odom = convert.odometry_msg(
+            reading.pose, velocity, stamp_ns, frame, self._base_frame, turn
+        )
         self._clock.publish(convert.clock_msg(stamp_ns))
         self._obstacles.publish(convert.obstacles_msg(centers, stamp_ns, frame))
         if self._tf:
             self._tf.publish(markers.tf_msg(odom))
+        if self._truth:
+            self._truth.publish(
+                convert.odometry_msg(world.pose, velocity, stamp_ns, frame, self._base_frame, turn)
+            )
+        if self._scan and reading.scan:
+            self._scan.publish(convert.scan_msg(reading.scan, stamp_ns, self._scan_frame))
         self._odom.publish(odom)
         if self._view.due(stamp_ns):
             self._path.append(world.pose.position)

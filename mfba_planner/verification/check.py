@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,18 +13,19 @@ from typing import Any
 from ..core.digest import digest
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner import Decision, Mode, observe
-from ..core.sensing import sense_circles, sensory_vector
-from ..messages import decision as read_decision
+from ..core.planner import Decision, Mode, Observation, observe
+from ..core.sensing import aligned, sense_circles, sense_scan, sensory_vector
 from ..messages import (
+    body_velocity,
     decision_value,
+    laser_scan,
     obstacle_centers,
     or_refused,
     robot_pose,
-    rotated,
     sector_ranges,
     velocity,
 )
+from ..messages import decision as read_decision
 from ..planners.method import brain
 from ..recording.episode import Setup, read_setup
 from ..recording.integrity import check_data
@@ -34,6 +35,7 @@ from .evidence import (
     DECISION,
     OBSTACLES,
     ODOM,
+    SCAN,
     SECTORS,
     STEP,
     TWIST,
@@ -123,7 +125,7 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         observation = observe(tick.stamp_ns, seen, ranges, goal, pose)
         pose = observation.pose
         recorded.append(was)
-        decided.append(planner.plan(observation))
+        decided.append(planner.plan(_with_scan(setup, tick, observation)))
         faults += _contradictions(setup, tick, was)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
@@ -137,6 +139,14 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
     )
 
 
+def _with_scan(setup: Setup, tick: Tick, obs: Observation) -> Observation:
+    """What a planner that tracks scans was shown besides."""
+    if not setup.planner.tracks_scan or obs.refused or SCAN not in tick.said:
+        return obs
+    yaw = obs.pose.yaw + setup.scenario.robot.lidar.yaw_rad
+    return replace(obs, scan=aligned(laser_scan(tick.said[SCAN]), yaw))
+
+
 def _contradictions(setup: Setup, tick: Tick, was: Decision) -> list[str]:
     """What other topics say about the same tick, where it is not what the decision says."""
     found = []
@@ -144,11 +154,12 @@ def _contradictions(setup: Setup, tick: Tick, was: Decision) -> list[str]:
         (SECTORS, _intensities_agree),
         (VECTOR, _vector_agrees),
         (STEP, _step_agrees),
-        (TWIST, _twist_agrees),
+        (TWIST, partial(_twist_agrees, setup)),
     ):
         if topic in tick.said and not is_so(tick.said[topic], was):
             found.append(f"stamp {tick.stamp_ns} ns: {topic} is not what the decision says")
-    if {OBSTACLES, ODOM} <= tick.said.keys() and not _is_sensed(setup, tick, was):
+    source = SCAN if setup.scenario.robot.lidar.beams else OBSTACLES
+    if {source, ODOM} <= tick.said.keys() and not _is_sensed(setup, tick, was):
         found.append(f"stamp {tick.stamp_ns} ns: {SECTORS} is not what the sensor measures")
     return found
 
@@ -165,18 +176,24 @@ def _step_agrees(step: Any, was: Decision) -> bool:
     return (step.pose.position.x, step.pose.position.y) == was.waypoint
 
 
-def _twist_agrees(twist: Any, was: Decision) -> bool:
-    return bool(or_refused(velocity, twist) == (*rotated(was.velocity, -was.pose.yaw), 0.0))
+def _twist_agrees(setup: Setup, twist: Any, was: Decision) -> bool:
+    told = body_velocity(was, setup.scenario.robot, setup.planner.tick_ns)
+    return bool(or_refused(velocity, twist) == told)
 
 
 def _is_sensed(setup: Setup, tick: Tick, was: Decision) -> bool:
-    """Whether the obstacles of this tick give these sectors (source: obstacles)."""
+    """Whether the obstacles, or the scan, of this tick give these sectors."""
+    scenario, lidar = setup.scenario, setup.scenario.robot.lidar
     try:
-        position = robot_pose(tick.said[ODOM]).position
+        pose = robot_pose(tick.said[ODOM])
+        if lidar.beams:
+            scan, yaw = laser_scan(tick.said[SCAN]), pose.yaw + lidar.yaw_rad
+            return sense_scan(scan, yaw, scenario.robot_radius_m, setup.sensor) == was.ranges_m
         centers = obstacle_centers(tick.said[OBSTACLES])
     except InputError:
         return not was.ranges_m  # blind, as it must be
-    radii = [o.radius_m + setup.scenario.robot_radius_m for o in setup.scenario.obstacles]
+    position = pose.position
+    radii = [o.radius_m + scenario.robot_radius_m for o in scenario.obstacles]
     if len(radii) != len(centers):
         return False
     ranges = sense_circles(position, list(zip(centers, radii)), setup.sensor)

@@ -13,7 +13,7 @@ from ..messages import goal_point, stamp_ns, waypoint_points
 from ..recording.decisions import DECISION, SECTORS, ranges_seen, require_decisions
 from ..recording.reader import BagReader
 
-ODOM, OBSTACLES, VECTOR = "/odom", "/obstacles", "/sensory_vector"
+ODOM, OBSTACLES, VECTOR, SCAN = "/odom", "/obstacles", "/sensory_vector", "/scan"
 GOAL, WAYPOINTS = "/goal_pose", "/waypoints"
 STEP, TWIST = "/goal_step", "/cmd_vel"
 STAMPED = (ODOM, OBSTACLES, SECTORS, STEP, DECISION)
@@ -44,7 +44,7 @@ def gather(reader: BagReader, tick_ns: int | None, frame: str = "") -> Evidence:
     Raises BagError for a bag without decisions, and for one that cannot be read to its end.
     """
     require_decisions(reader)
-    heard: dict[str, list[Any]] = {name: [] for name in (*STAMPED, VECTOR, TWIST)}
+    heard: dict[str, list[Any]] = {name: [] for name in (*STAMPED, SCAN, VECTOR, TWIST)}
     found = Evidence(ticks=[], goals=[])
     for message in reader.decoded([*heard, GOAL, WAYPOINTS]):
         if message.topic in (GOAL, WAYPOINTS):
@@ -52,7 +52,7 @@ def gather(reader: BagReader, tick_ns: int | None, frame: str = "") -> Evidence:
         else:
             heard[message.topic].append(message.message)
     ticks: dict[int, Tick] = {}
-    for topic in STAMPED:
+    for topic in (*STAMPED, SCAN):
         # In real time a later decision on a stamp only says that its inputs have become stale.
         all_alike = bool(tick_ns) or topic not in (DECISION, STEP)
         _join(found, ticks, topic, heard[topic], all_alike=all_alike)
@@ -63,7 +63,7 @@ def gather(reader: BagReader, tick_ns: int | None, frame: str = "") -> Evidence:
     _join_by_order(found, ticks, STEP, heard[STEP], TWIST, heard[TWIST], all_alike=alike)
     found.ticks = [ticks[stamp] for stamp in sorted(ticks)]
     if tick_ns:
-        _look_for_gaps(found, tick_ns)
+        _look_for_gaps(found, tick_ns, (*STAMPED, *([SCAN] if heard[SCAN] else []), TWIST))
     return found
 
 
@@ -134,7 +134,7 @@ def _join_by_order(
             found.faults.append(f"{topic}: stamp {stamp} ns is there twice, and not alike")
 
 
-def _look_for_gaps(found: Evidence, tick_ns: int) -> None:
+def _look_for_gaps(found: Evidence, tick_ns: int, needed: tuple[str, ...]) -> None:
     """In lockstep each tick follows the other, and each has all its messages."""
     first = found.ticks[0].stamp_ns
     if first > tick_ns:
@@ -148,6 +148,6 @@ def _look_for_gaps(found: Evidence, tick_ns: int) -> None:
                 f"{missing - 1} ticks are missing between {a.stamp_ns} and {b.stamp_ns} ns"
             )
     for tick in found.ticks[:-1]:  # the last one may have been cut off
-        absent = [topic for topic in (*STAMPED, TWIST) if topic not in tick.said]
+        absent = [topic for topic in needed if topic not in tick.said]
         if absent:
             found.faults.append(f"stamp {tick.stamp_ns} ns: no {', '.join(absent)}")

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A lidar among circles and walls: rays from one point, and the scan they make."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from .geometry import Point, Pose2D
+from .robot import Lidar
+from .sensing import Scan
+from .world import Walls
+
+_RAYS: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+
+def rays(beams: int, turned_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Cosines and sines of n beams along the middles of n equal sectors, each (n,)."""
+    if beams not in _RAYS:
+        angles = (np.arange(beams) + 0.5) * (2.0 * math.pi / beams)
+        _RAYS[beams] = np.cos(angles), np.sin(angles)
+    c, s = _RAYS[beams]
+    if turned_rad == 0.0:
+        return c, s
+    ct, st = math.cos(turned_rad), math.sin(turned_rad)
+    return ct * c - st * s, st * c + ct * s
+
+
+def cast_rays(
+    position: Point,
+    circles: Sequence[tuple[float, float, float]],
+    beams: int,
+    longest_m: float,
+    turned_rad: float = 0.0,
+) -> np.ndarray:
+    """Range of each beam to the nearest circle (x, y, radius), inf beyond longest_m; (n,), m.
+
+    From within a circle every beam starts at its surface: 0.
+    """
+    if not circles:
+        return np.full(beams, np.inf)
+    c, s = rays(beams, turned_rad)
+    x, y, r = np.array(circles).T[:, :, None]
+    x, y = x - position[0], y - position[1]
+    along = x * c + y * s
+    outside = x * x + y * y - r * r
+    under_root = along * along - outside
+    ranges = along - np.sqrt(np.maximum(under_root, 0.0))
+    ranges[(under_root < 0.0) | (along <= 0.0)] = np.inf
+    ranges[np.broadcast_to(outside <= 0.0, ranges.shape)] = 0.0
+    nearest = ranges.min(axis=0)
+    nearest[nearest > longest_m] = np.inf
+    return nearest
+
+
+def cast_walls(position: Point, walls: Walls, beams: int, turned_rad: float = 0.0) -> np.ndarray:
+    """Range of each beam to the walls' rectangle, from within or without; inf beside it; (n,)."""
+    enter, leave = np.full(beams, -np.inf), np.full(beams, np.inf)
+    for here, low, high, slope in zip(
+        position, walls.lower_m, walls.upper_m, rays(beams, turned_rad)
+    ):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            a, b = (low - here) / slope, (high - here) / slope
+        enter = np.fmax(enter, np.fmin(a, b))  # fmin passes over 0/0, a ray along the wall
+        leave = np.fmin(leave, np.fmax(a, b))
+    met = np.where(enter > 0.0, enter, leave)
+    return np.where((enter <= leave) & (leave > 0.0), met, np.inf)
+
+
+def scan_at(
+    pose: Pose2D,
+    lidar: Lidar,
+    circles: Sequence[tuple[float, float, float]],
+    walls: Walls | None,
+) -> Scan:
+    """The scan of real surfaces from this pose, in the lidar's own frame.
+
+    As in REP-117: +inf beyond range_max, -inf nearer than range_min. All numbers are what a
+    LaserScan can carry, single precision.
+    """
+    turned = pose.yaw + lidar.yaw_rad
+    ranges = cast_rays(pose.position, circles, lidar.beams, math.inf, turned)
+    if walls is not None and lidar.walls:
+        ranges = np.minimum(ranges, cast_walls(pose.position, walls, lidar.beams, turned))
+    increment = 2.0 * math.pi / lidar.beams
+    return Scan(
+        ranges_m=limited(ranges, lidar),
+        angle_min_rad=_single(0.5 * increment),
+        angle_increment_rad=_single(increment),
+        range_min_m=_single(lidar.range_min_m),
+        range_max_m=_single(lidar.range_max_m),
+    )
+
+
+def limited(ranges_m: np.ndarray, lidar: Lidar) -> np.ndarray:
+    """What a lidar says of these ranges: too far is +inf, too near -inf; single precision."""
+    far, near = ranges_m > lidar.range_max_m, ranges_m < lidar.range_min_m
+    said = np.where(far, np.inf, np.where(near, -np.inf, ranges_m))
+    return said.astype(np.float32).astype(np.float64)
+
+
+def _single(value: float) -> float:
+    return float(np.float32(value))

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What kind of robot drives: its base and limits, its lidar, how much its sensors err."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from .errors import ConfigError
+from .options import check, option
+
+FEWEST_BEAMS = 12
+
+
+class Drive(Enum):
+    """How a base moves: in any direction at once (the paper), or as a unicycle."""
+
+    OMNIDIRECTIONAL = "omnidirectional"
+    DIFFERENTIAL = "differential"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Base:
+    """The robot's base; the limits are a differential one's, Nav2's defaults where it has any."""
+
+    drive: Drive = option(Drive.OMNIDIRECTIONAL, "omnidirectional (the paper), or differential")
+    max_speed_mps: float = option(
+        1.0, "differential: highest speed", unit="m/s", minimum=0.01, maximum=100.0
+    )
+    max_turn_radps: float = option(
+        2.84, "differential: highest rate of turn", unit="rad/s", minimum=0.01, maximum=100.0
+    )
+    max_accel_mps2: float = option(
+        2.5, "differential: highest acceleration", unit="m/s^2", minimum=0.01, maximum=1000.0
+    )
+    max_turn_accel_radps2: float = option(
+        3.2, "differential: highest change of turn", unit="rad/s^2", minimum=0.01, maximum=1000.0
+    )
+    turn_first_rad: float = option(
+        0.8, "differential: heading error from which it turns in place", unit="rad",
+        minimum=0.05, maximum=1.5,
+    )  # fmt: skip
+    reverse: bool = option(True, "differential: drives backwards where that is less of a turn")
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+    @property
+    def turns(self) -> bool:
+        """Whether it has a heading of its own."""
+        return self.drive is Drive.DIFFERENTIAL
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lidar:
+    """A simulated lidar that sees all around, in a frame turned by yaw_rad against base_link."""
+
+    beams: int = option(
+        0, "number of beams; 0: none, the sectors come from obstacles", minimum=0, maximum=1080
+    )
+    range_min_m: float = option(
+        0.12, "nearer is -inf (REP-117)", unit="m", minimum=0.0, maximum=100.0
+    )
+    range_max_m: float = option(
+        3.5, "farther is +inf (REP-117)", unit="m", minimum=0.1, maximum=1000.0
+    )
+    yaw_rad: float = option(
+        0.0, "how its frame is turned in base_link", unit="rad", minimum=-6.4, maximum=6.4
+    )
+    walls: bool = option(False, "sees the walls, which stop obstacles only (and not the robot)")
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+        if 0 < self.beams < FEWEST_BEAMS:
+            raise ConfigError(
+                f"beams={self.beams}: fewer than {FEWEST_BEAMS}; give 0 (no lidar) or more"
+            )
+        if not self.range_min_m < self.range_max_m:
+            raise ConfigError(
+                f"range_min_m={self.range_min_m:g}: not below range_max_m={self.range_max_m:g}; "
+                "lower it"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Noise:
+    """What is wrong with odometry and scan, all of it 0 unless asked for."""
+
+    odom_m: float = option(
+        0.0, "deviation of the position, per axis", unit="m", minimum=0.0, maximum=10.0
+    )
+    odom_rad: float = option(0.0, "deviation of the heading", unit="rad", minimum=0.0, maximum=3.0)
+    odom_loss: float = option(0.0, "share of odometry lost: the last one again", minimum=0.0,
+                              maximum=0.99)  # fmt: skip
+    odom_latency_s: float = option(
+        0.0, "age of odometry, in whole ticks", unit="s", minimum=0.0, maximum=10.0
+    )
+    scan_m: float = option(0.0, "deviation of a range", unit="m", minimum=0.0, maximum=10.0)
+    scan_dropout: float = option(0.0, "share of beams lost: NaN", minimum=0.0, maximum=0.99)
+    scan_loss: float = option(0.0, "share of scans lost: all NaN", minimum=0.0, maximum=0.99)
+    scan_latency_s: float = option(
+        0.0, "age of scans, in whole ticks", unit="s", minimum=0.0, maximum=10.0
+    )
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+    @property
+    def of_odometry(self) -> bool:
+        """Whether the robot may be elsewhere than its odometry says."""
+        return any((self.odom_m, self.odom_rad, self.odom_loss, self.odom_latency_s))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robot(Base):
+    """A base with its instruments."""
+
+    lidar: Lidar = field(default_factory=Lidar)
+    noise: Noise = field(default_factory=Noise)
+
+    @property
+    def base(self) -> Base:
+        """The base alone: all that a planner must know."""
+        return Base(**{name: getattr(self, name) for name in Base.__dataclass_fields__})

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A differential drive: the law, the base that obeys it, and how far both get together."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mfba_planner.core.drive import Speeds, arc, brake, command, obey, track
+from mfba_planner.core.episode import Outcome, World, run
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.geometry import Point, Pose2D, carried, distance
+from mfba_planner.core.planner import Decision, Mode, PlannerParams
+from mfba_planner.core.robot import Base, Drive, Lidar, Noise, Robot
+from mfba_planner.core.world import Scenario
+from mfba_planner.scenarios import load_scenario, parse_scenario, scenario_to_json
+
+TICK_NS = 100_000_000
+ORIGIN = Pose2D(0.0, 0.0)
+BASE = Base(drive=Drive.DIFFERENTIAL)
+angles = st.floats(-math.pi, math.pi)
+
+
+def decision(
+    velocity: tuple[float, float], pose: Pose2D = ORIGIN, goal: Point = (9.0, 9.0)
+) -> Decision:
+    return Decision(
+        stamp_ns=1,
+        mode=Mode.PATH_GENERATION,
+        reason="",
+        pose=pose,
+        goal=goal,
+        ranges_m=(),
+        vs=(),
+        vg=(),
+        gap=0,
+        waypoint=(0.0, 0.0),
+        velocity=velocity,
+    )
+
+
+def test_an_omnidirectional_base_is_told_the_velocity_itself() -> None:
+    assert command(decision((0.3, -0.4)), Base(), TICK_NS) == (0.3, -0.4)
+
+
+def test_ahead_it_drives_and_aside_it_turns_first() -> None:
+    assert track(decision((0.5, 0.0)), BASE, TICK_NS) == (0.5, 0.0)
+    left = track(decision((0.0, 0.5)), BASE, TICK_NS)
+    assert left.v == 0.0
+    assert left.omega > 0.0
+    right = track(decision((0.4, -0.1)), BASE, TICK_NS)
+    assert 0.0 < right.v < 0.5
+    assert right.omega < 0.0
+    assert track(decision((0.0, 0.0)), BASE, TICK_NS) == (0.0, 0.0)
+
+
+def test_behind_it_reverses_only_where_it_may() -> None:
+    back = track(decision((-0.5, 0.05)), BASE, TICK_NS)
+    assert back.v < 0.0
+    assert back.omega < 0.0
+    round_about = track(decision((-0.5, 0.05)), replace(BASE, reverse=False), TICK_NS)
+    assert round_about.v == 0.0
+    assert round_about.omega > 0.0
+
+
+@given(left=st.floats(0.0, 100.0), a=st.floats(0.01, 100.0), held=st.floats(0.001, 2.0))
+def test_from_brakes_speed_one_stops_in_time(left: float, a: float, held: float) -> None:
+    v = brake(left, a, held)
+    assert v * held + v * v / (2.0 * a) == pytest.approx(left, rel=1e-6, abs=1e-9)
+
+
+@given(yaw=angles, v=st.floats(-2.0, 2.0), omega=st.floats(-3.0, 3.0), parts=st.integers(2, 50))
+def test_an_arc_is_the_same_in_one_piece_or_many(
+    yaw: float, v: float, omega: float, parts: int
+) -> None:
+    whole = arc(Pose2D(1.0, 2.0, yaw), v, omega, 0.4)
+    pose = Pose2D(1.0, 2.0, yaw)
+    for _ in range(parts):
+        pose = arc(pose, v, omega, 0.4 / parts)
+    assert (pose.x, pose.y) == pytest.approx((whole.x, whole.y), abs=1e-9)
+    assert math.cos(pose.yaw - whole.yaw) == pytest.approx(1.0)
+
+
+def test_a_quarter_of_a_circle() -> None:
+    pose = arc(Pose2D(0.0, 0.0), 0.5 * math.pi, 0.5 * math.pi, 1.0)
+    assert pose == pytest.approx((1.0, 1.0, 0.5 * math.pi))
+
+
+@given(
+    told=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0)),
+    v=st.floats(-1.0, 1.0),
+    omega=st.floats(-2.84, 2.84),
+)
+def test_limits_hold_whatever_it_is_told(
+    told: tuple[float, float], v: float, omega: float
+) -> None:
+    pose, now = obey(Pose2D(0.0, 0.0), Speeds(v, omega), told, BASE, TICK_NS)
+    assert abs(now.v) <= BASE.max_speed_mps
+    assert abs(now.omega) <= BASE.max_turn_radps
+    assert abs(now.v - v) <= BASE.max_accel_mps2 * 0.1 + 1e-9
+    assert abs(now.omega - omega) <= BASE.max_turn_accel_radps2 * 0.1 + 1e-9
+    assert distance((0.0, 0.0), pose.position) <= 0.1 * BASE.max_speed_mps + 1e-9
+
+
+@pytest.mark.parametrize("goal", [(3.0, 0.0), (-3.0, 0.1), (0.0, -2.0), (-0.5, 0.5)])
+@pytest.mark.parametrize("reverse", [True, False])
+def test_it_arrives_and_stops_there(goal: tuple[float, float], reverse: bool) -> None:
+    robot = Robot(drive=Drive.DIFFERENTIAL, reverse=reverse)
+    scenario = Scenario(name="x", start_m=(0.0, 0.0), goal_m=goal, robot=robot)
+    params = PlannerParams(speed_mps=0.8, step_length_m=0.08)
+    episode = run(scenario, planner=params, seed=1)
+    assert episode.outcome is Outcome.GOAL_REACHED
+    straight = distance((0.0, 0.0), goal)
+    assert len(episode.ticks) * 0.1 < straight / 0.8 + 4.0
+    for a, b in zip(episode.ticks, episode.ticks[1:]):
+        assert distance(a.pose.position, b.pose.position) <= 0.08 + 1e-9
+
+
+def test_who_is_put_elsewhere_is_at_rest() -> None:
+    scenario = replace(load_scenario("empty"), robot=Robot(drive=Drive.DIFFERENTIAL))
+    world = World(scenario, TICK_NS, 0.02)
+    world.step((1.0, 0.5))
+    assert world.speeds.v > 0.0
+    world.put(Pose2D(5.0, 5.0, 1.0))
+    world.step((0.0, 0.0))
+    assert world.pose == (5.0, 5.0, 1.0)
+
+
+def test_a_pose_is_read_as_a_message_carries_it() -> None:
+    pose = Pose2D(1.0, 2.0, 0.0)
+    assert carried(pose) is pose
+    assert carried(Pose2D(1.0, 2.0, 3.0)) == pytest.approx((1.0, 2.0, 3.0))
+
+
+def test_a_scenario_says_which_robot_and_says_it_again_alike() -> None:
+    text = (
+        "{name: x, start_m: [0.0, 0.0], goal_m: [1.0, 1.0], "
+        "robot: {drive: differential, max_turn_radps: 1, lidar: {beams: 720}, "
+        "noise: {odom_m: 0.01}}}"
+    )
+    scenario = parse_scenario(text, "it")
+    assert scenario.robot == Robot(
+        drive=Drive.DIFFERENTIAL,
+        max_turn_radps=1.0,
+        lidar=Lidar(beams=720),
+        noise=Noise(odom_m=0.01),
+    )
+    assert scenario.robot.base == Base(drive=Drive.DIFFERENTIAL, max_turn_radps=1.0)
+    assert parse_scenario(scenario_to_json(scenario), "again") == scenario
+    assert "robot" not in scenario_to_json(replace(scenario, robot=Robot())).replace(
+        "robot_radius_m", ""
+    )
+
+
+@pytest.mark.parametrize(
+    ("robot", "reason"),
+    [
+        ("{drive: legs}", r"robot.drive='legs': unknown; choose one of omnidirectional, diff"),
+        ("{max_speed_mps: 0.0}", r"robot.max_speed_mps=0.0: out of range; give a value in \["),
+        ("{lidar: {beams: 5}}", r"robot.beams=5: fewer than 12; give 0 \(no lidar\) or more"),
+        ("{lidar: {beams: 2000}}", r"robot.beams=2000: out of range; give a value in \[0, 1080"),
+        ("{lidar: {range_min_m: 4.0}}", r"robot.range_min_m=4: not below range_max_m=3.5"),
+        ("{noise: {odom_m: .nan}}", r"robot.odom_m=nan: not finite"),
+        ("{noise: {odom: 1}}", r"robot.noise.odom: unknown option; did you mean"),
+        ("{lidar: 360}", r"robot.lidar: unknown option; did you mean"),
+        ("[1]", r"robot=\[1\]: refused"),
+    ],
+)
+def test_a_robot_that_cannot_be_is_refused(robot: str, reason: str) -> None:
+    text = f"{{name: x, start_m: [0.0, 0.0], goal_m: [1.0, 1.0], robot: {robot}}}"
+    with pytest.raises(ConfigError, match=f"^it: {reason}"):
+        parse_scenario(text, "it")

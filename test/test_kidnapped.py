@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The kidnapped robot: noticed, said, forgotten what no longer holds, and at the goal at last."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
+from graph import Graph
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mfba_planner.core.episode import Episode, Outcome, run
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.geometry import Point, Pose2D, distance
+from mfba_planner.core.jump import carried_off
+from mfba_planner.core.metrics import assess, evaluate, tick_clearances
+from mfba_planner.core.planner import Method, Mode, Planner, PlannerParams, Swarm, observe
+from mfba_planner.core.robot import Drive
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.core.world import Kidnapping, Obstacle, Scenario
+from mfba_planner.planners.method import brain, simulate
+from mfba_planner.planners.predictive import preset
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.ros import topics
+from mfba_planner.ros.convert import pose_msg
+from mfba_planner.ros.in_process import run_in_process
+from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.ros.virtual_sensor import VirtualSensor
+from mfba_planner.ros.world_sim import WorldSim
+from mfba_planner.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios import load_scenario, parse_scenario, scenario_to_json
+from mfba_planner.verification.check import verify
+
+KIDNAPPED = load_scenario("kidnapped")
+FREE = (float("inf"),) * 12
+PLANNERS = {
+    "paper": PlannerParams(),
+    "persistent": PlannerParams(swarm=Swarm.PERSISTENT),
+    "predictive": replace(preset(), method=Method.PREDICTIVE),
+}
+
+
+def carried(episode: Episode) -> list[int]:
+    return [k for k, tick in enumerate(episode.ticks) if carried_off(tick.reason)]
+
+
+def played(scenario: Scenario, planner: PlannerParams) -> Episode:
+    return simulate(scenario, planner=planner, sensor=SensorParams(), seed=1)
+
+
+@pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS)
+def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams) -> None:
+    episode = played(KIDNAPPED, planner)
+    assert evaluate(episode).success
+    noticed = carried(episode)
+    times_s = [episode.time_s(episode.ticks[k].stamp_ns) for k in noticed]
+    tick_s = planner.tick_ns * 1e-9
+    assert [t - at.at_s for t, at in zip(times_s, KIDNAPPED.kidnappings)] == pytest.approx(
+        [tick_s / 2] * 2, abs=tick_s / 2 + 1e-9
+    )
+    for k, kidnapping in zip(noticed, KIDNAPPED.kidnappings):
+        assert episode.ticks[k].pose.position == kidnapping.to_m
+        assert ", beginning anew; " in episode.ticks[k].reason
+
+
+@pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS)
+def test_afterwards_it_decides_as_one_that_knows_of_nothing(planner: PlannerParams) -> None:
+    """What a planner remembers must not outlive the jump: a fresh one decides the same."""
+    episode = played(KIDNAPPED, planner)
+    first, second = carried(episode)
+    fresh = brain(planner, SensorParams(), seed=1)
+    for tick in episode.ticks[first:second]:
+        seen = observe(tick.stamp_ns, tick.pose, tick.ranges_m, tick.goal, tick.pose)
+        own = fresh.plan(seen)
+        assert (own.waypoint, own.velocity, own.mode) == (tick.waypoint, tick.velocity, tick.mode)
+
+
+def test_being_carried_is_no_way_driven_and_no_contact() -> None:
+    post = Obstacle(center_m=(2.0, 3.0), radius_m=0.5)  # on the straight way of the carriers
+    scenario = Scenario(
+        name="x",
+        start_m=(0.0, 0.0),
+        goal_m=(6.0, 0.0),
+        obstacles=(post,),
+        kidnappings=(Kidnapping(at_s=2.0, to_m=(3.0, 6.0)),),
+    )
+    episode = run(scenario, seed=2)
+    (k,) = carried(episode)
+    places = [tick.pose.position for tick in episode.ticks]
+    steps = [distance(a, b) for a, b in zip(places, places[1:])]
+    result, conduct = assess(episode)
+    assert result.collisions == 0
+    assert result.length_m == pytest.approx(sum(steps) - steps[k - 1])
+    assert conduct.jerk_mps3 < 5.0
+    assert min(map(min, tick_clearances(episode))) == pytest.approx(result.min_clearance_m)
+
+
+def look(stamp_ns: int, x: float) -> Any:
+    return observe(stamp_ns, Pose2D(x, 0.0), FREE, (100.0, 0.0), Pose2D(0.0, 0.0))
+
+
+@given(
+    stretch=st.floats(0.0, 2.0),
+    took_s=st.floats(0.01, 5.0),
+    jump_m=st.floats(0.05, 3.0),
+)
+@settings(max_examples=60)
+def test_only_what_cannot_have_been_driven_is_a_jump(
+    stretch: float, took_s: float, jump_m: float
+) -> None:
+    planner = Planner(PlannerParams(jump_m=jump_m), seed=0)
+    planner.plan(look(1_000_000_000, 0.0))
+    farthest = planner.params.speed_mps * took_s + jump_m
+    decision = planner.plan(look(1_000_000_000 + round(took_s * 1e9), farthest * stretch))
+    if abs(stretch - 1.0) > 1e-6:
+        assert carried_off(decision.reason) is (stretch > 1.0)
+
+
+def test_a_pose_that_was_refused_says_nothing_about_jumps() -> None:
+    planner = Planner(PlannerParams(), seed=0)
+    planner.plan(look(1, 0.0))
+    refused = observe(2, "odom holds nan", FREE, (100.0, 0.0), Pose2D(50.0, 0.0))
+    assert planner.plan(refused).mode is Mode.STOPPED
+    assert not carried_off(planner.plan(look(3, 0.1)).reason)
+    assert carried_off(planner.plan(look(4, 9.0)).reason)
+    assert not carried_off(planner.plan(look(3, 0.0)).reason)  # time was set back
+
+
+def test_the_graph_is_kidnapped_as_the_core_is(tmp_path: Path, domain_id: int) -> None:
+    config = RunConfig(scenario=KIDNAPPED, seed=1, driver=Driver.IN_PROCESS)
+    run_in_process(config, tmp_path / "bag", domain_id=domain_id)
+    recorded = read_episode(tmp_path / "bag")
+    assert recorded.ticks == played(KIDNAPPED, PlannerParams()).ticks
+    assert len(carried(recorded)) == 2
+    report = verify(tmp_path / "bag")
+    assert report.is_identical, report.faults
+
+
+def start(graph: Graph, scenario: Scenario) -> WorldSim:
+    told = node_parameters(RunConfig(scenario=scenario, seed=6), peers=())
+    graph.start(VirtualSensor, told["virtual_sensor"])
+    planner = graph.start(PlannerNode, told["planner"])
+    world = graph.start(WorldSim, told["world_sim"])
+    graph.until(lambda: planner.goals.errands.goal is not None)
+    return world
+
+
+@pytest.mark.parametrize("drive", list(Drive))
+def test_initialpose_carries_the_robot_off_and_the_planner_says_so(
+    graph: Graph, drive: Drive
+) -> None:
+    decisions = graph.hear(topics.DECISION)
+    case = load_scenario("case1")
+    world = start(graph, replace(case, robot=replace(case.robot, drive=drive)))
+    world.resume()
+    graph.until(lambda: world.world.tick > 20)
+    pose = PoseWithCovariance(pose=pose_msg(2.0, 11.0, 0.5))
+    graph.writer(topics.INITIALPOSE).publish(PoseWithCovarianceStamped(pose=pose))
+    graph.until(lambda: world.over, timeout_s=60.0)
+    graph.settle()
+    assert world.world.outcome() is Outcome.GOAL_REACHED
+    said = [m.status[0] for m in decisions if carried_off(m.status[0].message)]
+    assert len(said) == 1
+    assert said[0].level == b"\x01"
+
+
+@pytest.mark.parametrize(
+    ("kidnappings", "reason"),
+    [
+        ("[{at_s: 1.0, to_m: [4, 4]}]", r"kidnapping to_m=\[4.0, 4.0\]: 0.6 m inside obstacle 1"),
+        ("[{at_s: 0.0, to_m: [1, 1]}]", r"kidnappings.1.at_s=0.0: refused; give a number "),
+        ("[{at_s: 2.0, to_m: [1, 1]}, {at_s: 2.0, to_m: [1, 1]}]",
+         r"kidnappings: at_s=2 does not come after 2; give the kidnappings in order of time"),
+        ("[{at_s: 2.0, to: [1, 1]}]", r"kidnappings.1.to: unknown key; did you mean 'to_m'\?"),
+        ("[{at_s: 2.0}]", r"kidnappings.1.to_m: missing"),
+    ],
+)  # fmt: skip
+def test_kidnappings_that_cannot_be_are_refused(kidnappings: str, reason: str) -> None:
+    text = (
+        "{name: x, start_m: [0, 0], goal_m: [9, 9], "
+        f"obstacles: [{{center_m: [4, 4], radius_m: 0.3}}], kidnappings: {kidnappings}}}"
+    )
+    with pytest.raises(ConfigError, match=f"^it: {reason}"):
+        parse_scenario(text, "it")
+
+
+def test_kidnappings_are_written_and_read_again() -> None:
+    assert parse_scenario(scenario_to_json(KIDNAPPED), "again") == KIDNAPPED
+
+
+def free_place(rng: np.random.Generator, scenario: Scenario, t_s: float) -> Point:
+    while True:
+        x, y = rng.uniform(0.5, 11.5, size=2).tolist()
+        if all(distance((x, y), c) > r + 0.3 for c, r in scenario.enlarged(t_s)):
+            return (x, y)
+
+
+def test_wherever_and_whenever_it_arrives() -> None:
+    rng = np.random.default_rng(5)
+    case = load_scenario("case1")
+    for seed in range(10):
+        at_s = float(rng.uniform(0.5, 20.0))
+        kidnapping = Kidnapping(at_s=at_s, to_m=free_place(rng, case, at_s))
+        episode = run(replace(case, kidnappings=(kidnapping,)), seed=seed)
+        assert episode.outcome is Outcome.GOAL_REACHED
+        assert len(carried(episode)) == 1

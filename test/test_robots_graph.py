@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots that turn, and lidars, in the real graph: the core's decisions, and what goes over it."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from graph import Graph
+
+from mfba_planner.core.digest import digest
+from mfba_planner.core.episode import Outcome
+from mfba_planner.core.planner import Method, PlannerParams
+from mfba_planner.core.robot import Drive, Lidar, Noise, Robot
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.core.world import Scenario
+from mfba_planner.messages import laser_scan, robot_pose
+from mfba_planner.planners.method import simulate
+from mfba_planner.planners.predictive import preset
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.ros import topics
+from mfba_planner.ros.in_process import run_in_process
+from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.ros.virtual_sensor import VirtualSensor
+from mfba_planner.ros.world_sim import WorldSim
+from mfba_planner.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios import load_scenario
+from mfba_planner.verification.check import verify
+
+PAPER = PlannerParams(goal_tolerance_m=0.05)
+AHEAD = replace(preset(PAPER), method=Method.PREDICTIVE)
+TRACKING = replace(AHEAD, scan_radius_m=0.42)
+TURNING = Robot(drive=Drive.DIFFERENTIAL)
+SCANNING = replace(TURNING, lidar=Lidar(beams=360, yaw_rad=1.0))
+NOISY = replace(
+    SCANNING,
+    noise=Noise(
+        odom_m=0.01, odom_rad=0.01, odom_loss=0.1, odom_latency_s=0.1,
+        scan_m=0.01, scan_dropout=0.1, scan_loss=0.02, scan_latency_s=0.1,
+    ),
+)  # fmt: skip
+ROBOTS = {"turning": TURNING, "scanning": SCANNING, "noisy": NOISY}
+
+
+def near(robot: Robot) -> Scenario:
+    """A short trip past the obstacles of case 1."""
+    case = load_scenario("case1")
+    return replace(case, start_m=(9.4, 4.2), goal_m=(9.6, 8.0), robot=robot)
+
+
+def told(scenario: Scenario, planner: PlannerParams) -> RunConfig:
+    return RunConfig(scenario=scenario, planner=planner, seed=3, driver=Driver.IN_PROCESS)
+
+
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+@pytest.mark.parametrize("planner", [PAPER, AHEAD, TRACKING], ids=["paper", "ahead", "tracking"])
+def test_the_graph_decides_as_the_core_and_verify_agrees(
+    robot: Robot, planner: PlannerParams, tmp_path: Path, domain_id: int
+) -> None:
+    scenario = near(robot)
+    if planner.tracks_scan and not robot.lidar.beams:
+        scenario = replace(scenario, robot=replace(robot, lidar=Lidar(beams=1080)))
+    run_in_process(told(scenario, planner), tmp_path / "bag", domain_id=domain_id)
+    recorded = read_episode(tmp_path / "bag")
+    expected = simulate(scenario, planner=planner, sensor=SensorParams(), seed=3)
+    assert recorded.ticks == expected.ticks
+    assert digest(recorded.ticks) == digest(expected.ticks)
+    assert expected.outcome is Outcome.GOAL_REACHED
+    assert recorded.scenario == scenario
+    assert any(tick.vs and any(tick.vs) for tick in recorded.ticks), "nobody was met"
+    report = verify(tmp_path / "bag")
+    assert report.is_identical, report.faults
+
+
+def start(graph: Graph, config: RunConfig, **more: Any) -> WorldSim:
+    parameters = node_parameters(config, peers=())
+    graph.start(VirtualSensor, parameters["virtual_sensor"])
+    planner = graph.start(PlannerNode, parameters["planner"])
+    world = graph.start(WorldSim, {**parameters["world_sim"], **more})
+    graph.until(lambda: planner.goals.errands.goal is not None)
+    return world
+
+
+@pytest.mark.parametrize("beams", [360, 720, 1080])
+def test_what_a_lidar_robot_says_and_is_told(graph: Graph, beams: int) -> None:
+    scans, odoms = graph.hear(topics.SCAN), graph.hear(topics.ODOM)
+    sectors, twists = graph.hear(topics.SECTORS), graph.hear(topics.CMD_VEL)
+    robot = replace(SCANNING, lidar=Lidar(beams=beams, yaw_rad=1.0))
+    world = start(graph, told(near(robot), PAPER))
+    world.resume()
+    graph.until(lambda: world.world.tick >= 6)
+    world.pace.paused = True
+    graph.settle()
+    ticks = world.world.tick + 1
+    assert len(scans) == len(odoms) == len(sectors) == len(twists) == ticks
+    assert {scan.header.frame_id for scan in scans} == {"base_scan"}
+    assert {message.header.frame_id for message in sectors} == {"odom"}
+    expected = simulate(
+        near(robot), planner=PAPER, sensor=SensorParams(), seed=3, go_on=lambda w: w.tick < 6
+    )
+    for scan, odom, tick in zip(scans, odoms, expected.ticks):
+        assert (scan.header.stamp, len(scan.ranges)) == (odom.header.stamp, beams)
+        assert robot_pose(odom) == tick.pose
+        assert laser_scan(scan).range_max_m == pytest.approx(3.5)
+    for twist in twists:
+        assert twist.linear.y == 0.0
+    assert any(twist.angular.z for twist in twists)
+    assert odoms[-1].twist.twist.linear.x == pytest.approx(world.world.speeds.v)
+    assert odoms[-1].twist.twist.angular.z == world.world.speeds.omega
+
+
+def test_parameters_of_world_sim_make_another_robot_of_it(graph: Graph) -> None:
+    world = graph.start(
+        WorldSim,
+        {"scenario": "case2", "robot.drive": "differential", "robot.lidar.beams": 12},
+    )
+    assert world.scenario.robot == Robot(drive=Drive.DIFFERENTIAL, lidar=Lidar(beams=12))
+    stated = world.get_parameter("scenario_json").value
+    assert load_scenario(stated) == world.scenario
+
+
+def test_it_drives_in_real_time_too(tmp_path: Path, domain_id: int) -> None:
+    config = replace(told(near(SCANNING), TRACKING), real_time=True, speed_factor=2.0)
+    run_in_process(config, tmp_path / "bag", domain_id=domain_id)
+    recorded = read_episode(tmp_path / "bag")
+    assert recorded.outcome is Outcome.GOAL_REACHED
