@@ -223,6 +223,11 @@ def _order(found: argparse.Namespace) -> Order:
         raise ConfigError("--real-time: the core driver has no clock; choose another --driver")
     speed = {} if found.speed is None else {"speed_factor": found.speed}
     config = read_config(found, driver=driver, real_time=real_time, **speed)
+    if config.scenario.robots:
+        raise ConfigError(
+            f"scenario {config.scenario.name!r}: names {len(config.scenario.robots)} robots, "
+            "which have no ROS driver yet; use `mfba sim`"
+        )
     node_args = {
         node: _split(f"--{node.replace('_', '-')}-args", getattr(found, f"{node}_args"))
         for node in (*NODES, RECORDER)
