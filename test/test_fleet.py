@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from mfba_planner import cli
 from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Outcome, World, run
-from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.errors import BagError, ConfigError
 from mfba_planner.core.fleet import Fleet, alone, run_fleet, seed_of, way
 from mfba_planner.core.geometry import Point, Pose2D, closest_approach, distance
 from mfba_planner.core.metrics import evaluate, tick_clearances
@@ -26,6 +27,10 @@ from mfba_planner.planners.method import simulate_fleet
 from mfba_planner.planners.perception import Perception
 from mfba_planner.planners.predictive import preset
 from mfba_planner.planners.registry import make
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.recording.fleet import read_fleet
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.report.result import read_result
 from mfba_planner.scenarios import load_scenario, scenario_to_json
 
 TICK_NS = PlannerParams().tick_ns
@@ -266,3 +271,70 @@ def test_sim_prints_a_row_per_robot_or_per_seed(capsys: pytest.CaptureFixture[st
     said = capsys.readouterr().out.splitlines()
     assert said[1].split()[:4] == ["0", "10", "of", "10"]
     assert said[-1] == "2 of 2 seeds with all robots at the goal without collision"
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`mfba run` of four robots: the whole graph, one call."""
+    place = tmp_path_factory.mktemp("fleet")
+    whole = load_scenario("swap")
+    some = replace(whole, robots=whole.robots[::5] + whole.robots[2::5])
+    file = place / "some.json"
+    file.write_text(scenario_to_json(some), encoding="utf-8")
+    assert cli.main(["run", str(file), "--seed", "3", "--out", str(place / "run")]) == 0
+    return place / "run"
+
+
+def test_the_graph_decides_as_the_core_does(driven: Path) -> None:
+    scenario = load_scenario(str(driven.parent / "some.json"))
+    core = run_fleet(scenario, seed=3)
+    recorded = read_fleet(driven / "bag")
+    assert [digest(e.ticks) for e in recorded] == [digest(e.ticks) for e in core]
+    assert tuple(replace(e, driver="core") for e in recorded) == core
+
+
+def test_every_robot_has_its_topics_in_its_namespace(driven: Path) -> None:
+    names = {member.name for member in load_scenario(str(driven.parent / "some.json")).robots}
+    core = run_fleet(load_scenario(str(driven.parent / "some.json")), seed=3)
+    with BagReader(driven / "bag") as reader:
+        counts = {name: topic.message_count for name, topic in reader.topics.items()}
+    assert counts["/clock"] == max(len(episode.ticks) for episode in core)
+    for episode, name in zip(core, ["robot0", "robot5", "robot2", "robot7"], strict=True):
+        assert name in names
+        for topic in ("odom", "obstacles", "sectors", "goal_step", "cmd_vel", "planner/decision"):
+            assert counts[f"/{name}/{topic}"] == len(episode.ticks)
+    assert "/odom" not in counts
+
+
+def test_a_result_for_each_robot_and_one_picture(driven: Path) -> None:
+    found = sorted(path.name for path in driven.iterdir())
+    assert found == ["bag", *(f"robot{n}.json" for n in (0, 2, 5, 7)), "run.png"]
+    core = run_fleet(load_scenario(str(driven.parent / "some.json")), seed=3)
+    told = read_result(driven / "robot0.json")
+    assert told["digest"] == digest(core[0].ticks)
+    assert told["result"]["success"]
+    assert told["extra"]["fleet_seed"] == 3
+    assert told["seed"] == seed_of(3, 0)
+
+
+def test_what_knows_one_robot_only_says_so(driven: Path) -> None:
+    with pytest.raises(BagError, match="holds 4 robots, which only"):
+        read_episode(driven / "bag")
+    for command in ("verify", "digest"):
+        with pytest.raises(BagError, match="holds 4 robots"):
+            cli.main([command, str(driven / "bag")])
+    for args, what in (
+        (["--driver", "multi-process"], "give --driver in-process"),
+        (["--real-time"], "give --driver in-process"),
+        (["--driver", "core"], "use `mfba sim`"),
+    ):
+        with pytest.raises(ConfigError, match=what):
+            cli.main(["run", "swap", *args])
+    with pytest.raises(ConfigError, match="leave it out"):
+        cli.main(["sim", "swap", "--out", "x"])
+
+
+def test_a_bag_of_one_robot_is_none_of_a_fleet(tmp_path: Path) -> None:
+    assert cli.main(["run", "empty", "--driver", "in-process", "--out", str(tmp_path / "r")]) == 0
+    with pytest.raises(BagError, match="one robot's run"):
+        read_fleet(tmp_path / "r" / "bag")

@@ -10,10 +10,9 @@ from ..core.episode import Episode, Outcome
 from ..core.errors import ConfigError, MfbaError
 from ..core.metrics import Result, evaluate
 from ..planners.method import simulate_fleet
+from ..report.fleet import fleet_text, why_no_success
 from ..run_config import RunConfig
 
-_HEAD = "{:>8}  outcome       length     time  clearance  collisions  encounters"
-_ROW = "{:>8}  {:<12}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}  {:>10}"
 _SEED_HEAD = "    seed  at the goal   longest     last  clearance  collisions"
 _SEED_ROW = "{:>8}  {:>4} of {:<4}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"
 
@@ -27,17 +26,9 @@ def simulate(config: RunConfig, seeds: int, out: Path | None) -> int:
         )
     if seeds == 1:
         results = _results(config, config.seed)
-        names = [member.name for member in config.scenario.robots]
-        print(_HEAD.format("robot"))
-        for name, r in zip(names, results):
-            print(_row(name, r))
-        good = sum(r.success for r in results)
-        print(f"{good} of {len(results)} robots at the goal without collision")
-        if good < len(results):
-            raise MfbaError(
-                f"{len(results) - good} of {len(results)} robots failed; "
-                "try another --seed or --planner predictive"
-            )
+        print(fleet_text([member.name for member in config.scenario.robots], results), end="")
+        if why := why_no_success(results):
+            raise MfbaError(why)
         return 0
     print(_SEED_HEAD)
     whole = 0
@@ -56,13 +47,6 @@ def _results(config: RunConfig, seed: int) -> list[Result]:
         config.scenario, planner=config.planner, sensor=config.sensor, seed=seed
     )
     return [evaluate(episode) for episode in done]
-
-
-def _row(name: str, r: Result) -> str:
-    return _ROW.format(
-        name, r.outcome.value, r.length_m, r.time_s, r.min_clearance_m, r.collisions,
-        len(r.encounters),
-    )  # fmt: skip
 
 
 def _seed_row(seed: int, results: Sequence[Result]) -> str:

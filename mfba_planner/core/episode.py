@@ -106,6 +106,15 @@ class World:
         """
         return self._nearby.at(self.tick, position or self.pose.position, reach_m)
 
+    def centers(self) -> list[Point]:
+        """Centres of all that is around, now: the scenario's obstacles in its order."""
+        return self.scenario.centers(self.time_s)
+
+    @property
+    def left_m(self) -> float:
+        """How far the goal is."""
+        return distance(self.pose.position, self.scenario.goal_m)
+
     def radius_m(self, index: int) -> float:
         """Radius of whoever near() calls by that index, not enlarged."""
         return self.scenario.obstacles[index].radius_m

@@ -49,6 +49,7 @@ class Place(World):
         """Put the robot at its start, at tick 0."""
         seed = seed_of(fleet.seed, number)
         super().__init__(alone(fleet.scenario, number), fleet.tick_ns, tolerance_m, seed)
+        self.name = fleet.scenario.robots[number].name
         self.poses = [self.pose]  # one per tick of the fleet
         self.seed = seed
         self._fleet, self._number = fleet, number
@@ -86,9 +87,8 @@ class Place(World):
         return ((x1 - x0) / dt, (y1 - y0) / dt)
 
     def centers(self) -> list[Point]:
-        """Centres of obstacles and other robots now, in near()'s order."""
-        own = self.scenario.centers(self._fleet.tick * self.tick_ns * NANO)
-        return [*own, *(place.pose.position for place in self.others)]
+        """The scenario's obstacles, then the other robots, in near()'s order."""
+        return [*super().centers(), *(place.pose.position for place in self.others)]
 
 
 class Fleet:
@@ -110,6 +110,11 @@ class Fleet:
     def under_way(self) -> list[int]:
         """Who has not ended yet, as numbers from 0."""
         return [number for number, outcome in enumerate(self.outcomes) if outcome is None]
+
+    @property
+    def left_m(self) -> float:
+        """How far the farthest robot is from its goal."""
+        return max(place.left_m for place in self.places)
 
     def step(self, told: dict[int, Point]) -> None:
         """Move everybody who is under way and time on by one tick; told as for World.step()."""

@@ -13,6 +13,7 @@ from ..run_config import Driver
 from .attempt import Attempt
 from .conclusion import conclude
 from .directory import RunDirectory
+from .fleet import conclude_fleet
 from .options import Order
 from .screen import Screen
 from .stop import StoppedError, StopRequest
@@ -36,12 +37,19 @@ def run(order: Order) -> int:
         finally:
             if not attempt.has_begun:
                 attempt.directory.discard()
+    fleet = bool(order.config.scenario.robots)
     if failure is None:
-        conclude(attempt, episode).judge()
+        if not fleet:
+            conclude(attempt, episode).judge()
+        elif why := conclude_fleet(attempt):
+            raise MfbaError(why)
         return 0
     if attempt.has_begun:
         with suppress(BagError):  # nothing to tell of; the failure is told below
-            conclude(attempt, episode, str(failure))
+            if fleet:
+                conclude_fleet(attempt, str(failure))
+            else:
+                conclude(attempt, episode, str(failure))
     return _fail(failure, attempt)
 
 

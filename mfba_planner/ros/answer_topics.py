@@ -13,6 +13,7 @@ from ..node_settings import WorldSimSettings
 from . import topics
 from .answers import Answers
 from .letterboxes import Letter, Letterboxes
+from .namespaced import Namespaced
 from .runtime import GraphNode
 from .serialized import header_stamp_ns
 
@@ -22,7 +23,7 @@ class AnswerTopics:
 
     def __init__(
         self,
-        node: GraphNode,
+        node: GraphNode | Namespaced,
         settings: WorldSimSettings,
         on_twist: Callable[[Any], None],
         on_heard: Callable[[], None],

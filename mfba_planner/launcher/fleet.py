@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is left of a fleet's run: a table, a result file for each robot, the picture, a verdict."""
+
+from __future__ import annotations
+
+import sys
+
+from ..core.metrics import evaluate
+from ..recording.fleet import read_fleet
+from .attempt import Attempt
+
+
+def conclude_fleet(attempt: Attempt, failure: str = "") -> str:
+    """Print the table, write NAME.json for each robot and run.png; why it is no success, or "".
+
+    Raises BagError where the bag holds no decision of a robot or was not closed.
+    """
+    from ..report.fleet import draw_fleet, fleet_text, why_no_success
+    from ..report.result import result_to_dict, write_result
+
+    directory, config = attempt.directory, attempt.order.config
+    names = [member.name for member in config.scenario.robots]
+    episodes = read_fleet(directory.bag)
+    results = [evaluate(episode) for episode in episodes]
+    extra = {"fleet_seed": config.seed, "wall_s": attempt.wall_s, "failure": failure or None}
+    for name, episode in zip(names, episodes):
+        write_result(directory.path / f"{name}.json", result_to_dict(episode, extra))
+    if attempt.order.picture:
+        title = config.scenario.description or config.scenario.name
+        draw_fleet(title, names, episodes, results, config.seed, directory.picture)
+    sys.stdout.write(fleet_text(names, results))
+    print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
+    why = why_no_success(results)
+    return f"{directory.path}: {why}" if why else ""
