@@ -12,12 +12,13 @@ WORKERS ?= 2
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH RMW_IMPLEMENTATION
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help demo test lint docs colcon venv clean
+.PHONY: help demo test lint chromium docs colcon venv clean
 
 help:
 	@echo "make demo    run case study 1 and record it under runs/"
 	@echo "make test    lint, then all tests with branch coverage"
 	@echo "make lint    ruff and mypy"
+	@echo "make chromium  install what the tests of the report page need, where that may be done"
 	@echo "make docs    build the documentation under build/docs, warnings as errors"
 	@echo "make colcon  build with colcon under build/colcon and check what it installed"
 	@echo "make venv    only set up .venv (PYTHON=/path/to/python3 chooses the interpreter)"
@@ -26,12 +27,17 @@ help:
 demo: $(VENV)/.runtime
 	$(VENV)/bin/mfba run case1 --seed 1
 
+# Without a Chromium the tests of the page fail and say so; all others run.
 test: lint
+	@tools/chromium.sh || true
 	$(VENV)/bin/python -m pytest -n $(WORKERS) --cov --cov-fail-under=95
 
 lint: $(VENV)/.dev
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/mypy
+
+chromium:
+	@tools/chromium.sh
 
 docs: $(VENV)/.dev
 	$(VENV)/bin/python -m sphinx --builder html --nitpicky --fail-on-warning --keep-going \

@@ -28,13 +28,16 @@ setup(
     maintainer_email="maintainers@mfba-planner.example",
     license="Apache-2.0",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"]},
+    package_data={
+        NAME: ["py.typed"],
+        f"{NAME}.report.html": ["*.css", "*.html", "*.js"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
         (f"{SHARE}/config", glob("config/*.yaml")),
         (f"{SHARE}/config/scenarios", glob("config/scenarios/*.yaml")),
-        (f"{SHARE}/launch", glob("launch/*launch.py")),
+        (f"{SHARE}/launch", glob("launch/*launch.*")),
         (f"{SHARE}/layout", glob("layout/*")),
     ],
     entry_points={
@@ -73,9 +76,12 @@ setup(
             "pytest>=8",
             "pytest-cov>=6",
             "pytest-xdist>=3.6",
+            "rerun-sdk>=0.29",
             "rosbags>=0.10",
+            "selenium>=4.25",
             "small-mcap>=0.10",
         ],
+        "view": ["rerun-sdk>=0.29"],
         "peers": [
             "mealpy>=3.0.2,<4",
             "niapy>=2.7,<3",

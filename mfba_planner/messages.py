@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .core.drive import command
-from .core.errors import InputError
+from .core.errors import FrameError, InputError
 from .core.geometry import Point, Pose2D, yaw_of
 from .core.planner import Decision, Mode, Refused
 from .core.robot import Base
@@ -58,16 +58,46 @@ def pose2d(pose: Any, what: str) -> Pose2D:
     return Pose2D(p.x, p.y, yaw_of(q.x, q.y, q.z, q.w))
 
 
-def robot_pose(odometry: Any) -> Pose2D:
-    """nav_msgs/Odometry to the robot's pose; InputError for NaN or inf."""
+def require_frame(message: Any, frame: str, what: str) -> None:
+    """Raise FrameError for a message in another frame; an empty frame asks for none."""
+    given = message.header.frame_id
+    if frame and given != frame:
+        raise FrameError(
+            f"{what} is in frame {given!r}, not {frame!r}; transform it, or set odom_frame"
+        )
+
+
+def robot_pose(odometry: Any, frame: str = "") -> Pose2D:
+    """nav_msgs/Odometry to the robot's pose; InputError for NaN, inf or another frame."""
+    require_frame(odometry, frame, "odom")
     return pose2d(odometry.pose.pose, "odom")
 
 
-def goal_point(pose_stamped: Any) -> Point:
-    """geometry_msgs/PoseStamped to GP; InputError for NaN or inf (orientation is not used)."""
+def goal_point(pose_stamped: Any, frame: str = "", what: str = "goal_pose") -> Point:
+    """geometry_msgs/PoseStamped to GP; its orientation is not used.
+
+    Raises InputError for NaN or inf, and for another frame; one that names none is taken as is.
+    """
+    if pose_stamped.header.frame_id:
+        require_frame(pose_stamped, frame, what)
     p = pose_stamped.pose.position
-    _finite("goal_pose position", (p.x, p.y))
+    _finite(f"{what} position", (p.x, p.y))
     return (p.x, p.y)
+
+
+def waypoint_points(path: Any, frame: str = "") -> tuple[Point, ...]:
+    """nav_msgs/Path to goals in their order; InputError for none, NaN, inf or another frame.
+
+    The frame of the path holds for poses that name none.
+    """
+    if path.header.frame_id:
+        require_frame(path, frame, "waypoints")
+    if not path.poses:
+        raise InputError("waypoints are empty; give at least one, or call planner/cancel")
+    return tuple(
+        goal_point(pose, frame, f"waypoint {number}")
+        for number, pose in enumerate(path.poses, start=1)
+    )
 
 
 def obstacle_centers(pose_array: Any) -> list[Point]:
@@ -79,8 +109,12 @@ def obstacle_centers(pose_array: Any) -> list[Point]:
     return centers
 
 
-def sector_ranges(laser_scan: Any) -> Ranges:
-    """The sectors topic to ranges; inf is free; InputError for NaN, -inf or < 3 sectors."""
+def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
+    """The sectors topic to ranges; inf is free.
+
+    Raises InputError for NaN, -inf, fewer than 3 sectors or another frame.
+    """
+    require_frame(laser_scan, frame, "sectors")
     ranges = tuple(float(r) for r in laser_scan.ranges)
     if len(ranges) < 3:
         raise InputError(f"sectors hold {len(ranges)} ranges; send one per sector, at least 3")
@@ -146,6 +180,11 @@ def points(text: str) -> tuple[Point, ...]:
         return tuple((x, y) for x, y in pairs)
     except ValueError:
         raise InputError(f"{text!r}: not a list of points 'x,y x,y'") from None
+
+
+def decision_value(diagnostics: Any, key: str) -> str:
+    """What planner/decision says of one thing, "" where it does not."""
+    return next((item.value for item in diagnostics.status[0].values if item.key == key), "")
 
 
 def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:

@@ -11,7 +11,7 @@ from enum import Enum
 
 from .core.options import check, option
 from .core.planner import PlannerParams
-from .core.robot import Robot
+from .core.robot import Base, Robot
 from .core.world import Scenario
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
@@ -51,6 +51,13 @@ class WorldSimSettings:
     )
     answer_retries: int = option(
         4, "lockstep: give up after so many repetitions", minimum=0, maximum=1_000_000
+    )
+    cmd_vel_timeout_s: float = option(
+        0.5,
+        "real time: rest after so long without cmd_vel, but no less than a tick; 0: never",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
     )
     enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
     seed: int = option(0, "seed of the instruments' noise", minimum=0, maximum=2**63 - 1)
@@ -99,7 +106,7 @@ class VirtualSensorSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerSettings:
+class PlannerSettings(Base):
     """Settings of planner; PlannerParams are its parameters too."""
 
     seed: int = option(0, "seed of all its randomness", minimum=0, maximum=2**63 - 1)
@@ -112,6 +119,13 @@ class PlannerSettings:
     )
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
+    )
+    diagnostics_period_s: float = option(
+        1.0, "/diagnostics: time between two", unit="s", minimum=0.01, maximum=3600.0
+    )
+    hardware_id: str = option("none", "hardware_id of /diagnostics, to tell robots apart")
+    autostart: bool = option(
+        True, "configure and activate at once; false: wait for ~/change_state"
     )
     wait_for: str = option("", _WAIT_FOR)
 

@@ -149,6 +149,9 @@ _MEANINGS = {
     "robots": "several robots in one world instead; start_m and goal_m are the first one's then",
     "turns": "moments from which on it moves otherwise, in order of time",
     "at_s": "when, in simulated time from the beginning, s",
+    "robot": "its base, lidar and noise, where they are not those of the paper",
+    "kidnappings": "moments at which the robot is carried elsewhere, in order of time",
+    "to_m": "where it is put, m",
     "lower_m": "its corner with the smaller x and y, m",
     "upper_m": "its corner with the larger x and y, m",
 }

@@ -15,6 +15,8 @@ from mfba_planner.recording.reader import BagReader
 from mfba_planner.recording.writer import BagWriter
 from mfba_planner.ros import topics
 from mfba_planner.ros.in_process import run_in_process
+from mfba_planner.ros.qos import offered
+from mfba_planner.ros.serialized import type_name
 from mfba_planner.run_config import Driver, RunConfig
 from mfba_planner.scenarios import load_scenario
 
@@ -39,10 +41,15 @@ def rewrite(
     with BagReader(bag) as reader, BagWriter(out) as writer:
         for topic in reader.topics.values():
             writer.add_topic(topic.name, topic.type_name, topic.qos)
+        known = set(reader.topics)
         content = configure(read_configuration(reader))
         if content is not None:
             attach_configuration(writer, content)
         for message in edit(list(reader.messages())):
+            if message.topic not in known:
+                known.add(message.topic)
+                kind = type_name(KINDS[message.topic])
+                writer.add_topic(message.topic, kind, offered(topics.VIEW_QOS))
             writer.write(message.topic, message.data, message.log_time_ns, message.publish_time_ns)
     return out
 

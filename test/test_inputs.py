@@ -58,7 +58,16 @@ def test_real_time_refuses_sectors_that_do_not_rise_and_odom_that_goes_back() ->
     with pytest.raises(InputError, match="odom stamp 9 ns: not newer than 10 ns; stamps must"):
         inputs.odom(9, THERE, 1.0)
     assert inputs.odom(10, THERE, 1.0) is None
-    assert inputs.sectors(11, FREE, 1.0) == Ready(11, THERE, FREE, 0.0)
+    assert inputs.sectors(11, FREE, 1.0) == Ready(11, THERE, FREE, 1.0)
+
+
+def test_the_same_stamp_once_more_does_not_make_odom_younger() -> None:
+    """As a driver does that repeats its last message when its hardware has gone."""
+    inputs = Newest()
+    inputs.odom(10, HERE, 0.0)
+    inputs.sectors(10, FREE, 0.0)
+    inputs.odom(10, HERE, 5.0)
+    assert inputs.stale(5.0, 1.0) == Ready(10, HERE, FREE, 5.0)
 
 
 def test_a_negative_stamp_is_refused() -> None:

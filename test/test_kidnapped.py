@@ -144,7 +144,7 @@ def start(graph: Graph, scenario: Scenario) -> WorldSim:
     graph.start(VirtualSensor, told["virtual_sensor"])
     planner = graph.start(PlannerNode, told["planner"])
     world = graph.start(WorldSim, told["world_sim"])
-    graph.until(lambda: planner._goal is not None)
+    graph.until(lambda: planner.goals.errands.goal is not None)
     return world
 
 

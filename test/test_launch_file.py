@@ -1,19 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
-"""simulate.launch.py: what it tells the nodes, and that `launch` can read it."""
+"""The launch files: what they tell the nodes, and that `launch` can read them."""
 
 import ast
 import importlib.util
+import xml.etree.ElementTree as ElementTree
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
+import reference
+from graph import Graph
 
-from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.errors import ConfigError, InputError
+from mfba_planner.core.options import flatten
 from mfba_planner.launcher.by_launch import ARGUMENTS, told_by_launch
+from mfba_planner.launcher.robot_by_launch import (
+    PLANNER_ARGUMENTS,
+    REPLAY_ARGUMENTS,
+    replayed,
+    robot,
+)
+from mfba_planner.node_settings import Source
+from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.ros.replay_args import parse
+from mfba_planner.ros.virtual_sensor import VirtualSensor
 from mfba_planner.run_config import NODES, RunConfig, node_parameters
 from mfba_planner.scenarios import load_scenario
 
-FILE = Path(__file__).parents[1] / "launch" / "simulate.launch.py"
+LAUNCH = Path(__file__).parents[1] / "launch"
 
 
 def given(**changes: str) -> dict[str, str]:
@@ -66,26 +81,133 @@ def test_bad_arguments_are_one_line(name: str, value: str, line: str) -> None:
     assert str(caught.value).startswith(line)
 
 
-def test_every_argument_is_described_and_its_default_is_a_choice() -> None:
-    for name, argument in ARGUMENTS.items():
-        assert argument.description, name
-        assert not argument.choices or argument.default in argument.choices, name
+FILES = {
+    "simulate": ARGUMENTS,
+    "planner": PLANNER_ARGUMENTS,
+    "replay": REPLAY_ARGUMENTS,
+}
 
 
-def test_launch_file_is_what_launch_expects() -> None:
+@pytest.mark.parametrize("name", FILES)
+def test_every_argument_is_described_and_its_default_is_a_choice(name: str) -> None:
+    for argument in FILES[name].values():
+        assert len(argument.description) > 5
+        assert not argument.choices or argument.default in argument.choices
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_launch_file_is_what_launch_expects(name: str) -> None:
     """Read by launch itself where it is installed (it is no wheel), otherwise by its syntax."""
+    path = LAUNCH / f"{name}.launch.py"
     if importlib.util.find_spec("launch_ros") is not None:
         sources = import_module("launch.launch_description_sources")
-        description = sources.get_launch_description_from_python_launch_file(str(FILE))
-        assert [a.name for a in description.get_launch_arguments()] == list(ARGUMENTS)
+        description = sources.get_launch_description_from_python_launch_file(str(path))
+        assert [a.name for a in description.get_launch_arguments()] == list(FILES[name])
         return
-    tree = ast.parse(FILE.read_text(encoding="utf-8"))
-    compile(tree, str(FILE), "exec")
-    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+    helper = LAUNCH.parent / "mfba_planner/launcher/launch_files.py"
+    for file in (path, helper):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        compile(tree, str(file), "exec")
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("mfba_planner"):
+                module = node.module or ""
+                if module.endswith("launch_files"):
+                    names = {n.name for n in tree_of(helper).body if hasattr(n, "name")}
+                else:
+                    names = set(vars(import_module(module)))
+                assert {alias.name for alias in node.names} <= names
+    functions = {n.name: n for n in tree_of(path).body if isinstance(n, ast.FunctionDef)}
     assert functions["generate_launch_description"].args.args == []
-    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    assert {"ARGUMENTS", "told_by_launch", "DeclareLaunchArgument", "Node"} <= used
-    for node in tree.body:
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("mfba_planner"):
-            for alias in node.names:
-                assert hasattr(import_module(node.module or ""), alias.name)
+
+
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def test_the_xml_twin_declares_and_starts_the_same() -> None:
+    root = ElementTree.parse(LAUNCH / "planner.launch.xml").getroot()
+    declared = {a.get("name"): (a.get("default"), a.get("description")) for a in root.iter("arg")}
+    shipped = "$(find-pkg-share mfba_planner)/config/planner.yaml"
+    assert declared == {
+        name: (
+            argument.default or (shipped if name == "params_file" else ""),
+            argument.description,
+        )
+        for name, argument in PLANNER_ARGUMENTS.items()
+    }
+    names = ("scan", "odom", "cmd_vel", "goal_pose", "waypoints")
+    starts = robot(by_default(PLANNER_ARGUMENTS) | {name: f"my_{name}" for name in names})
+    for start, node in zip(starts, root.iter("node"), strict=True):
+        assert (node.get("exec"), node.get("name")) == (start.name, start.name)
+        told = {param.get("name") for param in node.iter("param") if param.get("name")}
+        assert told == set(start.parameters)
+        remaps = [(remap.get("from"), f"my_{remap.get('from')}") for remap in node.iter("remap")]
+        assert remaps == list(start.remaps)
+
+
+def by_default(arguments: Any) -> dict[str, str]:
+    return {name: argument.default for name, argument in arguments.items()}
+
+
+def test_on_a_robot_the_sensor_reads_the_scan_and_the_shipped_file_has_the_last_word() -> None:
+    sensor, planner = robot(by_default(PLANNER_ARGUMENTS))
+    assert sensor.parameters["source"] == "scan"
+    assert planner.parameters == {
+        "use_sim_time": False,
+        "autostart": True,
+        "enable_stamped_cmd_vel": False,
+    }
+    (file,) = {*sensor.files, *planner.files}
+    assert Path(file).samefile(LAUNCH.parent / "config/planner.yaml")
+    assert sensor.remaps == planner.remaps == ()
+
+
+def test_remaps_and_files_reach_the_nodes_of_a_robot(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("{}")
+    told = {"scan": "/front/scan", "odom": "wheel/odom", "stamped": "true"}
+    told["params_file"] = str(mine)
+    sensor, planner = robot(by_default(PLANNER_ARGUMENTS) | told)
+    assert sensor.remaps == (("scan", "/front/scan"), ("odom", "wheel/odom"))
+    assert planner.remaps == (("odom", "wheel/odom"),)
+    assert planner.parameters["enable_stamped_cmd_vel"] is True
+    assert sensor.files == planner.files == (str(mine),)
+    with pytest.raises(InputError, match="params_file:=nowhere: not there"):
+        robot(by_default(PLANNER_ARGUMENTS) | {"params_file": "nowhere"})
+
+
+def test_a_replay_is_told_what_its_command_line_understands() -> None:
+    given = by_default(REPLAY_ARGUMENTS) | {"bag": "runs/mine", "rate": "2.5", "loop": "true"}
+    (replay,) = replayed(given)
+    settings = parse(list(replay.arguments))
+    assert (settings.bag, settings.rate, settings.loop) == ("runs/mine", 2.5, True)
+    assert settings.inputs_of == ()
+    planner, replay = replayed(given | {"planner": "true"})
+    assert planner.parameters == {"lockstep": True}
+    settings = parse(list(replay.arguments))
+    assert (settings.inputs_of, settings.wait_for_subscribers) == (("planner",), ())
+    with pytest.raises(InputError, match=r"^bag:= is empty; give a bag"):
+        replayed(by_default(REPLAY_ARGUMENTS))
+
+
+@pytest.mark.parametrize("namespace", ["", "robot1"])
+def test_the_shipped_parameters_are_taken_by_the_nodes_in_any_namespace(
+    graph: Graph, namespace: str
+) -> None:
+    file = ["--ros-args", "--params-file", str(LAUNCH.parent / "config/planner.yaml")]
+    planner = graph.start(PlannerNode, {}, cli_args=file, namespace=namespace)
+    sensor = graph.start(VirtualSensor, {}, cli_args=file, namespace=namespace)
+    assert sensor.settings.source is Source.SCAN
+    for node, found in (
+        ("planner", flatten(planner.settings) | flatten(planner.brain.params)),
+        ("virtual_sensor", flatten(sensor.settings) | flatten(sensor.sensor)),
+    ):
+        defaults = {k: v for part in reference.NODES[node] for k, v in flatten(part).items()}
+        assert found == defaults | reference.ROBOT[node]
+
+
+def test_a_robot_that_is_told_the_shipped_parameters_stops_in_time() -> None:
+    told = reference.ROBOT["planner"]
+    watch_s = 0.25 * told["input_timeout_s"]
+    assert told["input_timeout_s"] + watch_s < 0.32
+    assert told["step_length_m"] / told["speed_mps"] == pytest.approx(0.1)

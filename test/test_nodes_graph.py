@@ -28,6 +28,8 @@ TABLE = [
     ("/sectors", "sensor_msgs/msg/LaserScan", ["virtual_sensor"], ["planner"], False),
     ("/sensory_vector", "std_msgs/msg/UInt8MultiArray", ["virtual_sensor"], [], False),
     ("/goal_pose", "geometry_msgs/msg/PoseStamped", ["world_sim"], ["planner"], True),
+    ("/waypoints", "nav_msgs/msg/Path", [], ["planner"], False),
+    ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", ["planner"], [], False),
     ("/goal_step", "geometry_msgs/msg/PoseStamped", ["planner"], ["world_sim"], False),
     ("/plan", "nav_msgs/msg/Path", ["planner"], [], False),
     ("/trail", "nav_msgs/msg/Path", ["world_sim"], [], False),
@@ -38,12 +40,19 @@ TABLE = [
     ("/markers", "visualization_msgs/msg/MarkerArray", ["planner", "world_sim"], [], False),
     ("/scan", "sensor_msgs/msg/LaserScan", [], [], False),
 ]
-RCLPYS_OWN = {"/parameter_events", "/rosout"}
+RCLPYS_OWN = {"/parameter_events", "/rosout", "/planner/transition_event"}
+ONE_FOR_ALL = {"/clock", "/diagnostics"}  # time and health are the whole site's
 SERVICES = {
     "/world_sim/pause": "std_srvs/srv/SetBool",
     "/world_sim/step": "std_srvs/srv/Trigger",
     "/world_sim/reset": "std_srvs/srv/Trigger",
     **{f"/{name}/ready": "std_srvs/srv/Trigger" for name in (*NODES, "recorder")},
+    "/planner/cancel": "std_srvs/srv/Trigger",
+    "/planner/change_state": "lifecycle_msgs/srv/ChangeState",
+    "/planner/get_state": "lifecycle_msgs/srv/GetState",
+    "/planner/get_available_states": "lifecycle_msgs/srv/GetAvailableStates",
+    "/planner/get_available_transitions": "lifecycle_msgs/srv/GetAvailableTransitions",
+    "/planner/get_transition_graph": "lifecycle_msgs/srv/GetAvailableTransitions",
 }
 
 
@@ -171,9 +180,9 @@ def test_everything_works_in_a_namespace(graph: Graph, tmp_path: Any) -> None:
     nodes = start_all(graph, tmp_path / "bag", namespace="robot1")
     graph.until(lambda: not any(node.missing() for node in nodes.values()))
     found = dict(graph.probe.get_topic_names_and_types())
-    ours = {name: kinds for name, kinds in found.items() if name not in RCLPYS_OWN}
-    # Time is one for all robots, as in any simulation.
-    assert set(ours) == {n if n == "/clock" else f"/robot1{n}" for n, *_ in TABLE}
+    own = {*RCLPYS_OWN, "/robot1/planner/transition_event"}
+    ours = {name: kinds for name, kinds in found.items() if name not in own}
+    assert set(ours) == {n if n in ONE_FOR_ALL else f"/robot1{n}" for n, *_ in TABLE}
     world = nodes["world_sim"]
     world.resume()
     graph.until(lambda: world.over, timeout_s=60.0)

@@ -6,12 +6,26 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TwistStamped
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from graph import Graph
 from nav_msgs.msg import Odometry
 from rclpy.qos import qos_profile_sensor_data, qos_profile_system_default
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
+from talk import (
+    FREE,
+    GOAL,
+    INF,
+    LOCKSTEP,
+    NAN,
+    NORTH_EAST,
+    Talk,
+    fields,
+    goal,
+    mode,
+    odom,
+    sectors,
+)
 
 from mfba_planner.core.bat import Algorithm
 from mfba_planner.core.errors import ConfigError
@@ -25,83 +39,11 @@ from mfba_planner.core.planner import (
     PlannerParams,
     Swarm,
 )
-from mfba_planner.core.sensing import Ranges, SensorParams
 from mfba_planner.messages import decision as read_decision
 from mfba_planner.messages import stamp_ns
 from mfba_planner.ros import topics
-from mfba_planner.ros.convert import odometry_msg, pose_stamped_msg, sectors_msg, time_msg
+from mfba_planner.ros.convert import time_msg
 from mfba_planner.ros.planner import PlannerNode
-
-INF, NAN = math.inf, math.nan
-FREE: Ranges = (INF,) * 12
-NORTH_EAST = (0.5, *FREE[1:])  # sector 1 is set
-GOAL = (10.0, 5.0)
-LOCKSTEP = {"lockstep": True, "seed": 3}
-
-
-def odom(stamp: int, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Odometry:
-    return odometry_msg(Pose2D(x, y, yaw), (0.0, 0.0), stamp, "odom", "base_link")
-
-
-def sectors(stamp: int, ranges: Ranges = FREE) -> LaserScan:
-    return sectors_msg(ranges, SensorParams(sectors=len(ranges)), 0.3, stamp, "odom")
-
-
-def goal(x: float, y: float) -> PoseStamped:
-    return pose_stamped_msg((x, y), 1, "odom")
-
-
-class Talk:
-    """A planner, what it is given and what it answers."""
-
-    def __init__(
-        self, graph: Graph, parameters: dict[str, Any], at: tuple[float, float] | None = GOAL
-    ) -> None:
-        self.graph = graph
-        self.odom = graph.writer(topics.ODOM)
-        self.sectors = graph.writer(topics.SECTORS)
-        self.goal = graph.writer(topics.GOAL_POSE)
-        self.decisions = graph.hear(topics.DECISION)
-        self.plans = graph.hear(topics.PLAN)
-        self.steps = graph.hear(topics.GOAL_STEP)
-        stamped = parameters.get("enable_stamped_cmd_vel")
-        self.cmd_vel = graph.hear(topics.CMD_VEL, TwistStamped if stamped else None)
-        if at:
-            self.goal.publish(goal(*at))  # latched
-        self.node = graph.start(PlannerNode, parameters)
-        if at:
-            graph.until(lambda: self.node._goal is not None)
-
-    def answers(self, *messages: Any) -> list[Any]:
-        """Publish in this order and return the decisions that come of it."""
-        count = len(self.decisions)
-        writers = {Odometry: self.odom, LaserScan: self.sectors, PoseStamped: self.goal}
-        for message in messages:
-            writers[type(message)].publish(message)
-            if isinstance(message, PoseStamped):
-                self.graph.settle()
-        self.graph.settle()
-        assert len(self.cmd_vel) == len(self.decisions), "each decision has its Twist"
-        return self.decisions[count:]
-
-    def answer(self, *messages: Any) -> Any:
-        (only,) = self.answers(*messages)
-        return only
-
-    @property
-    def velocity(self) -> tuple[float, float]:
-        """The Twist of the last decision."""
-        twist = getattr(self.cmd_vel[-1], "twist", self.cmd_vel[-1])
-        return (twist.linear.x, twist.linear.y)
-
-
-def fields(message: Any) -> dict[str, str]:
-    (status,) = message.status
-    return {item.key: item.value for item in status.values} | {"reason": status.message}
-
-
-def mode(message: Any) -> Mode:
-    return Mode(fields(message)["mode"])
 
 
 def test_the_method_can_be_changed_while_it_drives(graph: Graph) -> None:
@@ -253,14 +195,14 @@ def test_a_refused_pose_does_not_move_where_the_robot_is_said_to_be(graph: Graph
 
 
 @pytest.mark.parametrize("bad", [NAN, INF])
-def test_a_goal_that_is_not_finite_is_no_goal(graph: Graph, bad: float) -> None:
+def test_a_goal_that_is_not_finite_changes_nothing(graph: Graph, bad: float) -> None:
     talk = Talk(graph, LOCKSTEP)
-    talk.answer(odom(1), sectors(1))
-    idle = talk.answer(goal(bad, 1.0), odom(2), sectors(2))
-    assert mode(idle) is Mode.IDLE
-    assert fields(idle)["refused_inputs"] == "1"
-    assert talk.velocity == (0.0, 0.0)
-    assert mode(talk.answer(goal(*GOAL), odom(3), sectors(3))) is Mode.PATH_GENERATION
+    before = fields(talk.answer(odom(1), sectors(1)))
+    after = fields(talk.answer(goal(bad, 1.0), odom(2), sectors(2)))
+    assert after["refused_inputs"] == "1"
+    assert {key: after[key] for key in ("mode", "goal", "errand")} == {
+        key: before[key] for key in ("mode", "goal", "errand")
+    }
 
 
 def test_in_lockstep_it_waits_for_a_goal_that_somebody_gives(graph: Graph) -> None:
@@ -289,11 +231,14 @@ def test_the_goals_orientation_is_not_used(graph: Graph) -> None:
     assert mode(answer) is Mode.PATH_GENERATION
 
 
-def test_a_goal_in_another_frame_is_taken_as_in_odom(graph: Graph) -> None:
-    talk = Talk(graph, LOCKSTEP, at=None)
-    elsewhere = goal(3.0, 0.0)
-    elsewhere.header.frame_id = "map"
-    assert fields(talk.answer(elsewhere, odom(1), sectors(1)))["goal"] == "3.0,0.0"
+def test_a_goal_in_another_frame_is_refused_and_in_none_it_is_taken(graph: Graph) -> None:
+    talk = Talk(graph, LOCKSTEP)
+    for frame, expected in (("map", GOAL), ("", (3.0, 0.0))):
+        sent = goal(3.0, 0.0)
+        sent.header.frame_id = frame
+        talk.goal.publish(sent)
+        graph.settle()
+        assert talk.node.goals.errands.goal == expected
 
 
 def test_a_new_goal_counts_at_once_even_after_arrival(graph: Graph) -> None:
@@ -490,3 +435,30 @@ def test_markers_show_where_the_goal_step_leads(graph: Graph) -> None:
     lit = {mark.ns: mark for mark in marks[-1].markers}
     assert len(lit["sectors"].points) == 6
     assert lit["candidates"].action == lit["candidates"].DELETE
+
+
+def test_markers_read_at_a_glance(graph: Graph) -> None:
+    marks = graph.hear(topics.MARKERS)
+    talk = Talk(graph, {**LOCKSTEP, "view_period_s": 1e-9})
+    talk.answer(odom(1, 1.0, 2.0), sectors(1))
+    talk.answer(odom(2, 1.0, 2.0), sectors(2, (0.5,) * 3 + FREE[3:]))
+    graph.settle()
+    free, lit = ({mark.ns: mark for mark in message.markers} for message in marks)
+    reach_m = sectors(1).range_max
+    for mark in (free["ring"], lit["ring"]):
+        around = {round(math.hypot(p.x - 1.0, p.y - 2.0), 3) for p in mark.points}
+        assert around == {round(reach_m, 3)}
+    assert len(free["spokes"].points) == 2 * 12
+    assert len(lit["lit"].points) == 3 * 3 * 4, "three sectors of four triangles"
+    assert {free[name].action for name in ("lit", "gap")} == {free["lit"].DELETE}
+    assert (free["mode"].text, lit["mode"].text) == ("path generation", "obstacle avoidance")
+    tail, head = lit["gap"].points
+    step = lit["goal_step"].points[1]
+    assert (tail.x, tail.y) == (1.0, 2.0)
+    along = math.atan2(head.y - tail.y, head.x - tail.x)
+    assert along == pytest.approx(math.atan2(step.y - tail.y, step.x - tail.x))
+    for name in ("velocity", "gap"):
+        assert (lit[name].type, len(lit[name].points)) == (lit[name].ARROW, 2)
+    colors = {name: (m[name].color.r, m[name].color.g) for name in ("ring", "mode") for m in [lit]}
+    assert len(set(colors.values())) == 1, "the colour is the mode's"
+    assert lit["ring"].color != free["ring"].color

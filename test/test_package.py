@@ -65,15 +65,15 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "verification": ({"core", "messages", "planners", "recording", "verification"}, set()),
     "report": (
-        {"core", "outputs", "paper", "report", "statistics", "sweep"},
-        {"matplotlib", "numpy", "rich"},
+        {"core", "outputs", "paper", "report", "scenarios", "statistics", "sweep"},
+        {"matplotlib", "numpy", "rerun", "rich"},
     ),
     "ros": (
         {"arguments", "core", "messages", "outputs", "recording", "ros", "run_config"}
         | {"node_settings", "planners", "scenarios"},
         {"numpy"} | ROS,
     ),
-    "launcher": ({"*"}, {"rich", "yaml"} | ROS),
+    "launcher": ({"*"}, {"launch", "launch_ros", "rich", "yaml"} | ROS),
     "cli": ({"*"}, {"pyarrow", "rich", "yaml"}),
 }
 # The core is handed the time and its random generators, and lets others do the talking.
@@ -229,7 +229,7 @@ def test_every_import_is_declared_and_every_dependency_justified(distribution: A
         if not requirement.startswith("#")
     }
     ros = {element.text for element in manifest() if element.tag.endswith("_depend")}
-    modules = {"PyYAML": "yaml", "mcap-ros2-support": "mcap_ros2"}
+    modules = {"PyYAML": "yaml", "mcap-ros2-support": "mcap_ros2", "rerun-sdk": "rerun"}
     declared = {modules.get(name, name) for name in wheels} | ros
     imported = {name.split(".")[0] for path in SOURCES for name in imports_of(path)}
     used = imported - sys.stdlib_module_names - {"mfba_planner"}
@@ -240,11 +240,21 @@ def test_every_import_is_declared_and_every_dependency_justified(distribution: A
     assert wheels | ros <= justified
 
 
+def shipped_inside(distribution: Any) -> set[str]:
+    """What setup.py installs in the package that is not Python."""
+    return {
+        relative(path)
+        for package, patterns in distribution.package_data.items()
+        for pattern in patterns
+        for path in ROOT.joinpath(*package.split(".")).glob(pattern)
+    }
+
+
 def test_installs_every_shipped_file_in_its_place(distribution: Any) -> None:
     placed = {path: target for target, paths in distribution.data_files for path in paths}
     shipped = {
         relative(path)
-        for pattern in ("package.xml", "config/**/*.yaml", "launch/*.py", "layout/*")
+        for pattern in ("package.xml", "config/**/*.yaml", "launch/*.launch.*", "layout/*")
         for path in ROOT.glob(pattern)
     }
     assert {"config/scenarios/case1.yaml", "launch/simulate.launch.py"} <= shipped
@@ -255,6 +265,11 @@ def test_installs_every_shipped_file_in_its_place(distribution: Any) -> None:
     assert {str(path.parent.relative_to(ROOT)).replace("/", ".") for path in SOURCES} == set(
         distribution.packages
     )
+    assert shipped_inside(distribution) == {
+        relative(path)
+        for path in PACKAGE.rglob("*")
+        if path.is_file() and path.suffix not in (".py", ".pyc")
+    }
     scripts = ConfigParser(interpolation=None)
     scripts.read(ROOT / "setup.cfg")
     assert scripts["install"]["install_scripts"] == "$base/lib/mfba_planner"

@@ -53,12 +53,13 @@ def test_some_topics_others_not_and_another_name() -> None:
 
 def test_the_inputs_of_a_node_are_what_it_reads_and_none_of_them_writes() -> None:
     recorded = whole_graph()
-    assert set(names(recorded, "--inputs-of planner")) == {"/odom", "/sectors", "/goal_pose"}
+    goals = {"/goal_pose", "/waypoints"}
+    assert set(names(recorded, "--inputs-of planner")) == {"/odom", "/sectors", *goals}
     assert set(names(recorded, "--inputs-of virtual_sensor planner")) == {
         "/odom",
         "/obstacles",
         "/scan",
-        "/goal_pose",
+        *goals,
     }
     for name in PLANNER_TOPICS:
         assert name not in names(recorded, "--inputs-of planner")

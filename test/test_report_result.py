@@ -227,7 +227,7 @@ def test_a_result_without_a_part_or_with_a_wrong_one_is_refused(
 ) -> None:
     good = result_to_dict(episode)
     path = tmp_path / "r.json"
-    for key in good:
+    for key in good.keys() - {"world"}:  # the oldest results have none
         path.write_text(json.dumps({k: v for k, v in good.items() if k != key}))
         assert key in refusal(path)
         path.write_text(json.dumps({**good, key: [1]}))

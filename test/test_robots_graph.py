@@ -77,7 +77,7 @@ def start(graph: Graph, config: RunConfig, **more: Any) -> WorldSim:
     graph.start(VirtualSensor, parameters["virtual_sensor"])
     planner = graph.start(PlannerNode, parameters["planner"])
     world = graph.start(WorldSim, {**parameters["world_sim"], **more})
-    graph.until(lambda: planner._goal is not None)
+    graph.until(lambda: planner.goals.errands.goal is not None)
     return world
 
 

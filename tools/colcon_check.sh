@@ -37,13 +37,17 @@ import os
 from ament_index_python import get_package_prefix, get_package_share_directory
 
 import mfba_planner
+from mfba_planner.core.episode import run
+from mfba_planner.report.html.page import page
 from mfba_planner.resources import scenario_names
+from mfba_planner.scenarios import load_scenario
 
 assert mfba_planner.__file__.startswith(os.environ["BASE"]), mfba_planner.__file__
 assert get_package_prefix("mfba_planner") == os.environ["PREFIX"]
 share = get_package_share_directory("mfba_planner")
 assert os.path.isfile(f"{share}/package.xml"), share
 assert "case1" in scenario_names()
+assert page([("run", run(load_scenario("empty")))]), "parts of the page are missing"
 PYTHON
         "$prefix/lib/mfba_planner/mfba" --help >/dev/null
     )

@@ -11,6 +11,7 @@ from enum import Enum
 from .drive import Speeds, command, obey
 from .errors import ConfigError, InputError
 from .geometry import Point, Pose2D, distance
+from .guarded import Guarded
 from .instruments import Instruments, Reading
 from .motion import Motion
 from .nearby import Found, Nearby
@@ -237,7 +238,7 @@ def run(
             raise ConfigError(
                 f"method={planner.method.value}: not the core's own; use planners.method.simulate"
             )
-        brain = Planner(planner, seed)
+        brain = Guarded(Planner(planner, seed))
     ticks, truth = [brain.plan(look(world, sensor))], [world.pose]
     while (outcome := world.outcome()) is None and go_on(world):
         world.step(command(ticks[-1], scenario.robot, planner.tick_ns))

@@ -14,6 +14,14 @@ class InputError(MfbaError):
     """A message or measurement that cannot be used (NaN, wrong size, out of order)."""
 
 
+class FrameError(InputError):
+    """A message in another frame than the one that was agreed on."""
+
+
+class StampError(InputError):
+    """A stamp that was answered before, or goes back."""
+
+
 class BagError(MfbaError):
     """A recording that cannot be read as what it claims to be."""
 

@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 
-from .geometry import Point
+from .geometry import Point, distance
 from .motion import Motion
 from .planner import NANO
 
 AHEAD_TICKS = 64  # whose centres are worked out at once; the paper's trip of 17 m is 57
 PICKED_TICKS = 24  # of these, for which the near ones are picked at once
-ROAM_M = 2.0  # how far the robot may go before they are picked again
+ROAM_M = 2.0  # how far the robot may at least go before they are picked again
 
 Found = tuple[list[int], list[tuple[Point, float]]]
 
@@ -29,7 +29,7 @@ class Nearby:
         self._picked: list[Found] = []
         self._picked_from = 0
         self._picked_at: Point = (math.nan, math.nan)
-        self._reach_m = math.nan
+        self._reach_m, self._roam_m = math.nan, ROAM_M
 
     def at(self, tick: int, position: Point, reach_m: float) -> Found:
         """Indices, and (centre, enlarged radius), of all whose edge is within reach, in order.
@@ -41,7 +41,7 @@ class Nearby:
         dx, dy = position[0] - self._picked_at[0], position[1] - self._picked_at[1]
         if not (
             0 <= k < len(self._picked)
-            and dx * dx + dy * dy <= ROAM_M * ROAM_M
+            and dx * dx + dy * dy <= self._roam_m * self._roam_m
             and reach_m == self._reach_m
         ):
             self._pick(tick, position, reach_m)
@@ -49,6 +49,10 @@ class Nearby:
         return self._picked[k]
 
     def _pick(self, tick: int, position: Point, reach_m: float) -> None:
+        # As far as it went last time, so that those with long steps are not picked all the time.
+        per_tick = distance(self._picked_at, position) / max(1, abs(tick - self._picked_from))
+        roam_m = 1.1 * PICKED_TICKS * per_tick
+        self._roam_m = roam_m if ROAM_M < roam_m < math.inf else ROAM_M
         k = tick - self._centers_from
         if not 0 <= k < self._centers.shape[1]:
             times_s = np.arange(tick, tick + AHEAD_TICKS) * self._tick_ns * NANO
@@ -57,7 +61,7 @@ class Nearby:
         with np.errstate(invalid="ignore", over="ignore"):
             dx, dy = centers[0] - position[0], centers[1] - position[1]
             square = (dx * dx + dy * dy).min(axis=0)
-            far = radius_m + (reach_m + ROAM_M + 1e-6)
+            far = radius_m + (reach_m + self._roam_m + 1e-6)
             away = np.isfinite(square) & (square > far * far)
         which = np.flatnonzero(~away)
         x, y = centers[:, :, which].tolist()

@@ -12,12 +12,14 @@ from typing import Protocol
 import numpy as np
 
 from .bat import BatParams, BatSwarm, Bounds, Disc, Vector, minimize
+from .caution import CautionParams
 from .errors import ConfigError
 from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
 from .geometry import Point, Pose2D, bearing, distance, towards
 from .jump import JumpWatch, explained
 from .options import check, option
-from .seen import SeenParams
+from .recovery import RecoveryParams
+from .seen import Method, SeenParams
 from .sensing import Bits, Ranges, Scan, sensory_vector
 
 NANO = 1e-9
@@ -77,18 +79,10 @@ class Swarm(Enum):
     PERSISTENT = "persistent"
 
 
-class Method(Enum):
-    """Who decides on sectors: Algorithm 1, or the planner that predicts (planners/)."""
-
-    PAPER = "paper"
-    PREDICTIVE = "predictive"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannerParams(SeenParams):
     """The reading `section6` of Algorithm 1 and section 6.2."""
 
-    method: Method = option(Method.PAPER, "Algorithm 1, or our planner that predicts")
     speed_mps: float = option(0.785, "robot speed", unit="m/s", minimum=0.01, maximum=100.0)
     step_length_m: float = option(
         0.3, "longest goal step, in both modes", unit="m", minimum=0.001, maximum=100.0
@@ -102,6 +96,8 @@ class PlannerParams(SeenParams):
     gap_heading: GapHeading = option(GapHeading.BOUNDARY, "where a gap leads, in its two sectors")
     swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
     bat: BatParams = field(default_factory=BatParams)
+    caution: CautionParams = field(default_factory=CautionParams)
+    recovery: RecoveryParams = field(default_factory=RecoveryParams)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range."""
@@ -112,11 +108,6 @@ class PlannerParams(SeenParams):
         """Who decides, for people: the law of beta in Algorithm 1, or the other method."""
         paper = self.method is Method.PAPER
         return self.bat.algorithm.value if paper else self.method.value
-
-    @property
-    def tracks_scan(self) -> bool:
-        """Whether it wants the scan beside the sectors."""
-        return self.method is Method.PREDICTIVE and self.scan_radius_m > 0.0
 
     @property
     def tick_ns(self) -> int:

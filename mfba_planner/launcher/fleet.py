@@ -5,15 +5,17 @@ from __future__ import annotations
 
 import sys
 
+from ..core.errors import MfbaError
 from ..core.metrics import evaluate
 from ..recording.fleet import read_fleet
 from .attempt import Attempt
 
 
-def conclude_fleet(attempt: Attempt, failure: str = "") -> str:
-    """Print the table, write NAME.json for each robot and run.png; why it is no success, or "".
+def conclude_fleet(attempt: Attempt, _: object = None, *, failure: str = "") -> None:
+    """Print the table, write NAME.json for each robot and run.png.
 
-    Raises BagError where the bag holds no decision of a robot or was not closed.
+    Raises MfbaError where the run, otherwise fine, was no success, and BagError where the bag
+    holds no decision of a robot or was not closed.
     """
     from ..report.fleet import draw_fleet, fleet_text, why_no_success
     from ..report.result import result_to_dict, write_result
@@ -30,5 +32,11 @@ def conclude_fleet(attempt: Attempt, failure: str = "") -> str:
         draw_fleet(title, names, episodes, results, config.seed, directory.picture)
     sys.stdout.write(fleet_text(names, results))
     print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
-    why = why_no_success(results)
-    return f"{directory.path}: {why}" if why else ""
+    if failure:
+        return
+    if attempt.order.view:
+        from ..report.viewer import show
+
+        show(list(zip(names, episodes)))
+    if why := why_no_success(results):
+        raise MfbaError(f"{directory.path}: {why}")

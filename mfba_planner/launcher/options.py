@@ -48,6 +48,7 @@ class Order:
     out: Path | None = None
     timeout_s: float = TIMEOUT_S
     picture: bool = True
+    view: bool = False
     node_args: dict[str, list[str]]
 
 
@@ -91,6 +92,9 @@ def read_order(args: list[str], prog: str) -> Order:
         "--out", type=Path, metavar="DIR", help="directory to create (default: runs/run-NNN)"
     )
     output.add_argument("--no-picture", action="store_true", help="leave out run.png")
+    output.add_argument(
+        "--view", action="store_true", help="open the run in Rerun's viewer when it is over"
+    )
     return _order(parser.parse(args))
 
 
@@ -238,8 +242,13 @@ def _order(found: argparse.Namespace) -> Order:
             f"--{given[0].replace('_', '-')}-args: the {driver.value} driver starts no processes; "
             "use --set, or --driver multi-process"
         )
+    if found.view:
+        from ..report.viewer import require_viewer
+
+        require_viewer()
     return Order(
         config=config,
+        view=found.view,
         out=found.out,
         timeout_s=_timeout_s(found.timeout, config),
         picture=not found.no_picture,

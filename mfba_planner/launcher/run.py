@@ -39,18 +39,24 @@ def run(order: Order) -> int:
                 attempt.directory.discard()
     fleet = bool(order.config.scenario.robots)
     if failure is None:
-        if not fleet:
-            conclude(attempt, episode).judge()
-        elif why := conclude_fleet(attempt):
-            raise MfbaError(why)
+        (conclude_fleet if fleet else _conclude)(attempt, episode)
         return 0
     if attempt.has_begun:
         with suppress(BagError):  # nothing to tell of; the failure is told below
             if fleet:
-                conclude_fleet(attempt, str(failure))
+                conclude_fleet(attempt, failure=str(failure))
             else:
                 conclude(attempt, episode, str(failure))
     return _fail(failure, attempt)
+
+
+def _conclude(attempt: Attempt, episode: Episode | None) -> None:
+    conclusion = conclude(attempt, episode)
+    if attempt.order.view:
+        from ..report.viewer import show
+
+        show([(conclusion.directory.name, conclusion.episode)])
+    conclusion.judge()
 
 
 def _drive(attempt: Attempt) -> Episode | None:

@@ -29,7 +29,7 @@ T = TypeVar("T")
 TRUTH = "/ground_truth"
 
 # Options younger than the oldest bags: what they default to is what was done then.
-LATER = {"method", "jump_m", "scan_radius_m"}
+LATER = ("method", "jump_m", "scan_radius_m", "caution.", "recovery.")
 
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
@@ -74,6 +74,7 @@ class Setup(NamedTuple):
     seed: int
     driver: str
     lockstep: bool
+    odom_frame: str = ""  # that its inputs must be in; "": any
 
     def episode(self, ticks: tuple[Decision, ...], truth: Mapping[int, Pose2D] = {}) -> Episode:
         """The Episode of these decisions, at least one; truth is where the robot was, by stamp."""
@@ -115,6 +116,7 @@ def read_setup(reader: BagReader, *, fleet: bool = False, robot: str = "") -> Se
             seed=planner["seed"],
             driver=configuration["run"].get("driver", "by hand"),
             lockstep=bool(planner["lockstep"]),
+            odom_frame=planner.get("odom_frame", ""),
         )
     except (ConfigError, InputError) as error:
         raise BagError(f"{reader.path}: {error}") from None
@@ -126,7 +128,7 @@ def read_setup(reader: BagReader, *, fleet: bool = False, robot: str = "") -> Se
 
 def _only(defaults: T, values: dict[str, Any]) -> T:
     """The options of one dataclass out of all parameters of a node."""
-    told = [name for name in flatten(defaults) if name in values or name not in LATER]
+    told = [name for name in flatten(defaults) if name in values or not name.startswith(LATER)]
     return override(defaults, {name: values[name] for name in told})
 
 

@@ -21,11 +21,13 @@ from mfba_planner.core.errors import InputError
 from mfba_planner.core.metrics import Result, evaluate
 from mfba_planner.core.options import flatten
 from mfba_planner.outputs import write_new
+from mfba_planner.scenarios import scenario_to_dict
 
 SCHEMA_VERSION = 1
 _KINDS = {
     "schema_version": int,
     "scenario": str,
+    "world": dict,
     "seed": int,
     "driver": str,
     "algorithm": str,
@@ -35,12 +37,14 @@ _KINDS = {
     "result": dict,
     "extra": dict,
 }
+_LATER = {"world"}  # keys that the oldest results lack
 
 
 def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str, Any]:
     """Everything a result file holds, in plain JSON values.
 
-    parameters has the flattened options of planner and sensor; extra holds what the caller
+    world is the whole scenario as its files have it (the oldest results lack it); parameters
+    has the flattened options of planner and sensor; extra holds what the caller
     knows beyond the episode (wall time, file names). JSON has no infinity: null stands for a
     number that is not finite, which means for fitness that the robot never moved, for
     min_clearance_m that there are no obstacles.
@@ -48,6 +52,7 @@ def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str,
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": episode.scenario.name,
+        "world": scenario_to_dict(episode.scenario),
         "seed": episode.seed,
         "driver": episode.driver,
         "algorithm": episode.label,
@@ -124,6 +129,8 @@ def _fault(data: Any) -> str:
         return f"schema_version={version!r} is unknown (this is version {SCHEMA_VERSION})"
     for key, kind in _KINDS.items():
         if key not in data:
+            if key in _LATER:
+                continue
             return f"{key} is missing"
         if type(data[key]) is not kind:
             return f"{key} is of type {type(data[key]).__name__}, not {kind.__name__}"

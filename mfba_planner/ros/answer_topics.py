@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 
+from ..core.geometry import Point
 from ..messages import stamp_ns
 from ..node_settings import WorldSimSettings
 from . import topics
 from .answers import Answers
+from .deadman import Deadman
 from .letterboxes import Letter, Letterboxes
 from .namespaced import Namespaced
 from .runtime import GraphNode
@@ -33,6 +36,7 @@ class AnswerTopics:
         self._on_twist = on_twist
         self._on_heard = on_heard
         self._answers = Answers()
+        self._deadman = Deadman(settings)
         stamped = TwistStamped if settings.enable_stamped_cmd_vel else None
         node.listen(topics.CMD_VEL, self._on_cmd_vel, stamped)
         # Looked into when a Twist has come: nothing more to wake up for.
@@ -46,8 +50,13 @@ class AnswerTopics:
             self._goal_steps.empty()
         return self._answers.take(stamp)
 
+    def still_holds(self, velocity: Point) -> Point:
+        """Real time: the velocity that was commanded, or rest where that was too long ago."""
+        return (0.0, 0.0) if self._deadman.lets_go(time.monotonic()) else velocity
+
     def _on_cmd_vel(self, message: Any, info: Any) -> None:
         if not self._settings.lockstep:
+            self._deadman.heard(time.monotonic())
             self._on_twist(message)
             return
         sent_ns = info["source_timestamp"]

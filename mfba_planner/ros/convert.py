@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -22,6 +23,7 @@ from ..core.planner import Decision, Mode
 from ..core.robot import Base
 from ..core.sensing import Bits, Ranges, Scan, SensorParams, longest_range_m
 from ..messages import SECOND_NS, bits_text, body_velocity, points_text, rotated
+from .health import Status
 
 OMNIDIRECTIONAL = Base()
 
@@ -174,13 +176,16 @@ def twist_stamped_msg(
     return message
 
 
+_NOTHING: Mapping[str, str] = MappingProxyType({})
 _LEVELS = {
     Mode.BLOCKED: DiagnosticStatus.WARN,
     Mode.STOPPED: DiagnosticStatus.ERROR,
 }
 
 
-def decision_msg(decision: Decision, algorithm: str, refused: int, name: str) -> DiagnosticArray:
+def decision_msg(
+    decision: Decision, algorithm: str, refused: int, name: str, more: Mapping[str, str] = _NOTHING
+) -> DiagnosticArray:
     """Why the planner did what it did; floats as text that gives back the same floats."""
     values = {
         "mode": decision.mode.value,
@@ -194,6 +199,7 @@ def decision_msg(decision: Decision, algorithm: str, refused: int, name: str) ->
         "candidates": points_text(decision.candidates),
         "algorithm": algorithm,
         "refused_inputs": str(refused),
+        **more,
     }
     status = DiagnosticStatus(level=_LEVELS.get(decision.mode, DiagnosticStatus.OK), name=name)
     status.message = decision.reason
@@ -202,6 +208,26 @@ def decision_msg(decision: Decision, algorithm: str, refused: int, name: str) ->
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     message = DiagnosticArray(status=[status])
     set_stamp(message.header.stamp, decision.stamp_ns)
+    return message
+
+
+def diagnostics_msg(
+    statuses: Sequence[Status], who: str, hardware_id: str, stamp_ns: int
+) -> DiagnosticArray:
+    """Statuses as /diagnostics has them: each is called 'node: what it is about'."""
+    message = DiagnosticArray()
+    set_stamp(message.header.stamp, stamp_ns)
+    for status in statuses:
+        values = [KeyValue(key=key, value=value) for key, value in status.values.items()]
+        message.status.append(
+            DiagnosticStatus(
+                level=bytes([status.level]),
+                name=f"{who}: {status.name}",
+                message=status.message,
+                hardware_id=hardware_id,
+                values=values,
+            )
+        )
     return message
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..core.errors import InputError
+from ..core.errors import StampError
 from ..core.geometry import Pose2D
 from ..core.planner import Refused
 from ..core.sensing import Ranges
@@ -29,12 +29,12 @@ class Lockstep:
         self._pairs: StampPairs[Pose2D | Refused, Ranges | Refused] = StampPairs(again=True)
 
     def odom(self, stamp_ns: int, pose: Pose2D | Refused, _now_s: float) -> Ready | None:
-        """Take odom; InputError for a stamp that was answered before."""
+        """Take odom; StampError for a stamp that was answered before."""
         pair = self._pairs.add_a(stamp_ns, pose)
         return Ready(stamp_ns, *pair) if pair else None
 
     def sectors(self, stamp_ns: int, ranges_m: Ranges | Refused, _now_s: float) -> Ready | None:
-        """Take sectors; InputError for a stamp that was answered before."""
+        """Take sectors; StampError for a stamp that was answered before."""
         pair = self._pairs.add_b(stamp_ns, ranges_m)
         return Ready(stamp_ns, *pair) if pair else None
 
@@ -50,16 +50,18 @@ class Newest:
         self._odom_s = self._sectors_s = 0.0
 
     def odom(self, stamp_ns: int, pose: Pose2D | Refused, now_s: float) -> Ready | None:
-        """Keep odom for the next sectors; InputError for a stamp that goes back."""
+        """Keep odom for the next sectors; StampError for a stamp that goes back."""
         if stamp_ns < max(self._odom_ns, 0):
-            raise InputError(_goes_back("odom", stamp_ns, self._odom_ns))
-        self._odom_ns, self._pose, self._odom_s = stamp_ns, pose, now_s
+            raise StampError(_goes_back("odom", stamp_ns, self._odom_ns))
+        if stamp_ns > self._odom_ns:  # the same once more is no news: it does not make it younger
+            self._odom_s = now_s
+        self._odom_ns, self._pose = stamp_ns, pose
         return None
 
     def sectors(self, stamp_ns: int, ranges_m: Ranges | Refused, now_s: float) -> Ready | None:
-        """Answer sectors; InputError for a stamp that does not rise."""
+        """Answer sectors; StampError for a stamp that does not rise."""
         if stamp_ns <= self._sectors_ns:
-            raise InputError(_goes_back("sectors", stamp_ns, self._sectors_ns))
+            raise StampError(_goes_back("sectors", stamp_ns, self._sectors_ns))
         self._sectors_ns, self._ranges, self._sectors_s = stamp_ns, ranges_m, now_s
         return self._ready(now_s - self._odom_s if self._odom_ns >= 0 else 0.0)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What RViz and Foxglove show: obstacles, sensing ring, lit sectors, candidates; and tf."""
+"""What RViz and Foxglove show: obstacles, and around the robot ring, sectors, gap; and tf."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ..core.episode import World
-from ..core.geometry import Point, towards
+from ..core.geometry import Point, bearing, towards
 from ..core.planner import NANO, Decision, Mode
+from ..core.sensing import Ranges
 from .convert import pose_msg, set_header
 
 Rgba = tuple[float, float, float, float]
@@ -26,6 +27,8 @@ SKY: Rgba = (0.34, 0.71, 0.91, 0.9)
 GREEN: Rgba = (0.0, 0.62, 0.45, 0.9)
 VERMILION: Rgba = (0.84, 0.37, 0.0, 0.9)
 GREY: Rgba = (0.5, 0.5, 0.5, 0.6)
+FAINT: Rgba = (0.90, 0.62, 0.0, 0.25)
+RING, SLICES = 72, 4  # corners of the ring, triangles of a sector
 
 MODE_COLORS = {
     Mode.IDLE: GREY,
@@ -67,25 +70,62 @@ def world_markers(world: World, stamp_ns: int, frame_id: str) -> MarkerArray:
     for number, (obstacle, a, b) in enumerate(zip(world.scenario.obstacles, now, later)):
         marks.append(_disc("obstacles", number, a, obstacle.radius_m, GREY))
         if a != b:
-            marks.append(_line("velocities", number, [a, b], 0.05, VERMILION))
+            marks.append(_arrow("velocities", number, [a, b], VERMILION))
     return _array(marks, stamp_ns, frame_id)
 
 
-def decision_markers(decision: Decision, frame_id: str) -> MarkerArray:
-    """The lit sectors, the candidates and the step, in the colour of the mode."""
+def decision_markers(decision: Decision, frame_id: str, reach_m: float) -> MarkerArray:
+    """Mode, ring, sectors, gap, candidates and step around the robot; reach_m is the ring's."""
     color = MODE_COLORS[decision.mode]
-    position = decision.pose.position
-    marks = [_line("goal_step", 0, [position, decision.waypoint], 0.06, color)]
-    marks.append(_points("candidates", 0, decision.candidates, GREEN))
+    position, waypoint = decision.pose.position, decision.waypoint
     n = len(decision.ranges_m)
-    width = 2.0 * math.pi / n if n else 0.0
-    lit: list[Point] = []
+    reach_m = reach_m if math.isfinite(reach_m) else 0.0
+    ring = [towards(position, k * math.tau / RING, reach_m) for k in range(RING + 1)]
+    ahead = towards(position, bearing(position, waypoint), reach_m)
+    vx, vy = decision.velocity
+    there = (position[0] + vx, position[1] + vy)
+    marks = [
+        _line("ring", 0, ring if reach_m else [], 0.03, color),
+        _line("spokes", 0, _spokes(position, n, reach_m), 0.01, GREY, kind=Marker.LINE_LIST),
+        _fan("lit", position, decision.ranges_m, reach_m),
+        _line("sectors", 0, _outlines(decision), 0.03, ORANGE, kind=Marker.LINE_LIST),
+        _arrow("gap", 0, [position, ahead] if decision.gap else [], GREEN),
+        _arrow("velocity", 0, [position, there] if there != position else [], color),
+        _line("goal_step", 0, [position, waypoint], 0.06, color),
+        _points("candidates", 0, decision.candidates, GREEN),
+        _text("mode", position, decision.mode.value.replace("_", " "), color),
+    ]
+    return _array(marks, decision.stamp_ns, frame_id)
+
+
+def _spokes(position: Point, n: int, reach_m: float) -> list[Point]:
+    """The boundaries of all sectors."""
+    ends = [towards(position, k * math.tau / n, reach_m) for k in range(n)] if reach_m else []
+    return [point for end in ends for point in (position, end)]
+
+
+def _outlines(decision: Decision) -> list[Point]:
+    """Each lit sector as far as it is free."""
+    position, lit = decision.pose.position, []
+    width = math.tau / max(len(decision.ranges_m), 1)
     for i, r in enumerate(decision.ranges_m):
         if math.isfinite(r):
-            edges = [towards(position, k * width, max(r, 0.05)) for k in (i, i + 1)]
-            lit += [position, edges[0], edges[0], edges[1], edges[1], position]
-    marks.append(_line("sectors", 0, lit, 0.03, ORANGE, kind=Marker.LINE_LIST))
-    return _array(marks, decision.stamp_ns, frame_id)
+            a, b = (towards(position, k * width, max(r, 0.05)) for k in (i, i + 1))
+            lit += [position, a, a, b, b, position]
+    return lit
+
+
+def _fan(namespace: str, position: Point, ranges_m: Ranges, reach_m: float) -> Marker:
+    """The area of all lit sectors, out to the ring."""
+    corners: list[Point] = []
+    width = math.tau / max(len(ranges_m), 1)
+    for i, r in enumerate(ranges_m):
+        for k in range(SLICES if math.isfinite(r) and reach_m else 0):
+            a, b = (towards(position, (i + (k + e) / SLICES) * width, reach_m) for e in (0, 1))
+            corners += [position, a, b]
+    mark = _points(namespace, 0, corners, FAINT)
+    mark.type, mark.scale = Marker.TRIANGLE_LIST, Vector3(x=1.0, y=1.0, z=1.0)
+    return mark
 
 
 def tf_msg(odom: Odometry) -> Any:
@@ -132,6 +172,21 @@ def _line(
     mark = _points(namespace, number, points, rgba)
     mark.type = kind
     mark.scale = Vector3(x=width, y=0.0, z=0.0)
+    return mark
+
+
+def _arrow(namespace: str, number: int, points: Sequence[Point], rgba: Rgba) -> Marker:
+    """From the first to the second of two points, or nothing."""
+    mark = _points(namespace, number, points, rgba)
+    mark.type, mark.scale = Marker.ARROW, Vector3(x=0.05, y=0.12, z=0.12)
+    return mark
+
+
+def _text(namespace: str, place: Point, text: str, rgba: Rgba) -> Marker:
+    """Words above a place, turned to whoever looks."""
+    mark = _disc(namespace, 0, place, 0.0, rgba)
+    mark.type, mark.text = Marker.TEXT_VIEW_FACING, text
+    mark.pose.position.z, mark.scale = 0.5, Vector3(x=0.0, y=0.0, z=0.2)
     return mark
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import Any, Generic, TypeVar
 
-from ..core.errors import InputError
+from ..core.errors import StampError
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -28,7 +28,7 @@ class StampPairs(Generic[A, B]):
         self._answered_ns = -1
 
     def add_a(self, stamp_ns: int, value: A) -> tuple[A, B] | None:
-        """Take a message of stream a; InputError for a stamp that was answered before."""
+        """Take a message of stream a; StampError for a stamp that was answered before."""
         self._refuse_old(stamp_ns)
         if stamp_ns in self._b:
             pair = (value, self._b[stamp_ns])
@@ -38,7 +38,7 @@ class StampPairs(Generic[A, B]):
         return None
 
     def add_b(self, stamp_ns: int, value: B) -> tuple[A, B] | None:
-        """Take a message of stream b; InputError for a stamp that was answered before."""
+        """Take a message of stream b; StampError for a stamp that was answered before."""
         self._refuse_old(stamp_ns)
         if stamp_ns in self._a:
             pair = (self._a[stamp_ns], value)
@@ -50,7 +50,7 @@ class StampPairs(Generic[A, B]):
     def _refuse_old(self, stamp_ns: int) -> None:
         oldest_ns = self._answered_ns + (0 if self._again else 1)
         if stamp_ns < max(oldest_ns, 0):
-            raise InputError(
+            raise StampError(
                 f"stamp {stamp_ns} ns: not newer than {self._answered_ns} ns, answered before; "
                 "stamps must rise"
             )

@@ -7,20 +7,23 @@ import time
 from typing import Any
 
 from ..core.errors import InputError
-from ..core.geometry import Point, Pose2D
-from ..core.jump import carried_off
+from ..core.geometry import Pose2D
 from ..core.planner import NANO, Decision, Mode, PlannerParams, observe
-from ..messages import goal_point, robot_pose, sector_ranges, stamp_ns
+from ..core.recovery import Phase
+from ..messages import robot_pose, sector_ranges, stamp_ns
 from ..node_settings import PlannerSettings, names
 from ..planners.method import brain
-from . import convert, markers, params, topics
-from .cmd_vel import CmdVel
+from . import params, topics
+from .goals import Goals
 from .inputs import Lockstep, Newest, Ready
-from .runtime import GraphNode, Refusals, spin_node
+from .managed import ManagedNode
+from .planner_health import PlannerHealth
+from .planner_topics import PlannerTopics
+from .runtime import Refusals, spin_node
 from .sight import Sight
 
 
-class PlannerNode(GraphNode):
+class PlannerNode(ManagedNode):
     """Algorithm 1, or another method, as a node: convert, decide, convert."""
 
     def __init__(self, **kwargs: Any) -> None:
@@ -30,30 +33,46 @@ class PlannerNode(GraphNode):
         self.brain = brain(params.declare(self, PlannerParams()), seed=s.seed)
         params.follow(self, lambda: self.brain.params, self._set_params)
         self._refusals = Refusals(self)
-        self._goal: Point | None = None
-        self._heard_goal = False
-        self._pose = Pose2D(0.0, 0.0)  # the last that could be used
-        self._last: Decision | None = None
-        self._goal_step = self.advertise(topics.GOAL_STEP)
-        self._plan = self.advertise(topics.PLAN)
-        self._decision = self.advertise(topics.DECISION)
-        self._markers = self.advertise(topics.MARKERS)
-        self._view = markers.Seldom(s.view_period_s)
-        self._cmd_vel = CmdVel(self, s)
-        self._inputs: Lockstep | Newest = Lockstep() if s.lockstep else Newest()
-        self.listen(topics.ODOM, self._on_odom, from_anyone=not s.lockstep)
-        yaw = s.scan_yaw if self.brain.params.tracks_scan else None
-        self._sight = Sight(self, self._refusals, self._on_sectors, yaw)
-        self.listen(topics.GOAL_POSE, self._on_goal)
-        self.offer_ready(names(s.wait_for))
+        self.goals = Goals(self, s.odom_frame, self._refusals, self._is_over, self._set_out)
+        params_now = self.brain.params
+        self._sight = Sight(self, self._refusals, self._on_sectors, params_now, s.scan_yaw)
+        self._health = PlannerHealth(self, s, self._refusals)
+        self._forget()
         self.on_time_set_back(self._start_afresh)
-        if not s.lockstep:
-            period_s = min(max(0.25 * self.brain.params.input_timeout_s, 0.02), 0.25)
-            self.every(period_s, self._watch)
+        timeout_s = self.brain.params.input_timeout_s
+        self.every(0.5 if s.lockstep else min(max(0.25 * timeout_s, 0.02), 0.25), self._watch)
+        self.begin(s.autostart)
+        self.offer_ready(names(s.wait_for))
+
+    def set_up(self) -> None:
+        """Advertise and subscribe."""
+        s = self.settings
+        self._say = PlannerTopics(self, s, lambda: self.brain.params.tick_ns)
+        self.listen(topics.ODOM, self._on_odom, from_anyone=not s.lockstep)
+        self._sight.listen()
+        self.goals.listen()
+
+    def halt(self) -> None:
+        """Command rest once: nobody will, from now on."""
+        self._say.halt(self._pose.position, self._last.stamp_ns if self._last else 0)
+        self.goals.errands.begin_anew()
+        self._forget()
+
+    def tear_down(self) -> None:
+        """Forget all but the parameters; be neither heard nor spoken to."""
+        self.hang_up(keep=[topics.DIAGNOSTICS])
+        self.goals.forget()
+        self._forget()
+
+    def close(self) -> None:
+        """In real time, leave the robot at rest."""
+        if self.is_active and not self.settings.lockstep:
+            self.halt()
 
     def missing(self) -> str:
         """Besides the subscribers: the goal, when peers are waited for."""
-        return super().missing() or ("no goal_pose yet" if self._peers and not self._goal else "")
+        wanting = self._peers and not self.goals.errands.goal
+        return super().missing() or ("no goal_pose yet" if wanting else "")
 
     def _set_params(self, changed: PlannerParams) -> None:
         if changed.method is not self.brain.params.method:
@@ -62,84 +81,68 @@ class PlannerNode(GraphNode):
 
     def _start_afresh(self) -> None:
         self.get_logger().warning("time was set back: starting afresh")
-        self.brain.reset()
-        self._last = None
-        self._inputs = type(self._inputs)()
-        self._sight.forget()
+        self._forget()
 
-    def _on_goal(self, message: Any) -> None:
+    def _forget(self) -> None:
         self.brain.reset()
-        self._goal, self._heard_goal = None, True
-        frame, ours = message.header.frame_id, self.settings.odom_frame
-        if frame not in ("", ours):
-            self.get_logger().warning(f"goal_pose is in frame {frame!r}: taken as {ours!r}")
-        try:
-            self._goal = goal_point(message)
-        except InputError as error:
-            self._refusals.add(error)
+        self._sight.forget()
+        self._pose = Pose2D(0.0, 0.0)  # the last that could be used
+        self._last: Decision | None = None
+        self._inputs: Lockstep | Newest = Lockstep() if self.settings.lockstep else Newest()
+
+    def _set_out(self) -> None:
+        self.brain.reset()
+
+    def _is_over(self) -> bool:
+        arrived = self._last is not None and self._last.mode is Mode.ARRIVED
+        return arrived or self.brain.phase is Phase.GIVEN_UP
 
     def _on_odom(self, message: Any) -> None:
-        self._take(message, robot_pose, self._inputs.odom)
+        self._take("odom", message, robot_pose, self._inputs.odom)
 
     def _on_sectors(self, message: Any) -> None:
-        self._take(message, sector_ranges, self._inputs.sectors)
+        self._say.reach_m = message.range_max
+        self._take("sectors", message, sector_ranges, self._inputs.sectors)
 
-    def _take(self, message: Any, read: Any, add: Any) -> None:
+    def _take(self, name: str, message: Any, read: Any, add: Any) -> None:
         """Read one input and answer, if that completes what a decision needs."""
+        stamp, now_s = stamp_ns(message.header.stamp), time.monotonic()
         try:
-            value = read(message)
+            value = read(message, self.settings.odom_frame)
         except InputError as error:
-            self._refusals.add(error)
+            self._refusals.add(error, name)
             value = str(error)
         try:
-            ready = add(stamp_ns(message.header.stamp), value, time.monotonic())
+            ready = add(stamp, value, now_s)
         except InputError as error:
-            self._refusals.add(error)
+            self._refusals.add(error, name)
         else:
+            self._health.heard(name, stamp, now_s, value if isinstance(value, str) else "")
             self._answer(ready)
 
     def _watch(self) -> None:
-        """Real time: say stop, again and again, while sectors or odom are stale."""
+        """Say stop, again and again, while sectors or odom are stale; and how things are."""
+        now_s = time.monotonic()
         if isinstance(self._inputs, Newest):
-            self._answer(self._inputs.stale(time.monotonic(), self.brain.params.input_timeout_s))
+            self._answer(self._inputs.stale(now_s, self.brain.params.input_timeout_s))
+        self._health.report(self._last, self.brain, self.goals.errands, self.state, now_s)
 
     def _answer(self, ready: Ready | None) -> None:
-        if ready is None:
+        if ready is None or not self.is_active:
             return
         stamp, pose, ranges, age_s = ready
         if self.settings.lockstep and self._last and self._last.stamp_ns == stamp:
-            self._move(self._last)  # asked again: that answer got lost, or is on its way
+            self._say.move(self._last)  # asked again: that answer got lost, or is on its way
             return
-        if self.settings.lockstep and self._goal_is_under_way():
+        if self.settings.lockstep and self.goals.is_under_way():
             return  # restarted: the world asks again
-        seen = observe(stamp, pose, ranges, self._goal, self._pose, round(age_s / NANO))
+        goal = self.goals.next_from(pose, self.brain.params.goal_tolerance_m)
+        seen = observe(stamp, pose, ranges, goal, self._pose, round(age_s / NANO))
         self._pose = seen.pose
-        decision = self.brain.plan(self._sight.seen(seen))
-        if decision.mode is Mode.STOPPED or carried_off(decision.reason):
-            self.get_logger().warning(decision.reason, throttle_duration_sec=1.0)
-        self._last = decision
-        self._publish(decision)
-
-    def _goal_is_under_way(self) -> bool:
-        """Whether somebody gives goals, of which a planner this young has not heard the last."""
-        return not self._heard_goal and self.count_publishers(topics.GOAL_POSE.name) > 0
-
-    def _publish(self, decision: Decision) -> None:
-        """What the world waits for first, everything about the decision while it moves on."""
-        self._move(decision)
-        s, stamp = self.settings, decision.stamp_ns
-        who, algorithm = self.get_fully_qualified_name(), self.brain.params.label
-        self._plan.publish(convert.plan_msg(decision, s.odom_frame))
-        reason = convert.decision_msg(decision, algorithm, self._refusals.count, who)
-        self._decision.publish(reason)
-        if self._view.due(stamp):
-            self._markers.publish(markers.decision_markers(decision, s.odom_frame))
-
-    def _move(self, decision: Decision) -> None:
-        """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
-        s, stamp = self.settings, decision.stamp_ns
-        self._goal_step.publish(convert.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame))
-        self._cmd_vel.publish(decision, self.brain.params.tick_ns)
+        self._last = decision = self.brain.plan(self._sight.seen(seen))
+        more = {"errand": str(self.goals.errands.number), "leg": self.goals.errands.leg}
+        self._say.decided(decision, self.brain.params.label, self._refusals.count, more)
+        self._health.decided(decision, self.brain, self.goals.errands, self.state)
 
 
 def main(args: list[str]) -> int:

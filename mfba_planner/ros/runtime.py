@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Collection
 from typing import Any
 
 import rclpy
@@ -16,9 +17,11 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
+from ..core.errors import FrameError, StampError
 from . import params
 from .letterboxes import Deliver, Letterboxes, Once
 from .topics import Topic, expected_readers, reading_qos
@@ -77,6 +80,7 @@ class GraphNode(Node):
         self._writers: list[tuple[Topic, Publisher]] = []
         self._peers: set[str] = set()
         self._jumps: list[JumpHandle] = []
+        self._readers: list[Subscription] = []
 
     def advertise(self, topic: Topic, message_type: Any = None) -> Publisher:
         """Create the publisher of a topic of topics.py.
@@ -121,7 +125,9 @@ class GraphNode(Node):
         events = SubscriptionEventCallbacks(use_default_callbacks=not several)
         call: Any = _once(callback) if several else callback
         for qos in profiles:
-            self.create_subscription(kind, name, call, qos, event_callbacks=events)
+            self._readers.append(
+                self.create_subscription(kind, name, call, qos, event_callbacks=events)
+            )
 
     def open_boxes(
         self,
@@ -146,6 +152,15 @@ class GraphNode(Node):
             for qos in profiles
         ]
         letterboxes.add(boxes, deliver)
+
+    def hang_up(self, keep: Collection[Topic] = ()) -> None:
+        """Destroy what advertise and listen have created, but the publishers of these topics."""
+        while self._readers:
+            self.destroy_subscription(self._readers.pop())
+        for topic, publisher in self._writers:
+            if topic not in keep:
+                self.destroy_publisher(publisher)
+        self._writers = [(topic, made) for topic, made in self._writers if topic in keep]
 
     def every(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """Call back every period_s of real time, whatever the node's clock does."""
@@ -216,17 +231,28 @@ def _once(callback: Callable[[Any], None]) -> Callable[[Any, Any], None]:
     return call
 
 
+_KINDS = {FrameError: "frame", StampError: "stamp"}
+
+
 class Refusals:
     """Counts the inputs a node refused, and says so once a second at most."""
 
     def __init__(self, node: Node) -> None:
         """Start at 0."""
-        self.count = 0
+        self.by_kind: Counter[str] = Counter()
+        self.last = ""
         self._node = node
 
-    def add(self, error: Exception) -> None:
-        """Count one refused input."""
-        self.count += 1
+    @property
+    def count(self) -> int:
+        """How many were refused."""
+        return self.by_kind.total()
+
+    def add(self, error: Exception, source: str = "input") -> None:
+        """Count one refused input of a source, by what is wrong with it."""
+        kind = next((name for of, name in _KINDS.items() if isinstance(error, of)), "value")
+        self.by_kind[f"{source}: {kind}"] += 1
+        self.last = str(error)
         self._node.get_logger().warning(
             f"refused ({self.count} so far): {error}", throttle_duration_sec=1.0
         )

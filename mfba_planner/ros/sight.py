@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..core.errors import InputError
-from ..core.planner import Observation
+from ..core.planner import Observation, PlannerParams
 from ..core.sensing import Scan, aligned
 from ..messages import laser_scan, stamp_ns
 from . import topics
@@ -24,29 +24,29 @@ class Sight:
         node: GraphNode,
         refusals: Refusals,
         deliver: Callable[[Any], None],
-        scan_yaw_rad: float | None,
+        params: PlannerParams,
+        scan_yaw_rad: float,
     ) -> None:
-        """Listen to sectors, and to scans where the yaw of their frame is given."""
-        self._deliver, self._refusals, self._yaw = deliver, refusals, scan_yaw_rad
-        self._pairs: StampPairs[Any, Any] = StampPairs(again=True)
-        self._scan: Scan | None = None
-        node.listen(topics.SECTORS, self._on_sectors if self.tracks else deliver)
-        if self.tracks:
-            node.listen(topics.SCAN, self._on_scan)
+        """Whether scans are wanted at all, params say."""
+        self._node, self._refusals, self._deliver = node, refusals, deliver
+        self._yaw, self.tracks = scan_yaw_rad, params.tracks_scan
+        self.forget()
 
-    @property
-    def tracks(self) -> bool:
-        """Whether there is a scan beside the sectors."""
-        return self._yaw is not None
+    def listen(self) -> None:
+        """Subscribe to sectors, and to scans where they are wanted."""
+        on_sectors = self._on_sectors if self.tracks else self._deliver
+        self._node.listen(topics.SECTORS, on_sectors)
+        if self.tracks:
+            self._node.listen(topics.SCAN, self._on_scan)
 
     def forget(self) -> None:
         """Begin anew, as when time was set back."""
-        self._pairs = StampPairs(again=True)
-        self._scan = None
+        self._pairs: StampPairs[Any, Any] = StampPairs(again=True)
+        self._scan: Scan | None = None
 
     def seen(self, obs: Observation) -> Observation:
         """The observation with the scan that its sectors were made of."""
-        if self._yaw is None or self._scan is None or obs.refused:
+        if self._scan is None or obs.refused:
             return obs
         return replace(obs, scan=aligned(self._scan, obs.pose.yaw + self._yaw))
 
@@ -60,7 +60,7 @@ class Sight:
         try:
             pair = add(stamp_ns(message.header.stamp), message)
         except InputError as error:
-            self._refusals.add(error)
+            self._refusals.add(error, "scan")
             return
         if pair is not None:
             sectors, scan = pair

@@ -148,6 +148,8 @@ OUTCOME = Topic(
 INITIALPOSE = Topic(
     name="initialpose", type=PoseWithCovarianceStamped, readers=(WORLD_SIM,), qos=VIEW_QOS
 )
+WAYPOINTS = Topic(name="waypoints", type=Path, readers=(PLANNER,), qos=VIEW_QOS)
+DIAGNOSTICS = Topic(name="/diagnostics", type=DiagnosticArray, writers=(PLANNER,), qos=VIEW_QOS)
 MARKERS = Topic(name="markers", type=MarkerArray, writers=(WORLD_SIM, PLANNER), qos=VIEW_QOS)
 
 GRAPH: tuple[Topic, ...] = (
@@ -159,6 +161,7 @@ GRAPH: tuple[Topic, ...] = (
     SECTORS,
     SENSORY_VECTOR,
     GOAL_POSE,
+    WAYPOINTS,
     GOAL_STEP,
     PLAN,
     TRAIL,
@@ -167,6 +170,7 @@ GRAPH: tuple[Topic, ...] = (
     OUTCOME,
     INITIALPOSE,
     MARKERS,
+    DIAGNOSTICS,
 )
 
 try:  # not among the PyPI wheels; published and recorded where it is installed

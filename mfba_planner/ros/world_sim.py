@@ -30,8 +30,7 @@ class WorldSim(GraphNode):
         super().__init__(topics.WORLD_SIM, **kwargs)
         self.settings = s = params.declare(self, WorldSimSettings(), read_only=True)
         self.scenario = declare_scenario(self, s.scenario)
-        self.over = False
-        self._ticks_before_reset = 0
+        self.over, self._ticks_before_reset = False, 0
         self.pace = Pace(s)
         self._refusals = Refusals(self)
         self._out = WorldTopics(self, s, self.scenario.robot)
@@ -87,6 +86,7 @@ class WorldSim(GraphNode):
     def _on_timer(self) -> None:
         """Real time: one more tick; the first when everybody of wait_for is there."""
         if not self.pace.paused and not self.over and (self._published or not self.missing()):
+            self._told = self._answers.still_holds(self._told)
             self._move_on()
 
     def _watch(self) -> None:

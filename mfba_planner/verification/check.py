@@ -17,6 +17,7 @@ from ..core.planner import Decision, Mode, Observation, observe
 from ..core.sensing import aligned, sense_circles, sense_scan, sensory_vector
 from ..messages import (
     body_velocity,
+    decision_value,
     laser_scan,
     obstacle_centers,
     or_refused,
@@ -76,27 +77,34 @@ def verify(path: str | Path) -> Report:
         for file in reader.file_paths:
             check_data(file)
         setup = read_setup(reader)
-        evidence = gather(reader, setup.planner.tick_ns if setup.lockstep else None)
+        tick_ns = setup.planner.tick_ns if setup.lockstep else None
+        evidence = gather(reader, tick_ns, setup.odom_frame)
     return _check(setup, evidence)
 
 
 def _check(setup: Setup, evidence: Evidence) -> Report:
     faults, notes = [*evidence.faults], [*evidence.notes]
+    read_odom = partial(robot_pose, frame=setup.odom_frame)
+    read_sectors = partial(sector_ranges, frame=setup.odom_frame)
     planner = brain(setup.planner, setup.sensor, setup.seed)
     goals = deque(evidence.goals)
     goal: Point | None = None
     pose = Pose2D(0.0, 0.0)
     recorded, decided = [], []
-    unchecked = 0
+    unchecked, errand = 0, ""
     for tick in evidence.ticks:
         if DECISION not in tick.said or SECTORS not in tick.said:
             continue  # named by evidence where it must not be
-        ranges = or_refused(sector_ranges, tick.said[SECTORS])
+        ranges = or_refused(read_sectors, tick.said[SECTORS])
         try:
             was = read_decision(tick.said[DECISION], () if isinstance(ranges, str) else ranges)
         except InputError as error:
             faults.append(f"stamp {tick.stamp_ns} ns: {error}")
             continue
+        before, errand = errand, decision_value(tick.said[DECISION], "errand")
+        if errand != before:
+            planner.reset()  # ordered anew, be it to the same goal, or cancelled
+            goal = goal if was.goal else None
         if was.goal != goal:
             while goals and goal != was.goal:
                 goal = goals.popleft()
@@ -110,7 +118,7 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
                 goal = was.goal
         seen: Any = was.pose
         if setup.lockstep:
-            seen = or_refused(robot_pose, tick.said[ODOM]) if ODOM in tick.said else pose
+            seen = or_refused(read_odom, tick.said[ODOM]) if ODOM in tick.said else pose
         elif was.mode is Mode.STOPPED:
             unchecked += 1  # what was refused or how old it was is not recorded
             continue

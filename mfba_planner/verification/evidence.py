@@ -9,12 +9,13 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.geometry import Point
-from ..messages import goal_point, stamp_ns
+from ..messages import goal_point, stamp_ns, waypoint_points
 from ..recording.decisions import DECISION, SECTORS, ranges_seen, require_decisions
 from ..recording.reader import BagReader
 
 ODOM, OBSTACLES, VECTOR, SCAN = "/odom", "/obstacles", "/sensory_vector", "/scan"
-GOAL, STEP, TWIST = "/goal_pose", "/goal_step", "/cmd_vel"
+GOAL, WAYPOINTS = "/goal_pose", "/waypoints"
+STEP, TWIST = "/goal_step", "/cmd_vel"
 STAMPED = (ODOM, OBSTACLES, SECTORS, STEP, DECISION)
 
 
@@ -36,38 +37,41 @@ class Evidence:
     notes: list[str] = field(default_factory=list)
 
 
-def gather(reader: BagReader, tick_ns: int | None) -> Evidence:
+def gather(reader: BagReader, tick_ns: int | None, frame: str = "") -> Evidence:
     """Join a bag's messages; tick_ns is the duration of a tick, None where it is not fixed.
 
+    frame is the one that goals must be in, "" for any.
     Raises BagError for a bag without decisions, and for one that cannot be read to its end.
     """
     require_decisions(reader)
-    heard: dict[str, list[Any]] = {name: [] for name in (*STAMPED, SCAN, VECTOR, GOAL, TWIST)}
-    for message in reader.decoded(list(heard)):
-        heard[message.topic].append(message.message)
-    found = Evidence(ticks=[], goals=_goals(heard[GOAL]))
+    heard: dict[str, list[Any]] = {name: [] for name in (*STAMPED, SCAN, VECTOR, TWIST)}
+    found = Evidence(ticks=[], goals=[])
+    for message in reader.decoded([*heard, GOAL, WAYPOINTS]):
+        if message.topic in (GOAL, WAYPOINTS):
+            found.goals += _goals(message.topic, message.message, frame)
+        else:
+            heard[message.topic].append(message.message)
     ticks: dict[int, Tick] = {}
     for topic in (*STAMPED, SCAN):
         # In real time a later decision on a stamp only says that its inputs have become stale.
-        _join(found, ticks, topic, heard[topic], all_alike=bool(tick_ns) or topic != DECISION)
+        all_alike = bool(tick_ns) or topic not in (DECISION, STEP)
+        _join(found, ticks, topic, heard[topic], all_alike=all_alike)
     # No sensory vector follows where the sensor was blind.
     seen = [message for message in heard[SECTORS] if ranges_seen(message)]
     _join_by_order(found, ticks, SECTORS, seen, VECTOR, heard[VECTOR])
-    _join_by_order(found, ticks, STEP, heard[STEP], TWIST, heard[TWIST])
+    alike = bool(tick_ns)
+    _join_by_order(found, ticks, STEP, heard[STEP], TWIST, heard[TWIST], all_alike=alike)
     found.ticks = [ticks[stamp] for stamp in sorted(ticks)]
     if tick_ns:
         _look_for_gaps(found, tick_ns, (*STAMPED, *([SCAN] if heard[SCAN] else []), TWIST))
     return found
 
 
-def _goals(messages: list[Any]) -> list[Point]:
-    goals = []
-    for message in messages:
-        try:
-            goals.append(goal_point(message))
-        except InputError:  # the planner refused it as well
-            continue
-    return goals
+def _goals(topic: str, message: Any, frame: str) -> tuple[Point, ...]:
+    try:
+        return (goal_point(message, frame),) if topic == GOAL else waypoint_points(message, frame)
+    except InputError:  # the planner refused it as well
+        return ()
 
 
 def _join(
@@ -111,19 +115,22 @@ def _join_by_order(
     leaders: list[Any],
     topic: str,
     followers: list[Any],
+    *,
+    all_alike: bool = True,
 ) -> None:
     """Give messages without a stamp the one of the message that each of them followed."""
     if not leaders or not followers:
         return
     if hasattr(followers[0], "header"):
-        _join(found, ticks, topic, followers)
+        _join(found, ticks, topic, followers, all_alike=all_alike)
         return
     if len(leaders) != len(followers):
         found.faults.append(f"{topic}: {len(followers)} messages for {len(leaders)} on {stamped}")
         return
     for leader, follower in zip(leaders, followers):
         stamp = stamp_ns(leader.header.stamp)
-        if str(ticks[stamp].said.setdefault(topic, follower)) != str(follower):
+        first = ticks[stamp].said.setdefault(topic, follower)
+        if all_alike and str(first) != str(follower):
             found.faults.append(f"{topic}: stamp {stamp} ns is there twice, and not alike")
 
 

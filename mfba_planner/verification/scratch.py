@@ -6,7 +6,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..core.digest import digest
 from ..core.errors import BagError, InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner import Decision, PlannerParams, Refused, observe
-from ..core.sensing import Ranges, SensorParams, sense_scan
+from ..core.sensing import Ranges, SensorParams, aligned, sense_scan
 from ..messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
 from ..planners.method import brain
 from ..recording.decisions import DECISION, SECTORS
@@ -186,6 +186,9 @@ class _Decider:
         goal = next((g for t, g in reversed(self._goals) if t <= log_time_ns), None)
         seen = observe(stamp, pose, ranges, goal, self._pose, max(stamp - posed_ns, 0))
         self._pose = seen.pose
+        if self._robot.planner.tracks_scan and not seen.refused:
+            yaw = seen.pose.yaw + self._robot.scan_yaw_rad
+            seen = replace(seen, scan=aligned(laser_scan(scan), yaw))
         return self._brain.plan(seen)
 
     def _measure(self, pose: Pose2D | Refused, scan: Any) -> Ranges | Refused:

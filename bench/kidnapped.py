@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""100 seeded kidnappings, at a random tick to a random free place: whether the robot arrives.
+
+Run: python bench/kidnapped.py [--count N] [--graph N]. Kidnapping k is drawn from seed k: case 1
+or 2 in turn, a moment of its undisturbed run, a place of the 12 x 12 m that is 0.1 m clear of
+everybody. Rows: who decides, on which robot. --graph lets the real graph do the first N of them
+as well (in one process, over DDS) and holds its decisions against the core's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mfba_planner.core.digest import digest
+from mfba_planner.core.episode import Episode, Outcome
+from mfba_planner.core.geometry import distance
+from mfba_planner.core.jump import carried_off
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.planner import NANO, Method, PlannerParams, Swarm
+from mfba_planner.core.robot import Drive, Lidar, Robot
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.core.world import Kidnapping, Scenario
+from mfba_planner.launcher.domain import claim_domain
+from mfba_planner.planners.method import simulate
+from mfba_planner.planners.predictive import preset
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.run_config import Driver, RunConfig
+from mfba_planner.scenarios import load_scenario
+
+ROOM_M, CLEAR_M = 12.0, 0.1
+AHEAD = replace(preset(), method=Method.PREDICTIVE)
+TURNING = Robot(drive=Drive.DIFFERENTIAL, lidar=Lidar(beams=360))
+ROWS: dict[str, tuple[Robot, PlannerParams]] = {
+    "paper, omnidirectional": (Robot(), PlannerParams()),
+    "paper with a persistent swarm": (Robot(), PlannerParams(swarm=Swarm.PERSISTENT)),
+    "predictive, omnidirectional": (Robot(), AHEAD),
+    "predictive, differential, 360 beams": (TURNING, replace(AHEAD, scan_radius_m=0.42)),
+}
+
+
+def play(scenario: Scenario, params: PlannerParams, seed: int) -> Episode:
+    """The core driver."""
+    return simulate(scenario, planner=params, sensor=SensorParams(), seed=seed)
+
+
+def kidnapped(k: int, robot: Robot, params: PlannerParams) -> Scenario:
+    """The scenario of kidnapping k: drawn from its undisturbed run."""
+    case = replace(load_scenario(("case1", "case2")[k % 2]), robot=robot)
+    ticks = len(play(case, params, k).ticks)
+    rng = np.random.default_rng((20, k))
+    at_s = int(rng.integers(1, ticks - 1)) * params.tick_ns * NANO
+    circles = case.enlarged(at_s)
+    while True:
+        x, y = rng.uniform(0.0, ROOM_M, size=2).tolist()
+        if all(distance((x, y), center) > radius + CLEAR_M for center, radius in circles):
+            return replace(case, kidnappings=(Kidnapping(at_s=at_s, to_m=(x, y)),))
+
+
+def by_graph(scenario: Scenario, params: PlannerParams, seed: int) -> str:
+    """The decision digest of the same run through the real graph."""
+    from mfba_planner.ros.in_process import run_in_process
+
+    config = RunConfig(scenario=scenario, planner=params, seed=seed, driver=Driver.IN_PROCESS)
+    domain, lock = claim_domain()
+    with lock, tempfile.TemporaryDirectory() as directory:
+        bag = Path(directory) / "bag"
+        run_in_process(config, bag, domain_id=domain)
+        return digest(read_episode(bag).ticks)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--graph", type=int, default=0)
+    found = parser.parse_args()
+    for name, (robot, params) in ROWS.items():
+        arrived = clean = noticed = equal = 0
+        for k in range(found.count):
+            scenario = kidnapped(k, robot, params)
+            episode = play(scenario, params, k)
+            arrived += episode.outcome is Outcome.GOAL_REACHED
+            clean += evaluate(episode).success
+            noticed += any(carried_off(tick.reason) for tick in episode.ticks)
+            if k < found.graph:
+                equal += by_graph(scenario, params, k) == digest(episode.ticks)
+        graph = f"; graph: {equal} of {found.graph} digests equal" if found.graph else ""
+        print(
+            f"{name:36} arrived {arrived} of {found.count}, without contact {clean}, "
+            f"noticed {noticed}{graph}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Named runs from bags and results, for commands that show some of them; needs no ROS.
+
+A bag is read. Of a result (`mfba sim --out`) the run is made again, and must take the decisions
+that the result's digest stands for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from ..core.digest import digest
+from ..core.episode import Episode
+from ..core.errors import ConfigError, InputError
+from ..core.options import override
+from ..core.planner import PlannerParams
+from ..core.sensing import SensorParams
+from ..core.world import Scenario
+from ..outputs import bag_in
+from ..planners.method import simulate
+from ..recording.episode import read_episode
+from ..report.result import read_result
+from ..resources import scenario_names
+from ..scenarios import load_scenario
+
+_RESULT = "result.json"
+
+
+def add_paths(parser: argparse.ArgumentParser) -> None:
+    """The argument `paths`: one run or more."""
+    parser.add_argument(
+        "paths", type=Path, nargs="+", metavar="BAG|RESULT", help="run or bag directory, or file"
+    )
+
+
+def named_episodes(paths: list[Path]) -> list[tuple[str, Episode]]:
+    """Read or make the runs; raises BagError, InputError."""
+    return [(_name(path), _episode(path)) for path in paths]
+
+
+def _name(path: Path) -> str:
+    """What a run is called on the page: the last part of its path that tells it from others."""
+    path = path.absolute()
+    if path.name in ("bag", _RESULT):
+        return path.parent.name
+    return path.name if path.is_dir() else path.stem
+
+
+def _episode(path: Path) -> Episode:
+    if path.suffix == ".json":
+        return _again(path)
+    bag = bag_in(path)
+    if bag == path and not any(path.glob("*.mcap")) and (path / _RESULT).is_file():
+        return _again(path / _RESULT)
+    return read_episode(bag)
+
+
+def _again(path: Path) -> Episode:
+    """The run of a result, made again; InputError unless it decides as the result says."""
+    data = read_result(path)
+    told = data["parameters"]
+    try:
+        episode = simulate(
+            _world(data),
+            planner=override(PlannerParams(), told["planner"]),
+            sensor=override(SensorParams(), told["sensor"]),
+            seed=data["seed"],
+        )
+    except (ConfigError, InputError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: its run cannot be made again ({error}); give its bag") from None
+    made = digest(episode.ticks)
+    if made != data["digest"]:
+        raise InputError(
+            f"{path}: made again, its run decides otherwise (digest {made[:12]}, not "
+            f"{data['digest'][:12]}); give its bag"
+        )
+    return episode
+
+
+def _world(data: dict[str, Any]) -> Scenario:
+    """The world of a result; the older ones only name it."""
+    if "world" in data:
+        return load_scenario(json.dumps(data["world"]))
+    if data["scenario"] not in scenario_names():
+        raise InputError(f"scenario {data['scenario']} is not shipped")
+    return load_scenario(data["scenario"])

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba report`: runs as one page for a browser, to play and scrub; needs no ROS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..arguments import Parser
+from ..outputs import refuse_existing
+from .episodes import add_paths, named_episodes
+
+_DESCRIPTION = """Write runs as one HTML file that needs nothing else: no network, no ROS.
+
+A bag is read. Of a result (`mfba sim --out`) the run is made again, and must take the decisions
+that the result's digest stands for."""
+
+
+def main(args: list[str]) -> int:
+    """Write the page."""
+    parser = Parser(prog="mfba report", description=_DESCRIPTION)
+    add_paths(parser)
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="HTML",
+        default=Path("report.html"),
+        help="file to create (default: report.html)",
+    )
+    found = parser.parse(args)
+    from ..report.html.page import check_size, write_page
+
+    check_size(len(found.paths))
+    refuse_existing(found.out)
+    write_page(named_episodes(found.paths), found.out)
+    print(f"wrote {found.out}")
+    return 0

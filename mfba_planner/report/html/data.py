@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run as plain JSON values, column by column: all that the page knows of it.
+
+Lengths in metres, times in seconds; null stands for a number that is not finite. What a reader
+is shown as a figure keeps every bit; what is only drawn is rounded to a tenth of a millimetre.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from mfba_planner.core.digest import digest
+from mfba_planner.core.episode import Episode
+from mfba_planner.core.gaps import gap_heading
+from mfba_planner.core.metrics import evaluate, within_range
+from mfba_planner.core.motion import Motion
+from mfba_planner.core.options import walk
+from mfba_planner.core.planner import Mode, PlannerParams
+from mfba_planner.core.sensing import Bits, SensorParams
+from mfba_planner.core.world import velocity_at
+from mfba_planner.report import words
+from mfba_planner.report.moments import closest_passes
+from mfba_planner.report.table import result_rows
+from mfba_planner.report.view import View, choose_view
+
+MOST_RUNS = 6  # side by side
+MOST_TICKS = 20_000  # in all: beyond that a browser takes long to open the page
+
+Plain = dict[str, Any]
+_MODES = list(Mode)
+
+
+def pages_data(runs: Sequence[tuple[str, Episode]], version: str) -> Plain:
+    """What the page of these named runs holds; runs in equal worlds share one view."""
+    views = [choose_view(episode, closest_passes(episode))[0] for _, episode in runs]
+    shared = [
+        _union(view for view, (_, other) in zip(views, runs) if other.scenario == episode.scenario)
+        for _, episode in runs
+    ]
+    return {
+        "version": version,
+        "modes": [{"key": mode.value, "label": words.MODES[mode]} for mode in _MODES],
+        "runs": [run_data(name, episode, view) for (name, episode), view in zip(runs, shared)],
+    }
+
+
+def run_data(name: str, episode: Episode, view: View) -> Plain:
+    """One run, drawn within a view of its world."""
+    result = evaluate(episode)
+    reasons = list(dict.fromkeys(tick.reason for tick in episode.ticks))
+    number_of = {reason: number for number, reason in enumerate(reasons)}
+    sectors = episode.sensor.sectors
+    return {
+        "name": name,
+        "title": words.run_title(episode),
+        "success": result.success,
+        "outcome": words.outcome(result),
+        "world": {
+            "name": episode.scenario.name,
+            "description": episode.scenario.description,
+            "view": [view.left, view.bottom, view.right, view.top],
+            "start": list(episode.scenario.start_m),
+            "goal": list(episode.scenario.goal_m),
+            "robot_radius": episode.scenario.robot_radius_m,
+            "walls": _walls(episode),
+            "obstacles": _obstacles(episode),
+        },
+        "reach": episode.sensor.sensing_range_m,
+        "sectors": sectors,
+        "gap_headings": [
+            gap_heading(gap, sectors, episode.planner.gap_heading) for gap in range(1, sectors + 1)
+        ],
+        "reasons": reasons,
+        "ticks": {
+            "time": [episode.time_s(tick.stamp_ns) for tick in episode.ticks],
+            "x": _exact(tick.pose.x for tick in episode.ticks),
+            "y": _exact(tick.pose.y for tick in episode.ticks),
+            "mode": [_MODES.index(tick.mode) for tick in episode.ticks],
+            "reason": [number_of[tick.reason] for tick in episode.ticks],
+            "vs": [_digits(tick.vs) for tick in episode.ticks],
+            "vg": [_digits(tick.vg) for tick in episode.ticks],
+            "gap": [tick.gap for tick in episode.ticks],
+            "waypoint_x": _exact(tick.waypoint[0] for tick in episode.ticks),
+            "waypoint_y": _exact(tick.waypoint[1] for tick in episode.ticks),
+            "vx": _exact(tick.velocity[0] for tick in episode.ticks),
+            "vy": _exact(tick.velocity[1] for tick in episode.ticks),
+            "speed": _exact(speeds(episode)),
+            "clearance": _exact(clearances(episode)),
+            "near": [list(within_range(episode, tick)) for tick in episode.ticks],
+            "bats": [_drawn(v for bat in tick.candidates for v in bat) for tick in episode.ticks],
+        },
+        "result": [list(row) for row in result_rows(episode, result)],
+        "configuration": _configuration(episode),
+        "digest": digest(episode.ticks),
+    }
+
+
+def _union(views: Iterable[View]) -> View:
+    found = list(views)
+    whole = found[0]
+    for view in found[1:]:
+        whole = whole.around((view.left, view.bottom)).around((view.right, view.top))
+    return whole
+
+
+def _walls(episode: Episode) -> list[float] | None:
+    walls = episode.scenario.walls
+    return [*walls.lower_m, *walls.upper_m] if walls else None
+
+
+def _obstacles(episode: Episode) -> list[Plain]:
+    """Each obstacle's radius, and its centre and velocity at every tick."""
+    scenario = episode.scenario
+    times_s = [episode.time_s(tick.stamp_ns) for tick in episode.ticks]
+    xs, ys = Motion(scenario).centers(np.array(times_s))
+    moves = (
+        [velocity_at(obstacle, t, scenario.walls) for t in times_s]
+        for obstacle in scenario.obstacles
+    )
+    return [
+        {
+            "radius": obstacle.radius_m,
+            "x": _drawn(x.tolist()),
+            "y": _drawn(y.tolist()),
+            "vx": _drawn(vx for vx, _ in velocities),
+            "vy": _drawn(vy for _, vy in velocities),
+        }
+        for obstacle, x, y, velocities in zip(scenario.obstacles, xs.T, ys.T, moves)
+    ]
+
+
+def clearances(episode: Episode) -> list[float]:
+    """The smallest gap (m) from each tick to the next, as metrics.tick_clearances; then inf."""
+    times_s = np.array([episode.time_s(tick.stamp_ns) for tick in episode.ticks])
+    positions_m = np.array([tick.pose.position for tick in episode.ticks]).T
+    gaps = Motion(episode.scenario).steps(times_s, positions_m).gap_m
+    return [*gaps.min(axis=1, initial=math.inf).tolist(), math.inf]
+
+
+def speeds(episode: Episode) -> list[float]:
+    """The speed (m/s) that was decided at each tick."""
+    return [math.hypot(*tick.velocity) for tick in episode.ticks]
+
+
+def _configuration(episode: Episode) -> list[list[Any]]:
+    """(name, value, unit, is the default) of every option, the run's own figures first."""
+    rows: list[list[Any]] = [
+        ["seed", str(episode.seed), "", True],
+        ["driver", episode.driver, "", True],
+        ["tick", f"{episode.planner.tick_ns * 1e-9:.6f}", "s", True],
+    ]
+    for group, given, default in (
+        ("planner", episode.planner, PlannerParams()),
+        ("sensor", episode.sensor, SensorParams()),
+    ):
+        for (name, value, item), (_, usual, _) in zip(walk(given), walk(default)):
+            shown = str(getattr(value, "value", value))
+            rows.append([f"{group}.{name}", shown, item.metadata["spec"].unit, value == usual])
+    return rows
+
+
+def _digits(bits: Bits) -> str:
+    return "".join(map(str, bits))
+
+
+def _exact(values: Iterable[float]) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values]
+
+
+def _drawn(values: Iterable[float]) -> list[float | None]:
+    return [round(value, 4) if math.isfinite(value) else None for value in values]

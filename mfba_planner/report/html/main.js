@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// Put the page together and keep everything where the clock stands.
+
+const { runs } = DATA;
+const root = document.documentElement;
+const clock = new Clock(runs);
+const calm = matchMedia("(prefers-reduced-motion: reduce)");
+const views = runs.map((run) => ({ run, scene: new Scene(run), readout: new Readout(run) }));
+const charts = new Charts(DATA.charts, clock);
+const transport = new Transport(runs, clock, () =>
+  views.map(({ run, readout }) => readout.sentence(tickOf(run))).join("; "),
+);
+
+function tickOf(run) {
+  return indexAt(run.ticks.time, clock.time);
+}
+
+function show() {
+  for (const { run, scene, readout } of views) {
+    const { time } = run.ticks;
+    const k = tickOf(run);
+    const span = k + 1 < time.length ? time[k + 1] - time[k] : 0;
+    const part = span > 0 && !calm.matches ? (clock.time - time[k]) / span : 0;
+    scene.show(k, Math.max(0, Math.min(1, part)));
+    readout.show(k);
+  }
+  transport.show();
+  charts.show();
+}
+
+function card({ run, scene, readout }, number) {
+  const verdict = html("span", { class: `verdict ${run.success ? "good" : "bad"}` }, run.outcome);
+  return html(
+    "article",
+    { class: "card", "data-run": number + 1 },
+    html("header", {}, html("h2", {}, runName(run, number)), verdict, html("p", {}, run.title)),
+    html("div", { class: "stage" }, scene.element),
+    readout.element,
+  );
+}
+
+function legend() {
+  const shown = new Set(runs.flatMap((run) => run.ticks.mode));
+  const items = DATA.modes
+    .filter((_, number) => shown.has(number))
+    .map(({ key, label }) => entry(label, svg("path", { d: "M1 8H21", class: "past", "data-mode": key })));
+  items.push(
+    entry("obstacle, and its edge enlarged by the robot",
+      svg("circle", { cx: 11, cy: 8, r: 7, class: "enlarged" }),
+      svg("circle", { cx: 11, cy: 8, r: 4, class: "body" })),
+    entry(`how far it goes in ${AHEAD} s`, svg("path", { d: "M1 8H20M14 4L20 8L14 12", class: "motion" })),
+    entry("sensing range, sector that is set",
+      svg("path", { d: "M2 14A18 18 0 0 1 20 14L11 2Z", class: "sector lit" }),
+      svg("path", { d: "M1 14A18 18 0 0 1 21 14", class: "ring" })),
+    entry("gap: open, closed, taken",
+      svg("path", { d: "M3 3V13", class: "gap open" }),
+      svg("path", { d: "M11 3V13", class: "gap closed" }),
+      svg("path", { d: "M19 1V15", class: "taken" })),
+    entry("bats, and the waypoint chosen",
+      svg("g", { class: "bats" }, svg("circle", { cx: 4, cy: 5, r: 2 }), svg("circle", { cx: 7, cy: 12, r: 2 })),
+      svg("path", { d: "M16 3L21 8L16 13L11 8Z", class: "waypoint" })),
+  );
+  return html("ul", { class: "legend", "aria-label": "Legend" }, ...items);
+}
+
+/** Whose line is whose, where there are several. */
+function chartKey() {
+  if (runs.length === 1) return [];
+  const entries = runs.map((run, number) => {
+    const dashes = DATA.dashes[number].map((length) => 2 * length).join(" ") || "none";
+    const style = `stroke: var(--run-${number + 1}); stroke-width: 2; stroke-dasharray: ${dashes}`;
+    return entry(run.name, svg("path", { d: "M-6 8H28", style }));
+  });
+  return [html("ul", { class: "legend key", "aria-label": "Runs in the charts" }, ...entries)];
+}
+
+function entry(text, ...shapes) {
+  return html("li", {}, svg("svg", { viewBox: "0 0 22 16", "aria-hidden": "true" }, ...shapes), text);
+}
+
+function themeButton() {
+  const element = html("button", { type: "button", id: "theme" });
+  const use = (theme) => {
+    root.dataset.theme = theme;
+    element.textContent = theme === "dark" ? "Light" : "Dark";
+    set(element, { "aria-label": `Switch to the ${theme === "dark" ? "light" : "dark"} theme` });
+  };
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  system.addEventListener("change", () => use(system.matches ? "dark" : "light"));
+  element.addEventListener("click", () => use(root.dataset.theme === "dark" ? "light" : "dark"));
+  use(system.matches ? "dark" : "light");
+  return element;
+}
+
+const worlds = [...new Set(runs.map((run) => run.world.name))].join(", ");
+const about = [...new Set(runs.map((run) => run.world.description))].filter(Boolean).join("; ");
+document.getElementById("app").append(
+  html("header", { class: "top" }, html("div", {}, html("h1", {}, worlds), html("p", {}, about)), themeButton()),
+  html(
+    "main",
+    {},
+    html("section", { class: "runs", "aria-label": "Runs" }, ...views.map(card)),
+    ...(runs.length > 1 ? [legend()] : []),
+    html("section", { "aria-label": "Charts", class: "panel" }, ...chartKey(), charts.element),
+    html("section", { class: "panel" }, html("h2", {}, "Result"), resultTable(runs)),
+    html("section", { class: "panel" }, configurationTable(runs)),
+    html("section", { class: "panel" }, html("h2", {}, "Decision digest"), digestTable(runs)),
+  ),
+  transport.element,
+  html("footer", {},
+    html("p", { class: "keys" }, "Keys: space plays and pauses; ← → step, with shift by ten; Home and End; + and − change the speed."),
+    html("p", {}, `mfba_planner ${DATA.version}`)),
+);
+root.dataset.count = runs.length;
+root.style.setProperty("--rows", runs.length);
+if (runs.length === 1) views[0].readout.element.append(legend());
+clock.listeners.push(show);
+show();
+charts.fit();
+performance.mark("mfba-ready");
+root.dataset.ready = "yes";

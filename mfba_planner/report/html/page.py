@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page: one HTML file with style, script, data and charts inside; it asks for nothing else."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+from mfba_planner import __version__
+from mfba_planner.core.episode import Episode
+from mfba_planner.core.errors import InputError
+from mfba_planner.outputs import write_new
+from mfba_planner.report import words
+
+from .charts import DASHES, charts
+from .data import MOST_RUNS, MOST_TICKS, pages_data
+
+# One script in the page; each file uses only what stands before it.
+_SCRIPTS = ("dom", "clock", "scene", "readout", "charts", "tables", "transport", "main")
+
+
+def write_page(runs: Sequence[tuple[str, Episode]], path: Path) -> None:
+    """Write the page of some named runs; the same runs give the same bytes.
+
+    Raises InputError for too many runs or ticks, OutputError when path exists already or cannot
+    be written.
+    """
+    write_new(path, page(runs).encode())
+
+
+def page(runs: Sequence[tuple[str, Episode]]) -> str:
+    """The text of the page. Raises InputError for too many runs or ticks."""
+    episodes = [episode for _, episode in runs]
+    check_size(len(runs), sum(len(episode.ticks) for episode in episodes))
+    names = ", ".join(dict.fromkeys(episode.scenario.name for episode in episodes))
+    script = "\n".join(_own(f"{name}.js") for name in _SCRIPTS)
+    return Template(_own("page.html")).substitute(
+        title=escape(words.one_line(names, 80)),
+        policy=_policy(script),
+        style=_own("page.css"),
+        data=as_json(
+            {**pages_data(runs, __version__), "charts": charts(episodes), "dashes": DASHES}
+        ),
+        script=script,
+    )
+
+
+def check_size(runs: int, ticks: int = 0) -> None:
+    """Raise InputError for more than a page can show."""
+    if runs > MOST_RUNS:
+        raise InputError(f"{runs} runs: too many to stand side by side; give {MOST_RUNS} at most")
+    if ticks > MOST_TICKS:
+        raise InputError(
+            f"{ticks} ticks: too many for a page; give {MOST_TICKS} at most, or see `mfba export`"
+        )
+
+
+def as_json(data: object) -> str:
+    """JSON that may stand inside a script element: nothing in it ends that, or opens another."""
+    text = json.dumps(data, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
+    for sign in "<>&":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return text
+
+
+def _policy(script: str) -> str:
+    """A content security policy: this script and no other, and not a single request."""
+    allowed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return (
+        f"default-src 'none'; script-src 'sha256-{allowed}'; style-src 'unsafe-inline'; "
+        "img-src data:"
+    )
+
+
+def _own(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// What one run knew and decided at a tick, in words and figures.
+
+const MOST_CELLS = 36; // more sectors than this are shown as digits only
+
+class Readout {
+  constructor(run) {
+    this.run = run;
+    this.mode = html("strong", { class: "mode", "data-field": "mode" });
+    this.reason = html("p", { class: "reason", "data-field": "reason" });
+    this.vs = new Bits("Vs", "sectors in which something is", run.sectors);
+    this.vg = new Bits("Vg", "gaps that are closed", run.sectors);
+    this.fields = {};
+    this.element = html(
+      "div",
+      { class: "readout" },
+      html("p", { class: "modeline" }, html("span", { class: "dot" }), this.mode),
+      this.reason,
+      this.vs.element,
+      this.vg.element,
+      html("dl", {}, ...this.terms()),
+    );
+  }
+
+  terms() {
+    const names = {
+      tick: "tick",
+      time: "time",
+      position: "position",
+      waypoint: "waypoint",
+      speed: "speed",
+      clearance: "clearance until the next tick",
+      near: "within sensing range",
+    };
+    return Object.entries(names).map(([key, name]) => {
+      this.fields[key] = html("dd", { "data-field": key });
+      return html("div", {}, html("dt", {}, name), this.fields[key]);
+    });
+  }
+
+  show(k) {
+    const { ticks, reasons } = this.run;
+    const mode = DATA.modes[ticks.mode[k]];
+    set(this.element, { "data-mode": mode.key });
+    say(this.mode, mode.label);
+    say(this.reason, reasons[ticks.reason[k]]);
+    this.vs.show(ticks.vs[k], 0);
+    this.vg.show(ticks.vg[k], ticks.gap[k]);
+    const told = {
+      tick: `${k} of ${ticks.time.length - 1}`,
+      time: figure(ticks.time[k], 3, "s"),
+      position: point(ticks.x[k], ticks.y[k], 3),
+      waypoint: point(ticks.waypoint_x[k], ticks.waypoint_y[k], 3),
+      speed: figure(ticks.speed[k], 3, "m/s"),
+      clearance: figure(ticks.clearance[k], 3, "m"),
+      near: ticks.near[k].length ? `obstacle ${ticks.near[k].join(", ")}` : "nothing",
+    };
+    for (const [key, text] of Object.entries(told)) say(this.fields[key], text);
+  }
+
+  /** The same in one sentence, for those who hear the page. */
+  sentence(k) {
+    const { ticks, reasons } = this.run;
+    const mode = DATA.modes[ticks.mode[k]].label;
+    return `${this.run.name}: tick ${k}, ${figure(ticks.time[k], 2, "s")}, ${mode}, ${
+      reasons[ticks.reason[k]]
+    }`;
+  }
+}
+
+/** A vector of bits as a row of numbered cells. */
+class Bits {
+  constructor(name, meaning, count) {
+    this.name = name;
+    this.cells = [];
+    if (count <= MOST_CELLS) {
+      for (let i = 1; i <= count; i++) this.cells.push(html("i", {}, String(i)));
+    }
+    this.row = html("span", { class: "cells", role: "img", "data-field": name.toLowerCase() });
+    this.row.append(...this.cells);
+    this.element = html(
+      "p",
+      { class: `bits ${name.toLowerCase()}`, title: `${name}: ${meaning}` },
+      html("b", {}, name),
+      this.row,
+    );
+  }
+
+  show(bits, chosen) {
+    set(this.row, { "aria-label": `${this.name} ${bits}`, "data-bits": bits });
+    this.cells.forEach((cell, i) => {
+      cell.classList.toggle("set", bits[i] === "1");
+      cell.classList.toggle("chosen", i + 1 === chosen);
+    });
+    if (!this.cells.length) say(this.row, bits);
+  }
+}

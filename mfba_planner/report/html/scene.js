@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+// The world of one run, drawn to scale as SVG: metres are its units, y points up by its sign.
+
+const AHEAD = 2; // s: how far an arrow shows where something would go
+const BEHIND = 4; // s: how long an obstacle's wake lasts
+const STAR = starPoints(9, 3.8);
+
+class Scene {
+  constructor(run) {
+    this.run = run;
+    const { world } = run;
+    const [left, bottom, right, top] = world.view;
+    this.width = right - left;
+    this.element = svg("svg", {
+      class: "scene",
+      viewBox: `${left} ${-top} ${this.width} ${top - bottom}`,
+      role: "img",
+      "aria-label": `${run.title}: the world to scale`,
+    });
+    const grain = this.width / 1500; // m: what is nearer than this is one point of a line
+    this.kept = thinned(run.ticks.x, run.ticks.y, grain);
+    this.keptOf = world.obstacles.map(({ x, y }) => thinned(x, y, grain));
+    this.fixed = []; // [element, x, y]: what keeps its size on the screen
+    this.drawGround(world);
+    this.drawObstacles(world);
+    this.drawSensors();
+    this.drawPath();
+    this.drawEnds(world);
+    this.drawRobot(world);
+    this.pixel = this.width / 600; // metres
+    new ResizeObserver(() => this.measure()).observe(this.element);
+  }
+
+  add(tag, attributes, ...children) {
+    const element = svg(tag, attributes, ...children);
+    this.element.append(element);
+    return element;
+  }
+
+  /** A grid of round steps, its numbers, and the walls. */
+  drawGround(world) {
+    const [left, bottom, right, top] = world.view;
+    const step = roundStep(Math.max(right - left, top - bottom) / 8);
+    const lines = [];
+    for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
+      lines.push(`M${x} ${-top}V${-bottom}`);
+      const fits = x + 0.06 * this.width < right;
+      const looks = fits ? { dx: 3 } : { dx: -3, "text-anchor": "end" };
+      this.label(String(round(x)), x, bottom, { class: "axis", dy: -4, ...looks });
+    }
+    for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
+      lines.push(`M${left} ${-y}H${right}`);
+      const unit = y + step > top ? " m" : "";
+      this.label(`${round(y)}${unit}`, left, y, { class: "axis", dx: 3, dy: -4 });
+    }
+    this.element.prepend(svg("path", { class: "grid", d: lines.join("") }));
+    if (!world.walls) return;
+    const [x0, y0, x1, y1] = world.walls;
+    this.add("rect", { class: "wall", x: x0, y: -y1, width: x1 - x0, height: y1 - y0 });
+  }
+
+  label(text, x, y, attributes) {
+    const element = svg("text", attributes, text);
+    this.keepSize(x, y, element);
+    return element;
+  }
+
+  /** Place an element that is drawn in pixels around the origin; measure() scales it. */
+  keepSize(x, y, element) {
+    const group = this.add("g", {}, element);
+    this.fixed.push([group, x, y]);
+    return group;
+  }
+
+  drawObstacles(world) {
+    this.wakes = world.obstacles.map(() => this.add("path", { class: "wake" }));
+    this.obstacles = world.obstacles.map((obstacle, i) => {
+      const group = this.add(
+        "g",
+        { class: "obstacle" },
+        svg("circle", { class: "enlarged", r: obstacle.radius + world.robot_radius }),
+        svg("circle", { class: "body", r: obstacle.radius }),
+        svg("path", { class: "motion" }),
+      );
+      const number = svg("text", { class: "number" }, String(i + 1));
+      const sized = svg("g", {}, number);
+      group.append(sized);
+      this.fixed.push([sized, 0, 0]);
+      return { group, motion: group.querySelector(".motion") };
+    });
+  }
+
+  /** The ring of sensors around the robot: sectors, and the gaps between them. */
+  drawSensors() {
+    const { sectors, reach, gap_headings: headings } = this.run;
+    this.sensors = this.add("g", { class: "sensors" });
+    this.lights = [];
+    for (let i = 0; i < sectors; i++) {
+      const [x0, y0] = polar(reach, (2 * Math.PI * i) / sectors);
+      const [x1, y1] = polar(reach, (2 * Math.PI * (i + 1)) / sectors);
+      const wedge = `M0 0L${x0} ${y0}A${reach} ${reach} 0 0 0 ${x1} ${y1}Z`;
+      this.lights.push(svg("path", { class: "sector", d: wedge }));
+    }
+    this.gaps = headings.map((heading) => {
+      const [x, y] = polar(reach, heading);
+      return svg("path", { class: "gap", d: `M${0.86 * x} ${0.86 * y}L${x} ${y}` });
+    });
+    this.taken = svg("path", { class: "taken" });
+    const ring = svg("circle", { class: "ring", r: reach });
+    this.sensors.append(...this.lights, ring, ...this.gaps, this.taken);
+  }
+
+  /** The whole way, faint, and on top the part that lies behind, coloured by mode. */
+  drawPath() {
+    const { x, y, mode } = this.run.ticks;
+    this.whole = this.add("path", { class: "way", d: line(x, y, this.kept, 0, x.length - 1) });
+    this.stretches = [];
+    for (let first = 0, k = 1; k <= mode.length; k++) {
+      if (k < mode.length && mode[k] === mode[first]) continue;
+      const { key } = DATA.modes[mode[first]];
+      const element = this.add("path", { class: "past", "data-mode": key });
+      this.stretches.push({ first, end: Math.min(k, mode.length - 1), element });
+      first = k;
+    }
+  }
+
+  drawEnds(world) {
+    this.keepSize(...world.start, svg("circle", { class: "start", r: 5 }));
+    this.keepSize(...world.goal, svg("polygon", { class: "goal", points: STAR }));
+  }
+
+  drawRobot(world) {
+    this.bats = this.add("g", { class: "bats" });
+    this.step = this.add("path", { class: "step" });
+    this.robot = this.add(
+      "g",
+      { class: "robot" },
+      svg("circle", { class: "hull", r: world.robot_radius }),
+      svg("circle", { class: "heart", r: 0.16 * world.robot_radius }),
+    );
+    this.waypoint = this.add("g", {}, svg("path", { class: "waypoint", d: "M0-5L5 0L0 5L-5 0Z" }));
+  }
+
+  /** How large a pixel is decides the size of letters and marks. */
+  measure() {
+    const scale = this.element.getScreenCTM();
+    if (!scale || !scale.a) return;
+    this.pixel = 1 / scale.a;
+    for (const [element, x, y] of this.fixed) {
+      set(element, { transform: `translate(${x} ${-y}) scale(${this.pixel})` });
+    }
+    if (this.shown) this.show(...this.shown);
+  }
+
+  /** Show tick k, and where things are a part (0 to 1) of the way to tick k + 1. */
+  show(k, part) {
+    const { ticks, world } = this.run;
+    const isNew = !this.shown || this.shown[0] !== k || this.shown[2] !== this.pixel;
+    this.shown = [k, part, this.pixel];
+    const next = Math.min(k + 1, ticks.x.length - 1);
+    const at = (values) => between(values[k], values[next], part);
+    const x = at(ticks.x);
+    const y = at(ticks.y);
+    this.place(this.robot, x, y);
+    // What was sensed and decided belongs to the tick, not to the way to the next.
+    if (isNew) this.showDecision(k);
+    this.place(this.sensors, x, y);
+    world.obstacles.forEach((obstacle, i) => this.showObstacle(i, obstacle, k, at));
+    for (const { first, end, element } of this.stretches) {
+      const until = Math.min(k, end);
+      const tip = until === k && k < end && x !== null ? `L${x} ${-y}` : "";
+      set(element, { d: first > k ? "" : line(ticks.x, ticks.y, this.kept, first, until) + tip });
+    }
+  }
+
+  place(element, x, y) {
+    const hidden = x === null || y === null;
+    set(element, {
+      transform: hidden ? null : `translate(${x} ${-y})`,
+      visibility: hidden ? "hidden" : null,
+    });
+  }
+
+  showObstacle(i, obstacle, k, at) {
+    const { group, motion } = this.obstacles[i];
+    const x = at(obstacle.x);
+    const y = at(obstacle.y);
+    this.place(group, x, y);
+    const { time } = this.run.ticks;
+    const first = indexAt(time, time[k] - BEHIND);
+    const wake = line(obstacle.x, obstacle.y, this.keptOf[i], first, k);
+    set(this.wakes[i], { d: `${wake}L${x} ${-y}` });
+    const [vx, vy] = [obstacle.vx[k], obstacle.vy[k]];
+    const edge = obstacle.radius / (Math.hypot(vx, vy) || 1);
+    set(motion, { d: this.arrow(edge * vx, edge * vy, AHEAD * vx, AHEAD * vy) });
+    group.classList.toggle("near", this.run.ticks.near[k].includes(i + 1));
+  }
+
+  showDecision(k) {
+    const { ticks } = this.run;
+    const mode = DATA.modes[ticks.mode[k]].key;
+    set(this.element, { "data-mode": mode, "data-tick": k });
+    const isLit = ticks.vs[k].includes("1");
+    this.lights.forEach((light, i) => light.classList.toggle("lit", ticks.vs[k][i] === "1"));
+    this.gaps.forEach((gap, i) => {
+      gap.classList.toggle("open", isLit && ticks.vg[k][i] === "0");
+      gap.classList.toggle("closed", isLit && ticks.vg[k][i] === "1");
+    });
+    const chosen = ticks.gap[k];
+    const ray = chosen ? polar(this.run.reach, this.run.gap_headings[chosen - 1]) : null;
+    set(this.taken, { d: ray ? `M0 0L${ray[0]} ${ray[1]}` : "" });
+    const [x, y] = [ticks.x[k], ticks.y[k]];
+    const [wx, wy] = [ticks.waypoint_x[k], ticks.waypoint_y[k]];
+    const moves = x !== null && wx !== null && (wx !== x || wy !== y);
+    set(this.step, { d: moves ? this.arrow(x, y, AHEAD * ticks.vx[k], AHEAD * ticks.vy[k]) : "" });
+    set(this.waypoint, {
+      transform: moves ? `translate(${wx} ${-wy}) scale(${this.pixel})` : null,
+      visibility: moves ? null : "hidden",
+    });
+    const r = 2.2 * this.pixel;
+    const bats = [];
+    for (let i = 0; i < ticks.bats[k].length; i += 2) {
+      bats.push(svg("circle", { cx: ticks.bats[k][i], cy: -ticks.bats[k][i + 1], r }));
+    }
+    this.bats.replaceChildren(...bats);
+  }
+
+  /** A line with a head of seven pixels, from (x, y) along (dx, dy). */
+  arrow(x, y, dx, dy) {
+    const length = Math.hypot(dx, dy);
+    const head = 7 * this.pixel;
+    if (!(length > head)) return "";
+    const [ux, uy] = [dx / length, dy / length];
+    const [tx, ty] = [x + dx, y + dy];
+    const wing = (side) => {
+      const [wx, wy] = [tx - head * (ux + side * 0.5 * uy), ty - head * (uy - side * 0.5 * ux)];
+      return `M${tx} ${-ty}L${wx} ${-wy}`;
+    };
+    return `M${x} ${-y}L${tx} ${-ty}${wing(1)}${wing(-1)}`;
+  }
+}
+
+function between(a, b, part) {
+  return a === null || b === null ? a : a + part * (b - a);
+}
+
+/** In the coordinates of the drawing, where y points down. */
+function polar(radius, angle) {
+  return [radius * Math.cos(angle), -radius * Math.sin(angle)];
+}
+
+/** Numbers of the points that a line needs: those that are known, and apart by a grain. */
+function thinned(x, y, grain) {
+  const kept = [];
+  let [ax, ay] = [Infinity, Infinity];
+  x.forEach((px, k) => {
+    if (px === null || y[k] === null) return;
+    if ((px - ax) ** 2 + (y[k] - ay) ** 2 < grain ** 2) return;
+    [ax, ay] = [px, y[k]];
+    kept.push(k);
+  });
+  return kept;
+}
+
+/** The path through points first to last, by way of those that are kept. */
+function line(x, y, kept, first, last) {
+  const parts = [];
+  const add = (k) => {
+    if (x[k] !== null && y[k] !== null) parts.push(`${parts.length ? "L" : "M"}${x[k]} ${-y[k]}`);
+  };
+  add(first);
+  for (let i = indexAt(kept, first); i < kept.length && kept[i] < last; i++) {
+    if (kept[i] > first) add(kept[i]);
+  }
+  if (last > first) add(last);
+  return parts.join("");
+}
+
+function roundStep(rough) {
+  const power = 10 ** Math.floor(Math.log10(rough));
+  return power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
+}
+
+function round(value) {
+  return Number(value.toPrecision(6));
+}
+
+function starPoints(outer, inner) {
+  const points = [];
+  for (let i = 0; i < 10; i++) {
+    const angle = (Math.PI * i) / 5 - Math.PI / 2;
+    const radius = i % 2 ? inner : outer;
+    points.push(`${(radius * Math.cos(angle)).toFixed(2)},${(radius * Math.sin(angle)).toFixed(2)}`);
+  }
+  return points.join(" ");
+}

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run for Rerun's viewer: the world in motion, what the planner decided, and two curves.
+
+Everything stands on the timelines `sim_time` (s) and `tick`; lengths are metres, z points up.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mfba_planner.core.episode import Episode
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.motion import Motion
+from mfba_planner.core.planner import Decision, Mode
+from mfba_planner.core.world import velocity_at
+from mfba_planner.outputs import refuse_existing
+
+from . import style, words
+from .html.data import clearances, speeds
+
+_GREY, _DARK = style.FAINT, style.QUIET
+_AHEAD_S = 2.0  # arrows lead to where obstacles will be
+_CIRCLE = np.linspace(0.0, 2.0 * math.pi, 49)
+
+
+def save(runs: Sequence[tuple[str, Episode]], path: Path) -> None:
+    """Write a recording that `rerun FILE` opens. Raises OutputError where path exists."""
+    refuse_existing(path)
+    rerun, stream = _stream()
+    stream.save(str(path), default_blueprint=_layout(rerun, runs))
+    _log_all(rerun, stream, runs)
+
+
+def show(runs: Sequence[tuple[str, Episode]]) -> None:
+    """Open the viewer's window; raises as require_viewer does."""
+    require_viewer()
+    rerun, stream = _stream()
+    stream.spawn(default_blueprint=_layout(rerun, runs))
+    _log_all(rerun, stream, runs)
+
+
+def require_viewer() -> None:
+    """Raise ConfigError where there is no screen, or no viewer is installed."""
+    _stream()
+    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ConfigError(
+            "no screen (neither DISPLAY nor WAYLAND_DISPLAY is set); give --save FILE.rrd, or "
+            "see `mfba report` for a page"
+        )
+
+
+def _stream() -> tuple[Any, Any]:
+    try:
+        import rerun
+        import rerun.blueprint
+    except ImportError:
+        raise ConfigError(
+            "viewer: rerun is not installed; pip install 'mfba_planner[view]', or see "
+            "`mfba report` for a page"
+        ) from None
+    return rerun, rerun.RecordingStream("mfba_planner")
+
+
+def _layout(rerun: Any, runs: Sequence[tuple[str, Episode]]) -> Any:
+    view = rerun.blueprint
+    since_the_start = view.VisibleTimeRanges(
+        timeline="sim_time",
+        start=view.TimeRangeBoundary.infinite(),
+        end=view.TimeRangeBoundary.cursor_relative(),
+    )
+    return view.Blueprint(
+        view.Horizontal(
+            *(
+                view.Vertical(
+                    view.Spatial3DView(
+                        origin=f"{name}/world",
+                        name=name,
+                        overrides={f"{name}/world/trail": since_the_start},
+                    ),
+                    view.TextLogView(origin=f"{name}/decision", name="decisions"),
+                    view.TimeSeriesView(
+                        origin=f"{name}/curves", name="clearance (m), speed (m/s)"
+                    ),
+                    row_shares=[5, 1, 2],
+                )
+                for name, _ in runs
+            )
+        )
+    )
+
+
+def _log_all(rerun: Any, stream: Any, runs: Sequence[tuple[str, Episode]]) -> None:
+    for name, episode in runs:
+        _Log(rerun, stream, name, episode).all()
+    stream.flush()
+
+
+class _Log:
+    """One run below an entity path of its name."""
+
+    def __init__(self, rerun: Any, stream: Any, name: str, episode: Episode) -> None:
+        self.rr, self.stream, self.name, self.episode = rerun, stream, name, episode
+        self.scenario = episode.scenario
+
+    def all(self) -> None:
+        """What never changes, then tick by tick."""
+        self._still()
+        times_s = [self.episode.time_s(tick.stamp_ns) for tick in self.episode.ticks]
+        xs, ys = Motion(self.scenario).centers(np.array(times_s))
+        curves = zip(clearances(self.episode), speeds(self.episode))
+        for k, (tick, time_s, (gap_m, speed)) in enumerate(
+            zip(self.episode.ticks, times_s, curves)
+        ):
+            self.stream.set_time("sim_time", duration=time_s)
+            self.stream.set_time("tick", sequence=k)
+            self._obstacles(xs[k], ys[k], time_s)
+            self._robot(tick)
+            self._put("decision", self.rr.TextLog(f"{words.MODES[tick.mode]}: {tick.reason}"))
+            if math.isfinite(gap_m):
+                self._put("curves/clearance", self.rr.Scalars(gap_m))
+            self._put("curves/speed", self.rr.Scalars(speed))
+
+    def _put(self, path: str, what: Any, *, static: bool = False) -> None:
+        self.stream.log(f"{self.name}/{path}", what, static=static)
+
+    def _still(self) -> None:
+        rr, scenario = self.rr, self.scenario
+        self._put("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        ends = [_flat(scenario.start_m), _flat(scenario.goal_m)]
+        marks = rr.Points3D(
+            ends, radii=0.08, colors=[_rgb(_DARK), _rgb(style.GREEN)], labels=["start", "goal"]
+        )
+        self._put("world/task", marks, static=True)
+        if scenario.walls:
+            (left, low), (right, high) = scenario.walls.lower_m, scenario.walls.upper_m
+            corners = [(left, low), (right, low), (right, high), (left, high), (left, low)]
+            lines = rr.LineStrips3D([[_flat(corner) for corner in corners]], colors=_rgb(_DARK))
+            self._put("world/walls", lines, static=True)
+
+    def _obstacles(self, xs: Any, ys: Any, time_s: float) -> None:
+        obstacles = self.scenario.obstacles
+        if not obstacles:
+            return
+        rr, centers = self.rr, [(x, y, 0.0) for x, y in zip(xs.tolist(), ys.tolist())]
+        numbers = [str(number) for number in range(1, len(obstacles) + 1)]
+        radii = [obstacle.radius_m for obstacle in obstacles]
+        self._put(
+            "world/obstacles",
+            rr.Points3D(centers, radii=radii, colors=_rgb(_GREY), labels=numbers),
+        )
+        edges = [
+            _ring(center, self.scenario.enlarged_radius(obstacle))
+            for center, obstacle in zip(centers, obstacles)
+        ]
+        self._put("world/enlarged", rr.LineStrips3D(edges, colors=_rgb(_GREY)))
+        moves = [velocity_at(obstacle, time_s, self.scenario.walls) for obstacle in obstacles]
+        ahead = [(vx * _AHEAD_S, vy * _AHEAD_S, 0.0) for vx, vy in moves]
+        self._put("world/moves", rr.Arrows3D(origins=centers, vectors=ahead, colors=_rgb(_GREY)))
+
+    def _robot(self, tick: Decision) -> None:
+        rr, here = self.rr, (tick.pose.x, tick.pose.y, 0.0)
+        color = _rgb(style.MODE_COLOURS[tick.mode])
+        body = rr.Points3D([here], radii=self.scenario.robot_radius_m, colors=color)
+        self._put("world/robot", body)
+        reach = self.episode.sensor.sensing_range_m
+        self._put(
+            "world/sensor/ring", rr.LineStrips3D([_ring(here, reach)], colors=_rgb(style.ORANGE))
+        )
+        lit = [_sector(here, reach, k, len(tick.vs)) for k, bit in enumerate(tick.vs) if bit]
+        self._put(
+            "world/sensor/sectors", rr.LineStrips3D(lit, colors=_rgb(style.ORANGE), radii=0.02)
+        )
+        bats = rr.Points3D([_flat(bat) for bat in tick.candidates], radii=0.02, colors=_rgb(_DARK))
+        self._put("world/bats", bats)
+        if tick.mode not in (Mode.STOPPED, Mode.IDLE):
+            step = rr.LineStrips3D([[here, _flat(tick.waypoint)]], colors=color)
+            self._put("world/waypoint", step)
+        self._put("world/trail", rr.Points3D([here], radii=0.04, colors=color))
+
+
+def _rgb(color: str) -> list[int]:
+    return [int(color[k : k + 2], 16) for k in (1, 3, 5)]
+
+
+def _flat(point: Sequence[float]) -> tuple[float, float, float]:
+    return (point[0], point[1], 0.0)
+
+
+def _ring(center: Sequence[float], radius_m: float) -> Any:
+    x, y = center[0] + radius_m * np.cos(_CIRCLE), center[1] + radius_m * np.sin(_CIRCLE)
+    return np.stack([x, y, np.zeros_like(x)], axis=1)
+
+
+def _sector(center: Sequence[float], radius_m: float, k: int, count: int) -> Any:
+    angles = np.linspace(k, k + 1, 7) * (2.0 * math.pi / count)
+    x = np.concatenate([[0.0], radius_m * np.cos(angles), [0.0]]) + center[0]
+    y = np.concatenate([[0.0], radius_m * np.sin(angles), [0.0]]) + center[1]
+    return np.stack([x, y, np.zeros_like(x)], axis=1)

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner reports of itself on /diagnostics, and when."""
+
+from __future__ import annotations
+
+import time
+
+from ..core.guarded import Guarded
+from ..core.planner import NANO, Decision
+from ..messages import points_text
+from ..node_settings import PlannerSettings
+from .errands import Errands
+from .health import Health, driving
+from .planner_topics import DiagnosticTopic
+from .runtime import GraphNode, Refusals
+
+
+class PlannerHealth:
+    """Listens to what the planner hears and decides; publishes once in a period and on changes."""
+
+    def __init__(self, node: GraphNode, settings: PlannerSettings, refusals: Refusals) -> None:
+        """Advertise /diagnostics."""
+        self._topic = DiagnosticTopic(node, settings)
+        self._refusals = refusals
+        self._health = Health(("odom", "sectors"))
+        self._faults: dict[str, str] = {}
+        self._seen: tuple[object, ...] = ()
+        self._stamp_ns, self._stamp_s = node.get_clock().now().nanoseconds, time.monotonic()
+
+    def heard(self, name: str, stamp_ns: int, now_s: float, fault: str) -> None:
+        """An input came; fault is why its content is refused, "": it is sound."""
+        self._health.pulses[name].beat(stamp_ns, now_s)
+        self._faults[name] = fault
+
+    def decided(self, decision: Decision, brain: Guarded, errands: Errands, state: str) -> None:
+        """Report at once where something has changed; everything else can wait."""
+        self._stamp_ns, self._stamp_s = decision.stamp_ns, time.monotonic()
+        seen = (decision.mode, brain.phase, errands.number, *self._faults.values())
+        news, self._seen = seen != self._seen, seen
+        if news or self._topic.is_due(decision.stamp_ns):
+            self.report(decision, brain, errands, state, self._stamp_s, news=news)
+
+    def report(
+        self,
+        decision: Decision | None,
+        brain: Guarded,
+        errands: Errands,
+        state: str,
+        now_s: float,
+        *,
+        news: bool = False,
+    ) -> None:
+        """Publish, if it is time to, or if a level has changed."""
+        fault = next(filter(None, self._faults.values()), "")
+        timeout_s = brain.params.input_timeout_s
+        values = {
+            "method": brain.params.label,
+            "goal": points_text([errands.goal] if errands.goal else []),
+            "leg": errands.leg,
+            "errand": str(errands.number),
+            "last refused": self._refusals.last,
+        }
+        statuses = [
+            self._health.inputs(now_s, timeout_s, self._refusals.by_kind, fault),
+            driving(decision, brain.phase, state, values),
+        ]
+        passed_ns = round((now_s - self._stamp_s) / NANO)
+        self._topic.publish(statuses, self._stamp_ns + passed_ns, news=news)

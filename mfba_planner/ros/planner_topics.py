@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What planner says: the move, everything about the decision, and how it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from geometry_msgs.msg import Twist, TwistStamped
+
+from ..core.geometry import Point
+from ..core.jump import carried_off
+from ..core.planner import NANO, Decision, Mode
+from ..node_settings import PlannerSettings
+from . import convert, markers, topics
+from .health import Status
+from .runtime import GraphNode
+
+
+class PlannerTopics:
+    """The publishers of planner."""
+
+    def __init__(
+        self, node: GraphNode, settings: PlannerSettings, tick_ns: Callable[[], int]
+    ) -> None:
+        """Advertise them all; cmd_vel is what the base is told for a tick."""
+        self._settings, self._tick_ns = settings, tick_ns
+        self._log = node.get_logger()
+        self._who = node.get_fully_qualified_name()
+        self._goal_step = node.advertise(topics.GOAL_STEP)
+        self._plan = node.advertise(topics.PLAN)
+        self._decision = node.advertise(topics.DECISION)
+        self._markers = node.advertise(topics.MARKERS)
+        self.reach_m = 0.0  # of the sectors: what the ring shows
+        self._view = markers.Seldom(settings.view_period_s)
+        stamped = TwistStamped if settings.enable_stamped_cmd_vel else None
+        self._cmd_vel = node.advertise(topics.CMD_VEL, stamped)
+
+    def decided(
+        self, decision: Decision, algorithm: str, refused: int, more: Mapping[str, str]
+    ) -> None:
+        """What the world waits for first, everything about the decision while it moves on."""
+        self.move(decision)
+        if decision.mode is Mode.STOPPED or carried_off(decision.reason):
+            self._log.warning(decision.reason, throttle_duration_sec=1.0)
+        frame = self._settings.odom_frame
+        self._plan.publish(convert.plan_msg(decision, frame))
+        reason = convert.decision_msg(decision, algorithm, refused, self._who, more)
+        self._decision.publish(reason)
+        if self._view.due(decision.stamp_ns):
+            self._markers.publish(markers.decision_markers(decision, frame, self.reach_m))
+
+    def move(self, decision: Decision) -> None:
+        """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
+        s, stamp, tick_ns = self._settings, decision.stamp_ns, self._tick_ns()
+        self._goal_step.publish(convert.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame))
+        if s.enable_stamped_cmd_vel:
+            twist = convert.twist_stamped_msg(decision, s.base_frame, s, tick_ns)
+            self._cmd_vel.publish(twist)
+        else:
+            self._cmd_vel.publish(convert.twist_msg(decision, s, tick_ns))
+
+    def halt(self, place: Point, stamp_ns: int) -> None:
+        """Command rest, here, without having decided anything."""
+        s = self._settings
+        self._goal_step.publish(convert.pose_stamped_msg(place, stamp_ns, s.odom_frame))
+        if s.enable_stamped_cmd_vel:
+            rest = TwistStamped()
+            convert.set_header(rest.header, stamp_ns, s.base_frame)
+            self._cmd_vel.publish(rest)
+        else:
+            self._cmd_vel.publish(Twist())
+
+
+class DiagnosticTopic:
+    """The publisher of /diagnostics: once in a period, and at once when something changes."""
+
+    def __init__(self, node: GraphNode, settings: PlannerSettings) -> None:
+        """Advertise it; it outlives what PlannerTopics advertises."""
+        self._publisher = node.advertise(topics.DIAGNOSTICS)
+        self._who = node.get_fully_qualified_name().lstrip("/")
+        self._hardware_id = settings.hardware_id
+        self._period_ns = round(settings.diagnostics_period_s / NANO)
+        self._last_ns = -1
+        self._last_gist: list[Any] = []
+
+    def is_due(self, stamp_ns: int) -> bool:
+        """Whether a period has passed since the last, or time was set back."""
+        return not 0 <= self._last_ns <= stamp_ns < self._last_ns + self._period_ns
+
+    def publish(self, statuses: list[Status], stamp_ns: int, *, news: bool) -> None:
+        """Publish what is due, has changed its level, or is news for another reason."""
+        gist = [status.gist for status in statuses]
+        if news or gist != self._last_gist or self.is_due(stamp_ns):
+            self._last_gist, self._last_ns = gist, stamp_ns
+            message = convert.diagnostics_msg(statuses, self._who, self._hardware_id, stamp_ns)
+            self._publisher.publish(message)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A real graph in real time with somebody on the wires between its nodes, who may tamper."""
+
+from collections.abc import Callable
+from typing import Any
+
+from graph import Graph
+
+from mfba_planner.messages import stamp_ns
+from mfba_planner.ros import topics
+from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.ros.virtual_sensor import VirtualSensor
+from mfba_planner.ros.world_sim import WorldSim
+
+TICK_NS = 100_000_000
+SPEED_FACTOR = 0.25  # slow motion: a busy machine must not look like a fault
+TIMEOUT_S = 0.16  # of simulated time
+
+Tamper = Callable[[Any], Any]  # what becomes of a message; None: it is lost
+
+
+class Wired:
+    """world_sim, virtual_sensor and planner, whose odom, scan and sectors pass through here.
+
+    The world has no lidar: scan is made here, one per odom, with beams as given.
+    """
+
+    def __init__(self, graph: Graph, scenario: str, **planner: Any) -> None:
+        self.graph = graph
+        self.tamper: dict[str, Tamper] = {}
+        self.beams = [float("inf")] * 360
+        self.odom = graph.hear(topics.ODOM)
+        self.decisions = graph.hear(topics.DECISION)
+        self.diagnostics = graph.hear(topics.DIAGNOSTICS)
+        self.cmd_vel = graph.hear(topics.CMD_VEL)
+        self._wires = {
+            topic.name: graph.probe.create_publisher(
+                topic.type, f"tampered/{topic.name}", topic.qos
+            )
+            for topic in (topics.ODOM, topics.SCAN, topics.SECTORS)
+        }
+        for topic, deliver in ((topics.ODOM, self._on_odom), (topics.SECTORS, self._on_sectors)):
+            graph.probe.create_subscription(topic.type, topic.name, deliver, topic.qos)
+        self.sensor = graph.start(
+            VirtualSensor,
+            {"source": "scan"},
+            cli_args=_remapped("odom", "scan"),
+        )
+        self.planner = graph.start(
+            PlannerNode,
+            {"step_length_m": 0.08, "speed_mps": 0.8, "input_timeout_s": TIMEOUT_S / SPEED_FACTOR}
+            | planner,
+            cli_args=_remapped("odom", "sectors"),
+        )
+        told = {"scenario": scenario, "tick_ns": TICK_NS, "speed_factor": SPEED_FACTOR}
+        self.world = graph.start(WorldSim, told | {"cmd_vel_timeout_s": 0.2 / SPEED_FACTOR})
+
+    def _on_odom(self, message: Any) -> None:
+        self._pass_on("odom", message)
+        scan = topics.SCAN.type()
+        scan.header.stamp = message.header.stamp
+        scan.header.frame_id = "base_link"
+        scan.angle_min, scan.angle_increment = 0.0, 6.283185307179586 / len(self.beams)
+        scan.range_min, scan.range_max, scan.ranges = 0.05, 10.0, self.beams
+        self._pass_on("scan", scan)
+
+    def _on_sectors(self, message: Any) -> None:
+        self._pass_on("sectors", message)
+
+    def _pass_on(self, name: str, message: Any) -> None:
+        told = self.tamper.get(name, lambda same: same)(message)
+        if told is not None:
+            self._wires[name].publish(told)
+
+    def is_moving(self) -> bool:
+        """Whether the last two odometry messages are of two places."""
+        return len(self.odom) > 1 and _place(self.odom[-1]) != _place(self.odom[-2])
+
+    def drive(self) -> int:
+        """Wait until the robot is under way; return the stamp of the newest odometry."""
+        self.graph.until(lambda: len(self.odom) > 3 and self.is_moving(), timeout_s=20.0)
+        return stamp_ns(self.odom[-1].header.stamp)
+
+    def rest_after(self, since_ns: int) -> float:
+        """Wait until the robot rests for three ticks; seconds it moved on after a stamp."""
+        self.graph.until(lambda: self._rested(since_ns) is not None, timeout_s=20.0)
+        return (self._rested(since_ns) or 0) * 1e-9
+
+    def _rested(self, since_ns: int) -> int | None:
+        after = [m for m in self.odom if stamp_ns(m.header.stamp) >= since_ns]
+        for k in range(len(after) - 3):
+            if len({_place(m) for m in after[k : k + 4]}) == 1:
+                return stamp_ns(after[k].header.stamp) - since_ns
+        return None
+
+    def told(self, name: str) -> Any:
+        """The newest status of /diagnostics of this name."""
+        return next(s for s in self.diagnostics[-1].status if s.name == f"planner: {name}")
+
+
+def _remapped(*names: str) -> list[str]:
+    rules = [word for name in names for word in ("-r", f"{name}:=tampered/{name}")]
+    return ["--ros-args", *rules]
+
+
+def _place(odom: Any) -> tuple[float, float]:
+    p = odom.pose.pose.position
+    return (p.x, p.y)

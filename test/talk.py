@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A planner, what it is given and what it answers, for tests that talk to it by hand."""
+
+import math
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from graph import Graph
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import LaserScan
+
+from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.planner import Mode
+from mfba_planner.core.sensing import Ranges, SensorParams
+from mfba_planner.ros import topics
+from mfba_planner.ros.convert import odometry_msg, pose_stamped_msg, sectors_msg
+from mfba_planner.ros.planner import PlannerNode
+
+INF, NAN = math.inf, math.nan
+FREE: Ranges = (INF,) * 12
+NORTH_EAST = (0.5, *FREE[1:])  # sector 1 is set
+GOAL = (10.0, 5.0)
+LOCKSTEP = {"lockstep": True, "seed": 3}
+
+
+def odom(stamp: int, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Odometry:
+    return odometry_msg(Pose2D(x, y, yaw), (0.0, 0.0), stamp, "odom", "base_link")
+
+
+def sectors(stamp: int, ranges: Ranges = FREE) -> LaserScan:
+    return sectors_msg(ranges, SensorParams(sectors=len(ranges)), 0.3, stamp, "odom")
+
+
+def goal(x: float, y: float) -> PoseStamped:
+    return pose_stamped_msg((x, y), 1, "odom")
+
+
+class Talk:
+    """A planner, what it is given and what it answers."""
+
+    def __init__(
+        self, graph: Graph, parameters: dict[str, Any], at: tuple[float, float] | None = GOAL
+    ) -> None:
+        self.graph = graph
+        self.odom = graph.writer(topics.ODOM)
+        self.sectors = graph.writer(topics.SECTORS)
+        self.goal = graph.writer(topics.GOAL_POSE)
+        self.waypoints = graph.writer(topics.WAYPOINTS)
+        self.decisions = graph.hear(topics.DECISION)
+        self.plans = graph.hear(topics.PLAN)
+        self.steps = graph.hear(topics.GOAL_STEP)
+        stamped = parameters.get("enable_stamped_cmd_vel")
+        self.cmd_vel = graph.hear(topics.CMD_VEL, TwistStamped if stamped else None)
+        if at:
+            self.goal.publish(goal(*at))  # latched
+        self.node = graph.start(PlannerNode, parameters)
+        if at:
+            graph.until(lambda: self.node.goals.errands.goal is not None)
+
+    def answers(self, *messages: Any) -> list[Any]:
+        """Publish in this order and return the decisions that come of it."""
+        count, twists = len(self.decisions), len(self.cmd_vel)
+        writers: dict[Any, Any] = {Odometry: self.odom, LaserScan: self.sectors}
+        writers |= {PoseStamped: self.goal, Path: self.waypoints}
+        for message in messages:
+            writers[type(message)].publish(message)
+            if isinstance(message, PoseStamped | Path):
+                self.graph.settle()
+        self.graph.settle()
+        given = self.decisions[count:]
+        assert len(self.cmd_vel) - twists == len(given), "each decision has its Twist"
+        return given
+
+    def answer(self, *messages: Any) -> Any:
+        (only,) = self.answers(*messages)
+        return only
+
+    @property
+    def velocity(self) -> tuple[float, float]:
+        """The Twist of the last decision."""
+        twist = getattr(self.cmd_vel[-1], "twist", self.cmd_vel[-1])
+        return (twist.linear.x, twist.linear.y)
+
+
+def fields(message: Any) -> dict[str, str]:
+    (status,) = message.status
+    return {item.key: item.value for item in status.values} | {"reason": status.message}
+
+
+def mode(message: Any) -> Mode:
+    return Mode(fields(message)["mode"])

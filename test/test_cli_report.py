@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba report`: from bags and results to a page, or one line that says why not."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mfba_planner import cli
+from mfba_planner.core.episode import Episode, run
+from mfba_planner.entry import guarded_main
+from mfba_planner.report.result import result_to_dict, write_result
+from mfba_planner.scenarios import load_scenario
+
+Said = pytest.CaptureFixture[str]
+ROOT = Path(__file__).parents[1]
+
+
+def report(said: Said, *args: str | Path) -> tuple[int, str, str]:
+    code = guarded_main(lambda: cli.main(["report", *map(str, args)]), "mfba")
+    return code, *said.readouterr()
+
+
+def refused(said: Said, *args: str | Path) -> str:
+    """The one line that a mistake costs; nothing is written."""
+    code, out, err = report(said, *args)
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    return err
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def episode() -> Episode:
+    return run(load_scenario("case1"), seed=4)
+
+
+@pytest.fixture
+def kept(tmp_path: Path, episode: Episode) -> Path:
+    """The directory of a run without a bag."""
+    (tmp_path / "kept").mkdir()
+    write_result(tmp_path / "kept/result.json", result_to_dict(episode))
+    return tmp_path / "kept"
+
+
+def data_of(path: Path) -> dict[str, Any]:
+    found = re.search(r'id="data">(.*?)</script>', path.read_text(encoding="utf-8"), re.DOTALL)
+    assert found
+    data: dict[str, Any] = json.loads(found[1])
+    return data
+
+
+def changed(result: Path, **values: Any) -> Path:
+    """The result again, with other values."""
+    data = {**json.loads(result.read_text()), **values}
+    path = result.with_name("changed.json")
+    path.write_text(json.dumps({k: v for k, v in data.items() if v is not None}))
+    return path
+
+
+def test_a_result_is_made_again(capsys: Said, kept: Path, episode: Episode) -> None:
+    assert report(capsys, kept) == (0, "wrote report.html\n", "")
+    assert report(capsys, kept / "result.json", "--out", "b.html") == (0, "wrote b.html\n", "")
+    assert Path("report.html").read_bytes() == Path("b.html").read_bytes()
+    (told,) = data_of(Path("b.html"))["runs"]
+    assert told["name"] == "kept"
+    assert told["ticks"]["x"] == [tick.pose.x for tick in episode.ticks]
+    assert told["digest"] == result_to_dict(episode)["digest"]
+
+
+def test_a_result_holds_its_world(capsys: Said, tmp_path: Path) -> None:
+    world = tmp_path / "mine.yaml"
+    world.write_text("name: mine\nstart_m: [0.0, 0.0]\ngoal_m: [2.0, 0.0]\n")
+    assert guarded_main(lambda: cli.main(["sim", str(world), "--out", "run"]), "mfba") == 0
+    world.unlink()
+    capsys.readouterr()
+    assert report(capsys, "run") == (0, "wrote report.html\n", "")
+    assert data_of(Path("report.html"))["runs"][0]["world"]["goal"] == [2.0, 0.0]
+
+
+def test_a_result_without_its_world_needs_a_shipped_one(capsys: Said, kept: Path) -> None:
+    result = kept / "result.json"
+    assert report(capsys, changed(result, world=None)) == (0, "wrote report.html\n", "")
+    err = refused(capsys, changed(result, world=None, scenario="mine"), "--out", "b.html")
+    assert "its run cannot be made again (scenario mine is not shipped); give its bag" in err
+
+
+def test_a_run_that_decides_otherwise_is_refused(capsys: Said, kept: Path) -> None:
+    err = refused(capsys, changed(kept / "result.json", seed=5))
+    assert "made again, its run decides otherwise (digest " in err
+    assert err.endswith("; give its bag\n")
+    assert not Path("report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({"world": {"name": "x"}}, "missing"),
+        ({"parameters": {"planner": {}}}, "sensor"),
+        ({"parameters": {"planner": {"no": 1}, "sensor": {}}}, "no: unknown option"),
+        ({"seed": -1}, "negative"),
+    ],
+)
+def test_a_result_that_makes_no_sense_is_refused(
+    capsys: Said, kept: Path, values: dict[str, Any], reason: str
+) -> None:
+    err = refused(capsys, changed(kept / "result.json", **values))
+    assert "its run cannot be made again" in err
+    assert reason in err
+
+
+def test_mistakes_cost_one_line(capsys: Said, kept: Path, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no bag")
+    (tmp_path / "empty.mcap").touch()
+    (tmp_path / "empty").mkdir()
+    assert "BAG|RESULT" in refused(capsys)
+    assert "nowhere: does not exist" in refused(capsys, "nowhere")
+    assert "nowhere.json: no such file" in refused(capsys, "nowhere.json")
+    assert "notes.txt: " in refused(capsys, "notes.txt")
+    assert "empty.mcap: " in refused(capsys, "empty.mcap")
+    assert "empty: not a bag" in refused(capsys, "empty")
+    foreign = refused(capsys, ROOT / "test/data/rosbag2_foreign_scan")
+    assert "was not recorded by mfba" in foreign
+    assert "7 runs: too many" in refused(capsys, *[kept] * 7)
+    assert not Path("report.html").exists()
+
+
+def test_what_is_there_is_not_overwritten(capsys: Said, kept: Path) -> None:
+    Path("report.html").write_text("mine")
+    assert "report.html: exists" in refused(capsys, kept)
+    assert "cannot be written" in refused(capsys, kept, "--out", "no/where.html")
+    assert Path("report.html").read_text() == "mine"
+
+
+def test_several_runs_keep_their_order(capsys: Said, kept: Path) -> None:
+    assert guarded_main(lambda: cli.main(["sim", "case1", "--out", "other"]), "mfba") == 0
+    capsys.readouterr()
+    assert report(capsys, "other", kept)[0] == 0
+    assert [told["name"] for told in data_of(Path("report.html"))["runs"]] == ["other", "kept"]

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba view`: what is written for Rerun's viewer, as Rerun's own reader tells of it."""
+
+import math
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from mfba_planner import cli
+from mfba_planner.core.episode import Episode, run
+from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
+from mfba_planner.launcher.options import read_order
+from mfba_planner.report.html.data import clearances
+from mfba_planner.report.viewer import save
+from mfba_planner.scenarios import load_scenario
+
+RERUN = Path(sys.executable).parent / "rerun"
+ROWS = re.compile(r"^Chunk\(\w+\) with (\d+) rows .*? - (/\S+)", re.MULTILINE)
+
+
+def rows_of(path: Path) -> Counter[str]:
+    """How often each entity was logged, as `rerun rrd print` says."""
+    done = subprocess.run(
+        [RERUN, "rrd", "print", path], capture_output=True, text=True, timeout=120, check=True
+    )
+    found: Counter[str] = Counter()
+    for rows, entity in ROWS.findall(done.stdout):
+        found[entity] += int(rows)
+    return found
+
+
+@pytest.fixture(scope="module")
+def episode() -> Episode:
+    return run(load_scenario("walled"), seed=1)
+
+
+def test_every_tick_of_every_run_is_there(episode: Episode, tmp_path: Path) -> None:
+    other = run(load_scenario("empty"))
+    save([("a", episode), ("b", other)], tmp_path / "two.rrd")
+    rows = rows_of(tmp_path / "two.rrd")
+    for name, made in (("a", episode), ("b", other)):
+        ticks = len(made.ticks)
+        every_tick = ("decision", "curves/speed", "world/robot", "world/trail", "world/bats")
+        assert {rows[f"/{name}/{path}"] for path in every_tick} == {ticks}
+        assert rows[f"/{name}/world/sensor/ring"] == rows[f"/{name}/world/sensor/sectors"] == ticks
+        gaps = sum(map(math.isfinite, clearances(made)))
+        assert rows[f"/{name}/curves/clearance"] == gaps
+        assert rows[f"/{name}/world/obstacles"] == (ticks if made.scenario.obstacles else 0)
+        assert rows[f"/{name}/world/walls"] == bool(made.scenario.walls)
+
+
+def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["sim", "empty", "--out", "made"]) == 0
+    assert cli.main(["view", "made", "--save", "made.rrd"]) == 0
+    assert rows_of(tmp_path / "made.rrd")["/made/decision"] == len(
+        run(load_scenario("empty")).ticks
+    )
+    with pytest.raises(OutputError, match=r"^made.rrd: exists and is never overwritten"):
+        cli.main(["view", "made", "--save", "made.rrd"])
+    with pytest.raises(MfbaError, match="nowhere"):
+        cli.main(["view", "nowhere", "--save", "no.rrd"])
+    assert not Path("no.rrd").exists()
+
+
+def test_without_a_screen_or_a_viewer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert cli.main(["sim", "empty", "--out", "made"]) == 0
+    with pytest.raises(ConfigError, match=r"^no screen .*--save FILE.rrd"):
+        cli.main(["view", "made"])
+    with pytest.raises(ConfigError, match=r"^no screen "):  # before anything is run
+        read_order(["case1", "--view"], "mfba run")
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(ConfigError, match=r"rerun is not installed; pip install 'mfba_planner\[v"):
+        cli.main(["view", "made", "--save", "made.rrd"])
+    assert not Path("made.rrd").exists()

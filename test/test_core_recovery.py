@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The way out of a blocked state as a table, within bounded time, and only if asked for."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mfba_planner.core.caution import CautionParams, allowed_share
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.geometry import Pose2D, distance
+from mfba_planner.core.guarded import Guarded
+from mfba_planner.core.options import override
+from mfba_planner.core.planner import Decision, Mode, Observation, Planner, PlannerParams
+from mfba_planner.core.recovery import (
+    Phase,
+    Recovery,
+    RecoveryParams,
+    advance,
+    longest_s,
+    most_room,
+)
+from mfba_planner.core.sensing import SensorParams, sense_circles
+from mfba_planner.planners.method import brain
+
+S = 1_000_000_000
+INF = math.inf
+PARAMS = RecoveryParams(enabled=True, wait_s=2.0, back_off_s=1.0, attempts=3)
+ONCE = Recovery(phase=Phase.FREE, since_ns=10 * S, free_ns=12 * S, attempt=2)
+
+
+def at(phase: Phase, attempt: int = 1) -> Recovery:
+    return Recovery(phase=phase, since_ns=10 * S, free_ns=5 * S, attempt=attempt)
+
+
+@pytest.mark.parametrize(
+    ("state", "blocked", "now_s", "phase", "attempt"),
+    [
+        (Recovery(), False, 9, Phase.FREE, 0),
+        (Recovery(), True, 9, Phase.WAIT, 0),
+        (at(Phase.WAIT), True, 11, Phase.WAIT, 1),
+        (at(Phase.WAIT), True, 12, Phase.BACK_OFF, 2),
+        (at(Phase.WAIT), False, 11, Phase.FREE, 1),
+        (at(Phase.WAIT), False, 12, Phase.FREE, 1),
+        (at(Phase.WAIT, 3), True, 12, Phase.GIVEN_UP, 3),
+        (at(Phase.BACK_OFF), True, 10.5, Phase.BACK_OFF, 1),
+        (at(Phase.BACK_OFF), False, 10.5, Phase.BACK_OFF, 1),
+        (at(Phase.BACK_OFF), True, 11, Phase.REPLAN, 1),
+        (at(Phase.BACK_OFF), False, 11, Phase.REPLAN, 1),
+        (at(Phase.REPLAN), True, 11, Phase.WAIT, 1),
+        (at(Phase.REPLAN), False, 11, Phase.FREE, 1),
+        (at(Phase.GIVEN_UP, 3), True, 99, Phase.GIVEN_UP, 3),
+        (at(Phase.GIVEN_UP, 3), False, 99, Phase.GIVEN_UP, 3),
+        (ONCE, False, 13.9, Phase.FREE, 2),
+        (ONCE, False, 14, Phase.FREE, 0),
+        (ONCE, True, 13.9, Phase.BACK_OFF, 3),
+        (replace(ONCE, since_ns=12 * S), True, 13.9, Phase.WAIT, 2),
+        (ONCE, True, 14, Phase.WAIT, 0),
+    ],
+)
+def test_phases_follow_each_other(
+    state: Recovery, blocked: bool, now_s: float, phase: Phase, attempt: int
+) -> None:
+    after = advance(state, blocked, round(now_s * S), PARAMS)
+    assert (after.phase, after.attempt) == (phase, attempt)
+
+
+def test_a_gap_that_flickers_does_not_begin_the_wait_anew() -> None:
+    state = Recovery()
+    for tick in range(4):
+        state = advance(state, tick % 2 == 0, (10 + tick) * S // 2, PARAMS)
+    assert state.phase is Phase.FREE
+    assert advance(state, True, 69 * S // 10, PARAMS).since_ns == 5 * S
+    assert advance(state, True, 7 * S, PARAMS).phase is Phase.BACK_OFF
+
+
+@given(
+    wait_s=st.floats(0.0, 5.0),
+    back_off_s=st.floats(0.0, 3.0),
+    attempts=st.integers(0, 5),
+    tick_ms=st.integers(20, 700),
+    gaps=st.lists(st.booleans(), min_size=1, max_size=40),
+)
+def test_it_gives_up_in_bounded_time(
+    wait_s: float, back_off_s: float, attempts: int, tick_ms: int, gaps: list[bool]
+) -> None:
+    """Whatever flickers, as long as no gap stays open for wait_s."""
+    params = RecoveryParams(enabled=True, wait_s=wait_s, back_off_s=back_off_s, attempts=attempts)
+    tick_ns = tick_ms * 1_000_000
+    state, now_ns, open_ns, begun_ns = Recovery(), S, 0, S
+    limit_ns = begun_ns + longest_s(params, tick_ms * 1e-3) * S
+    k = 0
+    while state.phase is not Phase.GIVEN_UP:
+        gap = gaps[k % len(gaps)] and open_ns + 2 * tick_ns < wait_s * S and k > 0
+        open_ns = open_ns + tick_ns if gap else 0
+        state = advance(state, not gap, now_ns, params)
+        assert now_ns <= limit_ns + 1
+        now_ns += tick_ns
+        k += 1
+    assert state.attempt == attempts
+
+
+def test_most_room_is_where_nothing_is_near_and_of_equals_where_it_came_from() -> None:
+    everywhere = (0.5,) * 12
+    heading, room = most_room(everywhere, math.radians(200.0))
+    assert (round(math.degrees(heading)), room) == (-165, 0.5)
+    behind = tuple(INF if 4 <= i <= 9 else 0.2 for i in range(12))
+    heading, room = most_room(behind, math.pi)
+    assert round(abs(math.degrees(heading))) == 165
+    assert room > 0.5
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(-1.3, 1.3), st.floats(-1.3, 1.3), st.floats(0.1, 0.8)),
+        min_size=1,
+        max_size=6,
+    )
+)
+def test_half_the_room_never_leads_into_what_stands_still(
+    circles: list[tuple[float, float, float]],
+) -> None:
+    here = (0.0, 0.0)
+    known = [((x, y), r) for x, y, r in circles if math.hypot(x, y) > r]
+    ranges = sense_circles(here, known, SensorParams(sensing_range_m=3.0))
+    heading, room = most_room(ranges, 0.0)
+    step = min(0.5 * room, 1.0)
+    there = (step * math.cos(heading), step * math.sin(heading))
+    for center, r in known:
+        assert distance(there, center) >= r - 1e-6
+
+
+BLOCKED = (0.5,) * 11 + (0.6,)
+
+
+def seen(tick: int, ranges: tuple[float, ...] = BLOCKED, x: float = 0.0) -> Observation:
+    stamp = (tick + 1) * S
+    return Observation(
+        stamp_ns=stamp, pose=Pose2D(x, 0.0), ranges_m=ranges, goal=(9.0, 0.0), now_ns=stamp
+    )
+
+
+def test_by_default_every_decision_is_passed_on_unchanged() -> None:
+    params = PlannerParams()
+    bare, guarded = Planner(params, 3), Guarded(Planner(params, 3))
+    for tick in range(20):
+        ranges = BLOCKED if tick % 3 else (0.3,) + (INF,) * 11
+        assert guarded.plan(seen(tick, ranges, x=0.1 * tick)) == bare.plan(
+            seen(tick, ranges, x=0.1 * tick)
+        )
+    assert guarded.phase is Phase.FREE
+
+
+def drive(guarded: Guarded, ticks: int) -> list[Decision]:
+    return [guarded.plan(seen(tick)) for tick in range(ticks)]
+
+
+def test_blocked_it_waits_backs_off_replans_and_gives_up_until_there_is_a_goal() -> None:
+    params = override(PlannerParams(), {"recovery.enabled": True, "recovery.attempts": 1})
+    guarded = brain(params, seed=1)
+    decisions = drive(guarded, 9)
+    reasons = [decision.reason for decision in decisions]
+    assert reasons[0].endswith("every gap is closed; waiting for 0.0 s")
+    assert reasons[2] == "backing off, attempt 1 of 1"
+    assert reasons[3].startswith("replanning, attempt 1 of 1: sectors 1+2+")
+    assert reasons[-1] == "gave up after 1 attempts; send a goal to go on"
+    assert {decision.mode for decision in decisions} == {Mode.BLOCKED}
+    moving = [decision.velocity != (0.0, 0.0) for decision in decisions]
+    assert moving == [False, False, True, *([False] * 6)]
+    assert decisions[2].waypoint[0] > 0.0, "to sector 12, where most room is"
+    free = (INF,) * 12
+    assert guarded.plan(seen(9, free)).mode is Mode.BLOCKED
+    guarded.reset()
+    assert guarded.plan(seen(10, free)).mode is Mode.PATH_GENERATION
+
+
+def test_what_cannot_be_trusted_moves_nobody_in_any_phase() -> None:
+    params = override(PlannerParams(), {"recovery.enabled": True})
+    guarded = brain(params, seed=1)
+    drive(guarded, 2)
+    blind = replace(seen(2), refused="sector 1 holds nan", ranges_m=())
+    assert guarded.plan(blind).velocity == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("nearest", "share"), [(INF, 1.0), (0.8, 1.0), (0.4, 0.5), (0.1, 0.2), (0.0, 0.2)]
+)
+def test_the_speed_falls_with_the_clearance(nearest: float, share: float) -> None:
+    caution = CautionParams(slow_within_m=0.8, least_share=0.2)
+    ranges = (INF, nearest, INF)
+    assert allowed_share(ranges, caution) == pytest.approx(share)
+    assert allowed_share(ranges, CautionParams()) == 1.0
+    params = PlannerParams(caution=caution)
+    one_sided = (INF,) * 6 + (nearest,) + (INF,) * 5
+    full = brain(PlannerParams()).plan(seen(0, one_sided))
+    slow = brain(params).plan(seen(0, one_sided))
+    assert slow.waypoint == pytest.approx([share * w for w in full.waypoint])
+    assert math.hypot(*slow.velocity) == pytest.approx(share * math.hypot(*full.velocity))
+    if share < 1.0:
+        assert slow.reason.endswith(f"; {100 * share:.0f} % speed so near")
+
+
+def test_options_out_of_range_are_refused() -> None:
+    for options in ({"wait_s": -1.0}, {"attempts": -1}, {"back_off_mps": math.nan}):
+        with pytest.raises(ConfigError):
+            RecoveryParams(**options)  # type: ignore[arg-type]
+    with pytest.raises(ConfigError):
+        CautionParams(least_share=1.5)

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every failure on the real graph ends in a robot at rest, and in a diagnostic that names it."""
+
+import json
+import math
+import time
+from copy import deepcopy
+from itertools import groupby
+from typing import Any
+
+import pytest
+from graph import Graph
+from relay import SPEED_FACTOR, TIMEOUT_S, Tamper, Wired
+from std_srvs.srv import SetBool
+
+from mfba_planner.core.options import flatten
+from mfba_planner.core.recovery import RecoveryParams, longest_s
+from mfba_planner.messages import stamp_ns
+from mfba_planner.ros import topics
+from mfba_planner.ros.convert import pose_stamped_msg
+from mfba_planner.ros.planner import PlannerNode
+
+INF, NAN = math.inf, math.nan
+FAR = json.dumps(
+    {"name": "far", "start_m": [0.0, 0.0], "goal_m": [50.0, 0.0], "time_limit_s": 600.0}
+)
+SOON_S = 0.3  # of simulated time
+
+
+def lost(_: Any) -> None:
+    """Nothing comes any more."""
+
+
+def changed(path: str, value: Any) -> Tamper:
+    """The message with one attribute changed."""
+
+    def tamper(message: Any) -> Any:
+        copy = deepcopy(message)
+        *parents, last = path.split(".")
+        part = copy
+        for name in parents:
+            part = getattr(part, name)
+        setattr(part, last, value)
+        return copy
+
+    return tamper
+
+
+def repeated() -> Tamper:
+    """The same message again and again, as a driver does whose hardware has gone."""
+    first: list[Any] = []
+
+    def tamper(message: Any) -> Any:
+        first.append(message)
+        return first[0]
+
+    return tamper
+
+
+OK, WARN, ERROR, STALE = b"\x00", b"\x01", b"\x02", b"\x03"
+BLIND = [NAN] * 12
+FAULTS = {
+    "stale scan": ("scan", lost, STALE, "sectors stale for"),
+    "stale odom": ("odom", lost, STALE, "odom stale for"),
+    "odom with one stamp": ("odom", repeated(), STALE, "odom stale for"),
+    "stale sectors": ("sectors", lost, STALE, "sectors stale for"),
+    "NaN scan": ("scan", changed("ranges", [NAN] * 360), ERROR, "refused: sector 1 holds nan"),
+    "NaN sectors": ("sectors", changed("ranges", BLIND), ERROR, "refused: sector 1 holds nan"),
+    "NaN odom": (
+        "odom",
+        changed("pose.pose.position.x", NAN),
+        ERROR,
+        "refused: odom position holds nan",
+    ),
+    "inf odom": (
+        "odom",
+        changed("pose.pose.position.y", math.inf),
+        ERROR,
+        "refused: odom position holds inf",
+    ),
+    "frame of odom": (
+        "odom",
+        changed("header.frame_id", "map"),
+        ERROR,
+        "refused: odom is in frame 'map', not 'odom'",
+    ),
+    "frame of sectors": (
+        "sectors",
+        changed("header.frame_id", "laser"),
+        ERROR,
+        "refused: sectors is in frame 'laser', not 'odom'",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_of_the_inputs_stops_the_robot_and_is_named(graph: Graph, fault: str) -> None:
+    where, tamper, level, text = FAULTS[fault]
+    wired = Wired(graph, FAR)
+    last_good_ns = wired.drive()
+    assert wired.told("inputs").level == OK
+    wired.tamper[where] = tamper
+    assert wired.rest_after(last_good_ns) <= SOON_S
+    graph.until(lambda: wired.told("inputs").message.startswith(text))
+    assert wired.told("inputs").level == level
+    assert wired.told("driving").level == ERROR
+    wired.tamper.clear()
+    graph.until(wired.is_moving)
+    graph.until(lambda: wired.told("inputs").level == OK)
+
+
+def test_a_silent_world_stops_the_commands_and_is_named(graph: Graph) -> None:
+    wired = Wired(graph, FAR)
+    wired.drive()
+    graph.call(SetBool, "world_sim/pause", SetBool.Request(data=True))
+    graph.settle()
+    since_s = time.monotonic()
+    graph.until(lambda: is_rest(wired.cmd_vel[-1]))
+    assert (time.monotonic() - since_s) * SPEED_FACTOR <= SOON_S
+    for name in ("odom", "sectors"):
+        text = f"{name} stale for"
+        graph.until(lambda text=text: text in wired.told("inputs").message)  # type: ignore[misc]
+    assert wired.told("inputs").level == STALE
+    ages = values(wired.told("inputs"))
+    assert float(ages["odom: age [s]"]) > TIMEOUT_S / SPEED_FACTOR
+    assert 0.0 < float(ages["odom: rate [Hz]"]) < 10.0
+
+
+def is_rest(twist: Any) -> bool:
+    return (twist.linear.x, twist.linear.y, twist.angular.z) == (0.0, 0.0, 0.0)
+
+
+def values(status: Any) -> dict[str, str]:
+    return {item.key: item.value for item in status.values}
+
+
+def test_before_anything_comes_it_says_what_it_waits_for(graph: Graph) -> None:
+    heard = graph.hear(topics.DIAGNOSTICS)
+    graph.start(PlannerNode, {"hardware_id": "rosie"})
+    graph.until(lambda: bool(heard))
+    inputs, driving = heard[0].status
+    assert (inputs.level, inputs.message) == (STALE, "no odom yet; no sectors yet")
+    assert (driving.level, driving.message) == (OK, "nothing decided yet")
+    assert {inputs.hardware_id, driving.hardware_id} == {"rosie"}
+    assert (inputs.name, driving.name) == ("planner: inputs", "planner: driving")
+
+
+def test_diagnostics_come_once_a_period_and_at_once_when_a_level_changes(graph: Graph) -> None:
+    wired = Wired(graph, FAR, diagnostics_period_s=3600.0)
+    wired.drive()
+    count = len(wired.diagnostics)
+    begun_ns = stamp_ns(wired.odom[-1].header.stamp)
+    graph.until(lambda: stamp_ns(wired.odom[-1].header.stamp) > begun_ns + 5 * 10**8)
+    assert len(wired.diagnostics) == count, "nothing has changed"
+    wired.tamper["sectors"] = lost
+    graph.until(lambda: wired.told("inputs").level == STALE)
+    assert len(wired.diagnostics) <= count + 3
+
+
+def test_when_every_gap_is_closed_it_rests_and_says_so(graph: Graph) -> None:
+    wired = Wired(graph, FAR)
+    since_ns = wired.drive()
+    wired.beams = [0.7] * 360
+    assert wired.rest_after(since_ns) <= SOON_S
+    graph.until(lambda: wired.told("driving").level == WARN)
+    assert wired.told("driving").message.endswith("set: every gap is closed")
+    assert values(wired.told("driving"))["mode"] == "blocked"
+
+
+def test_recovery_backs_off_and_gives_up_in_bounded_time(graph: Graph) -> None:
+    recovery = RecoveryParams(
+        enabled=True, wait_s=0.3, back_off_s=0.3, back_off_mps=0.1, attempts=2
+    )
+    told = {f"recovery.{name}": value for name, value in flatten(recovery).items()}
+    wired = Wired(graph, FAR, **told)
+    since_ns = wired.drive()
+    wired.beams = [0.7] * 180 + [0.9] * 180  # more room behind
+    graph.until(lambda: values(wired.told("driving"))["recovery"] == "given_up", timeout_s=30.0)
+    took_s = (stamp_ns(wired.odom[-1].header.stamp) - since_ns) * 1e-9
+    assert took_s < longest_s(recovery, 0.1) + SOON_S
+    assert wired.told("driving").level == ERROR
+    assert wired.told("driving").message == "gave up after 2 attempts; send a goal to go on"
+    phases = [values(m.status[1])["recovery"] for m in wired.diagnostics]
+    order = [name for name, _ in groupby(phases)]
+    expected = ["wait", "back_off", "replan"] * 2 + ["wait", "given_up"]
+    assert order[-len(expected) :] == expected
+    wired.rest_after(stamp_ns(wired.odom[-1].header.stamp))
+    backwards = {
+        d.status[0].message for d in wired.decisions if "backing off" in d.status[0].message
+    }
+    assert backwards == {"backing off, attempt 1 of 2", "backing off, attempt 2 of 2"}
+    # The way is free again: nothing happens until somebody sends a goal, be it the same.
+    wired.beams = [INF] * 360
+    goal = graph.writer(topics.GOAL_POSE)
+    assert not wired.is_moving()
+    goal.publish(pose_stamped_msg((50.0, 0.0), 1, "odom"))
+    graph.until(wired.is_moving)
+
+
+def test_a_planner_that_dies_leaves_a_robot_at_rest(graph: Graph) -> None:
+    """Killed: it cannot say anything any more. world_sim stops as a base controller would."""
+    wired = Wired(graph, FAR)
+    since_ns = wired.drive()
+    graph.executor.remove_node(wired.planner)
+    assert wired.rest_after(since_ns) <= SOON_S + 1e-9
+
+
+def test_a_planner_that_is_ended_commands_rest_last(graph: Graph) -> None:
+    wired = Wired(graph, FAR)
+    wired.drive()
+    graph.stop(wired.planner)
+    graph.settle()
+    assert is_rest(wired.cmd_vel[-1])
+
+
+def test_it_slows_down_where_it_is_narrow_if_asked_to(graph: Graph) -> None:
+    wired = Wired(graph, FAR, **{"caution.slow_within_m": 0.8, "caution.least_share": 0.1})
+    wired.drive()
+    fast = speed(wired.cmd_vel[-1])
+    wired.beams = [INF] * 170 + [0.7] * 20 + [INF] * 170  # 0.4 m behind, enlarged by 0.3 m
+    graph.until(lambda: 0.0 < speed(wired.cmd_vel[-1]) < 0.6 * fast)
+    assert wired.decisions[-1].status[0].message.endswith("50 % speed so near")
+
+
+def speed(twist: Any) -> float:
+    return math.hypot(twist.linear.x, twist.linear.y)

@@ -1,0 +1,505 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a run in a real browser: it plays, scrubs and shows what the run holds."""
+
+import json
+import math
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from browser import Browser
+from helpers import wait_until
+from launching import complete
+from selenium.webdriver.common.keys import Keys
+
+from mfba_planner.core.digest import digest
+from mfba_planner.core.episode import Episode, run
+from mfba_planner.core.errors import InputError, OutputError
+from mfba_planner.core.gaps import gap_heading
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.planner import Mode
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.report import words
+from mfba_planner.report.html.data import MOST_RUNS, clearances
+from mfba_planner.report.html.page import as_json, page, write_page
+from mfba_planner.report.table import result_rows
+from mfba_planner.scenarios import load_scenario
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    opened = Browser(tmp_path_factory.mktemp("profile"))
+    yield opened
+    opened.driver.quit()
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of a recorded run of case 2."""
+    where = tmp_path_factory.mktemp("recorded")
+    done = complete(
+        "mfba", "run", "case2", "--seed", "2", "--driver", "in-process", "--no-picture", cwd=where
+    )
+    assert (done.process.returncode, done.stderr) == (0, "")
+    return where / "runs/run-001"
+
+
+@pytest.fixture(scope="module")
+def episode(bag: Path) -> Episode:
+    return read_episode(bag / "bag")
+
+
+@pytest.fixture(scope="module")
+def single(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of that run, as a user makes it."""
+    path = tmp_path_factory.mktemp("page") / "page.html"
+    done = complete("mfba", "report", str(bag), "--out", str(path), cwd=path.parent)
+    assert (done.process.returncode, done.stdout, done.stderr) == (0, f"wrote {path}\n", "")
+    return path
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Episode]]:
+    """Two runs of unequal length, one of them in a world with walls."""
+    runs = [run(load_scenario("walled"), seed=1), run(load_scenario("case1"), seed=3)]
+    path = tmp_path_factory.mktemp("pair") / "page.html"
+    write_page([("walled run", runs[0]), ("other run", runs[1])], path)
+    return path, runs
+
+
+def field(browser: Browser, name: str, number: int = 1) -> str:
+    selector = f'.card[data-run="{number}"] [data-field="{name}"]'
+    return str(browser.run("return document.querySelector(arguments[0]).textContent", selector))
+
+
+def bits(browser: Browser, name: str, number: int = 1) -> str:
+    selector = f'.card[data-run="{number}"] [data-field="{name}"]'
+    return str(browser.run("return document.querySelector(arguments[0]).dataset.bits", selector))
+
+
+def tick(browser: Browser, number: int = 1) -> int:
+    return int(field(browser, "tick", number).split()[0])
+
+
+def scrub(browser: Browser, value: int) -> None:
+    browser.run(
+        "const slider = document.getElementById('time'); slider.value = arguments[0];"
+        "slider.dispatchEvent(new Event('input'))",
+        value,
+    )
+
+
+def press(browser: Browser, *keys: str) -> None:
+    browser.driver.switch_to.active_element.send_keys(*keys)
+
+
+def test_it_opens_fast_alone_and_without_a_word(browser: Browser, single: Path) -> None:
+    assert single.stat().st_size < 6_000_000
+    browser.open(single)
+    assert browser.said() == []
+    asked = {url for url in browser.requested() if not url.startswith("data:")}
+    assert asked - {"about:blank"} == {single.as_uri()}
+    ready_ms = browser.run("return performance.getEntriesByName('mfba-ready')[0].startTime")
+    assert ready_ms < 2000.0
+    assert browser.run("return document.title") == "case2"
+
+
+def test_nothing_in_it_leads_elsewhere(single: Path, bag: Path) -> None:
+    text = single.read_text(encoding="utf-8")
+    addresses = set(re.findall(r"https?://[^\s\"'<>)\\]*", text))
+    assert addresses <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
+    assert "default-src 'none'" in text
+    assert str(bag.parent) not in text
+    assert str(Path(__file__).parents[1]) not in text
+
+
+def test_every_tick_shows_what_the_bag_holds(
+    browser: Browser, single: Path, episode: Episode
+) -> None:
+    browser.open(single)
+    gaps = clearances(episode)
+    seen = set()
+    for k, decision in enumerate(episode.ticks):
+        scrub(browser, k)
+        seen.add(decision.mode)
+        assert field(browser, "tick") == f"{k} of {len(episode.ticks) - 1}"
+        assert field(browser, "mode") == words.MODES[decision.mode]
+        assert field(browser, "reason") == decision.reason
+        assert bits(browser, "vs") == "".join(map(str, decision.vs))
+        assert bits(browser, "vg") == "".join(map(str, decision.vg))
+        x, y = decision.pose.position
+        assert field(browser, "position") == f"({x:.3f}, {y:.3f}) m"
+        assert field(browser, "time") == f"{episode.time_s(decision.stamp_ns):.3f} s"
+        last = k == len(episode.ticks) - 1
+        assert field(browser, "clearance") == ("–" if last else f"{gaps[k]:.3f} m")
+    assert {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE, Mode.ARRIVED} <= seen
+    assert min(gaps) == evaluate(episode).min_clearance_m
+
+
+def test_the_world_is_drawn_as_the_tick_has_it(
+    browser: Browser, single: Path, episode: Episode
+) -> None:
+    browser.open(single)
+    k = next(i for i, t in enumerate(episode.ticks) if t.mode is Mode.OBSTACLE_AVOIDANCE)
+    scrub(browser, k)
+    decision = episode.ticks[k]
+    drawn = browser.run(
+        """
+        const one = (name) => document.querySelector(`.scene ${name}`);
+        const all = (name) => [...document.querySelectorAll(`.scene ${name}`)];
+        const place = (element) =>
+          element.getAttribute("transform").match(/-?[\\d.]+(e-\\d+)?/g).slice(0, 2).map(Number);
+        return {
+          robot: place(one(".robot")),
+          lit: all(".sector").map((s) => Number(s.classList.contains("lit"))),
+          closed: all(".gap").map((g) => Number(g.classList.contains("closed"))),
+          taken: one(".taken").getAttribute("d"),
+          rooms: all(".sector").map((sector, i, { length }) => {
+            const middle = (2 * Math.PI * (i + 0.5)) / length;
+            return sector.isPointInFill(
+              new DOMPoint(0.5 * Math.cos(middle), -0.5 * Math.sin(middle)));
+          }),
+          motions: all(".obstacle .motion").map((m) => m.getAttribute("d")),
+          obstacles: all(".obstacle").map(place),
+          radii: all(".obstacle .body").map((c) => Number(c.getAttribute("r"))),
+          enlarged: all(".obstacle .enlarged").map((c) => Number(c.getAttribute("r"))),
+          ring: Number(one(".ring").getAttribute("r")),
+          bats: all(".bats circle").length,
+        };
+        """
+    )
+    assert drawn["robot"] == pytest.approx([decision.pose.x, -decision.pose.y])
+    assert tuple(drawn["lit"]) == decision.vs
+    assert tuple(drawn["closed"]) == decision.vg
+    heading = gap_heading(decision.gap, len(decision.vg), episode.planner.gap_heading)
+    tip = [float(word) for word in drawn["taken"].removeprefix("M0 0L").split()]
+    reach = episode.sensor.sensing_range_m
+    assert tip == pytest.approx([reach * math.cos(heading), -reach * math.sin(heading)])
+    assert drawn["rooms"] == [True] * len(decision.vs)
+    for obstacle, arrow in zip(episode.scenario.obstacles, drawn["motions"], strict=True):
+        x0, y0, x1, y1 = map(float, arrow[1:].split("M")[0].replace("L", " ").split())
+        vx, vy = obstacle.velocity  # in case 2 nobody bounces or turns
+        assert [x1 - x0, y0 - y1] == pytest.approx([2.0 * vx, 2.0 * vy], abs=1e-3)
+    centers = episode.scenario.centers(episode.time_s(decision.stamp_ns))
+    assert drawn["obstacles"] == [pytest.approx([x, -y], abs=1e-3) for x, y in centers]
+    assert drawn["radii"] == [o.radius_m for o in episode.scenario.obstacles]
+    assert drawn["enlarged"] == pytest.approx(
+        [episode.scenario.enlarged_radius(o) for o in episode.scenario.obstacles]
+    )
+    assert drawn["ring"] == episode.sensor.sensing_range_m
+    assert drawn["bats"] == len(decision.candidates)
+
+
+def test_it_plays_and_pauses(browser: Browser, single: Path) -> None:
+    browser.open(single)
+    browser.run("document.getElementById('speed').value = '16'")
+    browser.run("document.getElementById('speed').dispatchEvent(new Event('change'))")
+    play = browser.driver.find_element("id", "play")
+    assert play.get_attribute("aria-label") == "Play"
+    play.click()
+    assert play.get_attribute("aria-label") == "Pause"
+    wait_until(lambda: tick(browser) > 3, 20.0)
+    play.click()
+    held = tick(browser)
+    browser.driver.execute_async_script(
+        "let left = 5; const done = arguments[0];"
+        "const turn = () => (left-- ? requestAnimationFrame(turn) : done()); turn()"
+    )
+    assert tick(browser) == held
+    play.click()
+    wait_until(lambda: play.get_attribute("aria-label") == "Play", 30.0)
+    assert field(browser, "tick").split()[0] == field(browser, "tick").split()[-1]
+    assert field(browser, "mode") == "arrived"
+
+
+PLACES = """
+const done = arguments[0];
+const places = [];
+const robot = document.querySelector(".scene .robot");
+const turn = () => {
+  places.push(robot.getAttribute("transform").slice(10, -1).split(" ").map(Number));
+  const isOver = document.getElementById("play").dataset.icon === "play";
+  if (isOver || places.length > 400) done(places); else requestAnimationFrame(turn);
+};
+document.getElementById("play").click();
+turn();
+"""
+
+
+@pytest.mark.parametrize("calm", [False, True], ids=["smooth", "calm"])
+def test_between_ticks_things_move_unless_unwanted(
+    browser: Browser, single: Path, episode: Episode, calm: bool
+) -> None:
+    browser.open(single, calm=calm)
+    scrub(browser, len(episode.ticks) - 4)
+    places = {(x, y) for x, y in browser.driver.execute_async_script(PLACES)}
+    at_ticks = {(t.pose.x, -t.pose.y) for t in episode.ticks}
+    assert (places <= at_ticks) == calm
+    assert len(places) >= 4
+
+
+def test_it_is_driven_by_keyboard(browser: Browser, single: Path, episode: Episode) -> None:
+    browser.open(single)
+    last = len(episode.ticks) - 1
+    press(browser, Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
+    assert tick(browser) == 2
+    press(browser, Keys.ARROW_LEFT)
+    assert tick(browser) == 1
+    press(browser, Keys.END)
+    assert tick(browser) == last
+    press(browser, Keys.ARROW_RIGHT)
+    assert tick(browser) == last
+    press(browser, Keys.HOME)
+    assert tick(browser) == 0
+    press(browser, "+", "+", "-", "+")
+    assert browser.run("return document.getElementById('speed').value") == "4"
+    press(browser, Keys.SPACE)
+    wait_until(lambda: tick(browser) > 1, 20.0)
+    press(browser, Keys.SPACE)
+    held = tick(browser)
+    press(browser, Keys.ARROW_RIGHT)
+    assert tick(browser) == held + 1
+    # with the slider focused the same keys do the same, once
+    browser.run("document.getElementById('time').focus()")
+    press(browser, Keys.ARROW_LEFT)
+    assert tick(browser) == held
+    heard = browser.run("return document.getElementById('time').getAttribute('aria-valuetext')")
+    assert heard.endswith(episode.ticks[held].reason)
+
+
+def test_every_control_has_a_name_and_can_be_focused(browser: Browser, single: Path) -> None:
+    browser.open(single)
+    browser.run("document.querySelector('details').open = true")
+    names = browser.run(
+        """
+        const all = "button, input, select, summary, [tabindex]";
+        return [...document.querySelectorAll(all)].map((e) => {
+          e.focus();
+          return document.activeElement === e && (e.getAttribute("aria-label") || e.textContent);
+        });
+        """
+    )
+    assert len(names) >= 10
+    assert all(names)
+
+
+def test_the_charts_show_where_the_clock_stands_and_move_it(
+    browser: Browser, single: Path, episode: Episode
+) -> None:
+    browser.open(single)
+    where = "return document.querySelector('#charts .cursor').getAttribute('d')"
+    at_start = browser.run(where)
+    press(browser, Keys.END)
+    assert browser.run(where) != at_start
+    browser.run(
+        """
+        const chart = document.getElementById("charts");
+        chart.scrollIntoView({ block: "center" });
+        const sheet = DATA_CHARTS();
+        function DATA_CHARTS() {
+          const all = JSON.parse(document.getElementById("data").textContent).charts;
+          return all.filter((sheet) => sheet.from_px <= chart.clientWidth).pop();
+        }
+        const box = chart.getBoundingClientRect();
+        const part = sheet.left + 0.5 * (sheet.right - sheet.left);
+        chart.dispatchEvent(new PointerEvent("pointerdown",
+          { clientX: box.left + part * box.width, clientY: box.top + 50, buttons: 1 }));
+        """
+    )
+    times = [episode.time_s(t.stamp_ns) for t in episode.ticks]
+    middle = 0.5 * (times[0] + times[-1])
+    assert tick(browser) == min(range(len(times)), key=lambda k: abs(times[k] - middle))
+
+
+def test_the_result_is_mfba_s_own(browser: Browser, single: Path, episode: Episode) -> None:
+    browser.open(single)
+    shown = browser.run(
+        """
+        return [...document.querySelectorAll('[aria-label="Result"] tr')].map((row) =>
+          [row.querySelector("th"), row.querySelector("td span"), row.querySelector("td small")]
+            .map((cell) => (cell ? cell.textContent : "")));
+        """
+    )
+    assert [tuple(row) for row in shown] == list(result_rows(episode, evaluate(episode)))
+    text = browser.run("return document.body.textContent")
+    assert digest(episode.ticks) in text
+    assert "planner.speed_mps" in text
+
+
+def luminance(colour: str) -> float:
+    """WCAG 2's relative luminance of a computed colour, 'rgb(r, g, b)'."""
+    channels = [int(number) / 255.0 for number in re.findall(r"\d+", colour)[:3]]
+    linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+TEXTS = """
+const behind = (element) => {
+  for (let e = element; e; e = e.parentElement) {
+    const colour = getComputedStyle(e).backgroundColor;
+    if (!/, 0\\)$/.test(colour) && colour !== "transparent") return colour;
+  }
+};
+const told = [];
+for (const element of document.querySelectorAll("body *")) {
+  const hasText = [...element.childNodes].some((n) => n.nodeType === 3 && n.data.trim());
+  if (!hasText || !element.getClientRects().length || element.closest(".unseen")) continue;
+  const style = getComputedStyle(element);
+  const isDrawn = element instanceof SVGElement;
+  told.push([element.textContent.trim().slice(0, 30), isDrawn ? style.fill : style.color,
+    behind(isDrawn ? element.closest("svg").parentElement : element)]);
+}
+return told;
+"""
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_every_text_has_contrast(browser: Browser, single: Path, dark: bool) -> None:
+    browser.open(single, dark=dark)
+    assert browser.run("return document.documentElement.dataset.theme") == (
+        "dark" if dark else "light"
+    )
+    browser.run("document.querySelector('details').open = true")
+    texts = browser.run(TEXTS)
+    assert len(texts) > 80
+    paper = {luminance(paper) < 0.2 for _, _, paper in texts if paper.startswith("rgb")}
+    assert dark in paper
+    for text, ink, behind in texts:
+        light, dim = sorted((luminance(ink), luminance(behind)), reverse=True)
+        assert (light + 0.05) / (dim + 0.05) >= 4.5, (text, ink, behind)
+
+
+def test_the_theme_can_be_switched(browser: Browser, single: Path) -> None:
+    browser.open(single)
+    paper = "return getComputedStyle(document.body).backgroundColor"
+    before = luminance(browser.run(paper))
+    browser.driver.find_element("id", "theme").click()
+    assert luminance(browser.run(paper)) < 0.1 < before
+
+
+@pytest.mark.parametrize("width", [320, 390, 768, 1400])
+def test_nothing_overflows_sideways(
+    browser: Browser, single: Path, pair: tuple[Path, list[Episode]], width: int
+) -> None:
+    for path in (single, pair[0]):
+        browser.open(path, width=width, height=844)
+        browser.run("document.querySelector('details').open = true")
+        assert browser.run("return document.documentElement.scrollWidth") <= width
+        small = browser.run(
+            """
+            return [...document.querySelectorAll("button, select")].filter((e) => {
+              const box = e.getBoundingClientRect();
+              return box.right > innerWidth || box.width < 24 || box.height < 24;
+            }).length;
+            """
+        )
+        assert small == 0
+
+
+def test_two_runs_stand_side_by_side_on_one_clock(
+    browser: Browser, pair: tuple[Path, list[Episode]]
+) -> None:
+    path, runs = pair
+    browser.open(path)
+    boxes = browser.run(
+        "return [...document.querySelectorAll('.card')].map((e) => e.getBoundingClientRect().top)"
+    )
+    assert len(boxes) == 2
+    assert boxes[0] == boxes[1]
+    for number in (1, 2):
+        assert tick(browser, number) == 0
+    lengths = [len(episode.ticks) for episode in runs]
+    assert lengths[0] != lengths[1]
+    scrub(browser, 10)
+    for number, episode in enumerate(runs, start=1):
+        decision = episode.ticks[10]
+        assert field(browser, "reason", number) == decision.reason
+    press(browser, Keys.END)
+    assert [tick(browser, number) for number in (1, 2)] == [n - 1 for n in lengths]
+    columns = browser.run(
+        """
+        return [...document.querySelectorAll('[aria-label="Result"] tbody tr')].map((row) =>
+          [...row.querySelectorAll("td span")].map((cell) => cell.textContent));
+        """
+    )
+    for column, episode in enumerate(runs):
+        rows = result_rows(episode, evaluate(episode))
+        assert [cells[column] for cells in columns] == [figure for _, figure, _ in rows]
+
+
+def test_names_are_text_and_never_markup(browser: Browser, tmp_path: Path) -> None:
+    hostile = "</script><script>document.title='owned'</script><img src=x onerror=alert(1)>$title"
+    scenario = replace(load_scenario("case1"), name=hostile, description=hostile)
+    episode = run(scenario, seed=1)
+    ticks = (replace(episode.ticks[0], reason=hostile), *episode.ticks[1:])
+    path = tmp_path / "hostile.html"
+    write_page([(hostile, replace(episode, ticks=ticks))], path)
+    browser.open(path)
+    assert browser.said() == []
+    assert browser.run("return document.title") == words.one_line(hostile, 80)
+    assert browser.run("return document.querySelectorAll('img').length") == 0
+    assert field(browser, "reason") == hostile
+    assert browser.run("return document.querySelector('.card .run').textContent") == hostile
+
+
+def test_a_policy_stands_where_another_script_comes_in(browser: Browser, single: Path) -> None:
+    browser.open(single)
+    browser.run(
+        "const s = document.createElement('script'); s.textContent = 'window.owned = 1';"
+        "document.head.append(s); fetch('file:///etc/hostname').catch(() => {})"
+    )
+    assert browser.run("return window.owned") is None
+    assert "Content Security Policy" in browser.said()[0]
+
+
+def test_json_cannot_end_its_element() -> None:
+    data = {"name": "</script><!--<script>&\u2028'\"\\"}
+    text = as_json(data)
+    assert not set("<>&") & set(text)
+    assert text.isascii()
+    assert json.loads(text) == data
+
+
+def test_the_same_runs_give_the_same_bytes(episode: Episode, single: Path, bag: Path) -> None:
+    assert page([(bag.name, episode)]) == single.read_text(encoding="utf-8")
+
+
+def test_a_run_of_one_tick_without_obstacles_has_a_page(browser: Browser, tmp_path: Path) -> None:
+    episode = run(load_scenario("empty"), go_on=lambda _: False)
+    path = tmp_path / "page.html"
+    write_page([("one", episode)], path)
+    browser.open(path)
+    assert browser.said() == []
+    assert field(browser, "tick") == "0 of 0"
+    assert field(browser, "clearance") == "–"
+
+
+def test_what_is_too_much_is_refused(episode: Episode, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"^{MOST_RUNS + 1} runs: too many.*; give"):
+        page([("run", episode)] * (MOST_RUNS + 1))
+    long = replace(episode, ticks=episode.ticks * 400)
+    with pytest.raises(InputError, match="ticks: too many for a page; give 20000 at most"):
+        page([("run", long)])
+    (tmp_path / "page.html").write_text("mine")
+    with pytest.raises(OutputError, match="already exists"):
+        write_page([("run", episode)], tmp_path / "page.html")
+
+
+def test_without_a_chromium_one_line_says_what_to_install(tmp_path: Path) -> None:
+    for name in ("bash", "env"):
+        (tmp_path / name).symlink_to(str(shutil.which(name)))
+    done = subprocess.run(
+        [Path(__file__).parents[1] / "tools/chromium.sh"],
+        env={"PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("no Chromium with chromedriver on PATH: ")
+    assert done.stderr.count("\n") == 1
