@@ -25,7 +25,8 @@ from mfba_planner.core.sensing import SensorParams
 from mfba_planner.core.world import Member, Scenario
 from mfba_planner.planners.orca import Orca
 from mfba_planner.planners.perception import Perception
-from mfba_planner.planners.predictive import Predictive, preset
+from mfba_planner.planners.prediction import RiskParams
+from mfba_planner.planners.predictive import Predictive, PredictiveParams, preset
 from mfba_planner.statistics import share_interval
 
 JITTER_DEG = 8.0  # of 36 between two robots
@@ -69,10 +70,16 @@ def _predictive(params: PlannerParams, sensor: SensorParams) -> MakeBrain:
     return lambda seed: Predictive(params, sensor, seed)
 
 
+def _wide(params: PlannerParams, sensor: SensorParams) -> MakeBrain:
+    return lambda seed: Predictive(params, sensor, seed, WIDE)
+
+
 def _orca(params: PlannerParams, sensor: SensorParams) -> MakeBrain:
     return lambda seed: Orca(params, sensor, seed)
 
 
+# Others do not keep their velocities here: pass them at 0.2 m rather than at 0.015 m.
+WIDE = PredictiveParams(risk=RiskParams(margin_m=0.2, close_m=3.0))
 FAR = SensorParams(sensing_range_m=3.0)
 LIDAR = Robot(lidar=Lidar(beams=360))
 
@@ -91,6 +98,7 @@ WAYS: dict[str, Way] = {
     "predictive, known within 3 m": Way(
         planner=preset(), sensor=FAR, make=_predictive, look=_known
     ),
+    "predictive, known, wide berth": Way(planner=preset(), make=_wide, look=_known),
     "predictive, lidar, tracked": Way(
         planner=replace(preset(), scan_radius_m=0.35),
         robot=LIDAR,

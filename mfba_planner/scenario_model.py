@@ -146,7 +146,7 @@ _MEANINGS = {
     "speed_mps": "how fast it moves, m/s",
     "heading_deg": "where it moves, degrees from +x, counter-clockwise",
     "heading_rad": "the same in radians, instead",
-    "robots": "several robots in one world instead; start_m and goal_m are the first one's then",
+    "robots": "several robots in one world; start_m and goal_m above are left out then",
     "turns": "moments from which on it moves otherwise, in order of time",
     "at_s": "when, in simulated time from the beginning, s",
     "robot": "its base, lidar and noise, where they are not those of the paper",
