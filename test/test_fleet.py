@@ -318,11 +318,11 @@ def test_a_result_for_each_robot_and_one_picture(driven: Path) -> None:
 
 
 def test_what_knows_one_robot_only_says_so(driven: Path) -> None:
-    with pytest.raises(BagError, match="holds 4 robots, which only"):
+    with pytest.raises(BagError, match="holds 4 robots, and a bag of one"):
         read_episode(driven / "bag")
-    for command in ("verify", "digest"):
+    for command in ("verify", "digest", "export"):
         with pytest.raises(BagError, match="holds 4 robots"):
-            cli.main([command, str(driven / "bag")])
+            cli.main([command, str(driven / "bag")] + ["x.csv"] * (command == "export"))
     for args, what in (
         (["--driver", "multi-process"], "give --driver in-process"),
         (["--real-time"], "give --driver in-process"),

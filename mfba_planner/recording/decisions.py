@@ -20,10 +20,24 @@ Answered = tuple[Decision, Any]
 
 
 def require_decisions(reader: BagReader, namespace: str = "") -> None:
-    """Raise BagError for a bag that holds none."""
+    """Raise BagError for a bag that holds none, or not in this namespace."""
+    if DECISION not in reader.topics and not namespace and _robots(reader):
+        raise of_a_fleet(reader)
     for topic in (namespace + SECTORS, namespace + DECISION):
         if topic not in reader.topics or not reader.topics[topic].message_count:
             raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
+
+
+def of_a_fleet(reader: BagReader) -> BagError:
+    """What is said by whoever reads one robot's decisions only."""
+    return BagError(
+        f"{reader.path}: holds {_robots(reader)} robots, and a bag of one is read here; take "
+        "their results, or mfba_planner.recording.fleet.read_fleet"
+    )
+
+
+def _robots(reader: BagReader) -> int:
+    return sum(name.endswith(DECISION) for name in reader.topics)
 
 
 def stream_decisions(reader: BagReader, namespace: str = "") -> Iterator[Answered]:

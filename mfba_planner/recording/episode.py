@@ -21,7 +21,7 @@ from mfba_planner.scenarios import load_scenario
 from ..core.errors import BagError, ConfigError, InputError
 from ..messages import robot_pose, stamp_ns
 from .configuration import read_configuration
-from .decisions import rising_decisions, stream_decisions
+from .decisions import of_a_fleet, rising_decisions, stream_decisions
 from .reader import BagReader
 
 T = TypeVar("T")
@@ -103,10 +103,7 @@ def read_setup(reader: BagReader, *, fleet: bool = False, robot: str = "") -> Se
         world = nodes["world_sim"]
         scenario = load_scenario(world["scenario_json"])
         if scenario.robots and not fleet:
-            raise BagError(
-                f"{reader.path}: holds {len(scenario.robots)} robots, which only `mfba run` and "
-                "mfba_planner.recording.fleet.read_fleet tell apart; give a bag of one"
-            )
+            raise of_a_fleet(reader)
         above = f"{robot or scenario.robots[0].name}/" if scenario.robots else ""
         planner, sensor = (nodes[above + name] for name in ("planner", "virtual_sensor"))
         return Setup(
