@@ -69,29 +69,44 @@ def _stream() -> tuple[Any, Any]:
 
 def _layout(rerun: Any, runs: Sequence[tuple[str, Episode]]) -> Any:
     view = rerun.blueprint
-    since_the_start = view.VisibleTimeRanges(
-        timeline="sim_time",
-        start=view.TimeRangeBoundary.infinite(),
-        end=view.TimeRangeBoundary.cursor_relative(),
-    )
-    return view.Blueprint(
-        view.Horizontal(
-            *(
-                view.Vertical(
-                    view.Spatial3DView(
-                        origin=f"{name}/world",
-                        name=name,
-                        overrides={f"{name}/world/trail": since_the_start},
-                    ),
-                    view.TextLogView(origin=f"{name}/decision", name="decisions"),
-                    view.TimeSeriesView(
-                        origin=f"{name}/curves", name="clearance (m), speed (m/s)"
-                    ),
-                    row_shares=[5, 1, 2],
-                )
-                for name, _ in runs
-            )
+    runs_in_columns = [
+        view.Vertical(
+            view.Spatial3DView(
+                origin=f"{name}/world",
+                name=name,
+                overrides={f"{name}/world/trail": _since_the_start(view)},
+                eye_controls=_from_above(view, episode),
+            ),
+            view.TextLogView(origin=f"{name}/decision", name="decisions"),
+            view.TimeSeriesView(origin=f"{name}/curves", name="clearance (m), speed (m/s)"),
+            row_shares=[6, 2, 2],
         )
+        for name, episode in runs
+    ]
+    return view.Blueprint(view.Horizontal(*runs_in_columns), view.TimePanel(timeline="sim_time"))
+
+
+def _since_the_start(view: Any) -> Any:
+    ranges = [
+        view.VisibleTimeRange(
+            timeline,
+            start=view.TimeRangeBoundary.infinite(),
+            end=view.TimeRangeBoundary.cursor_relative(),
+        )
+        for timeline in ("sim_time", "tick")
+    ]
+    return view.VisibleTimeRanges(ranges)
+
+
+def _from_above(view: Any, episode: Episode) -> Any:
+    """The whole way in sight, +y away from who looks on."""
+    corners = [episode.scenario.start_m, episode.scenario.goal_m]
+    corners += [tick.pose.position for tick in episode.ticks]
+    xs, ys = zip(*corners)
+    x, y = (min(xs) + max(xs)) / 2.0, (min(ys) + max(ys)) / 2.0
+    height_m = 1.2 * max(max(xs) - min(xs), max(ys) - min(ys)) + 2.0
+    return view.EyeControls3D(
+        position=(x, y - 0.3 * height_m, height_m), look_target=(x, y, 0.0), eye_up=(0.0, 0.0, 1.0)
     )
 
 
