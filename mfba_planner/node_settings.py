@@ -140,6 +140,7 @@ class RecorderSettings:
 
     output: str = option("", "bag directory to create; empty: a new one below ./runs")
     nodes: str = option("", "nodes whose parameters go into the bag, separated by commas")
+    namespaces: str = option("", "fleets: the robots' namespaces, separated by commas")
     sim_time: bool = option(False, "log times are /clock's (as rosbag2 --use-sim-time)")
     run: str = option("{}", "JSON of whatever else explains the run (driver, versions)")
     enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -12,6 +12,8 @@ import numpy as np
 
 from . import __version__
 from .core.errors import ConfigError
+from .core.fleet import seed_of, seen_by
+from .core.geometry import Pose2D
 from .core.options import Scalar, check, flatten, option
 from .core.planner import NANO, PlannerParams
 from .core.sensing import SensorParams
@@ -48,6 +50,11 @@ class RunConfig:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range, or a planner that would stop every tick."""
         check(self)
+        if self.scenario.robots and (self.real_time or self.driver is Driver.MULTI_PROCESS):
+            raise ConfigError(
+                f"scenario {self.scenario.name!r}: names {len(self.scenario.robots)} robots, "
+                "which run in lockstep in one process only; give --driver in-process"
+            )
         if self.planner.tracks_scan and not self.scenario.robot.lidar.beams:
             raise ConfigError(
                 f"planner.scan_radius_m={self.planner.scan_radius_m:g}: the robot has no lidar; "
@@ -108,3 +115,19 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
         | {"seed": config.seed, "scan_yaw": robot.lidar.yaw_rad}
         | ({} if lockstep else {"input_timeout_s": timeout_s}),
     }
+
+
+def fleet_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
+    """node_parameters() of a scenario that names robots: NAME/planner, NAME/virtual_sensor."""
+    scenario = config.scenario
+    wholes = {"world_sim": node_parameters(config, peers)["world_sim"]}
+    starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
+    for number, member in enumerate(scenario.robots):
+        one = replace(
+            config,
+            scenario=seen_by(scenario, number, starts, config.planner.tick_ns),
+            seed=seed_of(config.seed, number),
+        )
+        told = node_parameters(one, peers)
+        wholes |= {f"{member.name}/{name}": told[name] for name in ("virtual_sensor", "planner")}
+    return wholes

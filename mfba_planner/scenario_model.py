@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .core.errors import ConfigError
 from .core.options import did_you_mean
-from .core.world import Kidnapping, Obstacle, Scenario, Turn, Walls
+from .core.world import Kidnapping, Member, Obstacle, Scenario, Turn, Walls
 from .scenarios import EXAMPLE, LIMIT, robot_of
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
@@ -88,6 +88,15 @@ class _Kidnapping(_Strict):
         return Kidnapping(at_s=self.at_s, to_m=self.to_m)
 
 
+class _Member(_Strict):
+    name: str
+    start_m: _Point
+    goal_m: _Point
+
+    def build(self) -> Member:
+        return Member(name=self.name, start_m=self.start_m, goal_m=self.goal_m)
+
+
 class _Scenario(_Strict):
     name: _Name
     description: str = _default(Scenario, "description")
@@ -99,6 +108,7 @@ class _Scenario(_Strict):
     time_limit_s: _Positive = _default(Scenario, "time_limit_s")
     robot: dict[str, Any] = {}
     kidnappings: list[_Kidnapping] = []
+    robots: list[_Member] = []
 
     def build(self) -> Scenario:
         walls = self.walls
@@ -118,6 +128,7 @@ class _Scenario(_Strict):
             time_limit_s=self.time_limit_s,
             robot=robot_of(self.robot),
             kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
+            robots=tuple(member.build() for member in self.robots),
         )
 
 
@@ -135,6 +146,7 @@ _MEANINGS = {
     "speed_mps": "how fast it moves, m/s",
     "heading_deg": "where it moves, degrees from +x, counter-clockwise",
     "heading_rad": "the same in radians, instead",
+    "robots": "several robots in one world; start_m and goal_m above are left out then",
     "turns": "moments from which on it moves otherwise, in order of time",
     "at_s": "when, in simulated time from the beginning, s",
     "robot": "its base, lidar and noise, where they are not those of the paper",
@@ -157,9 +169,18 @@ def schema() -> dict[str, Any]:
 def checked(data: dict[Any, Any]) -> Scenario:
     """The scenario plain data describes. Raises ConfigError: place, value, reason, remedy."""
     try:
-        return _Scenario.model_validate(data).build()
+        return _Scenario.model_validate(_with_ends(data)).build()
     except ValidationError as error:
         raise ConfigError(_explain(error)) from None
+
+
+def _with_ends(data: dict[Any, Any]) -> dict[Any, Any]:
+    """A fleet's start and goal, where not given, are its first robot's."""
+    robots = data.get("robots")
+    if not (isinstance(robots, list) and robots and isinstance(robots[0], dict)):
+        return data
+    ends = {key: robots[0][key] for key in ("start_m", "goal_m") if key in robots[0]}
+    return ends | data
 
 
 class _Loader(yaml.SafeLoader):
@@ -239,6 +260,7 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
         "obstacles": _Obstacle,
         "turns": _Turn,
         "kidnappings": _Kidnapping,
+        "robots": _Member,
         "walls": _Walls,
     }
     within = [models[part] for part in location[:-1] if part in models]

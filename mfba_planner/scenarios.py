@@ -16,7 +16,7 @@ from .core.errors import ConfigError
 from .core.geometry import Point
 from .core.options import did_you_mean, override
 from .core.robot import Robot
-from .core.world import Kidnapping, Obstacle, Scenario, Turn, Walls
+from .core.world import Kidnapping, Member, Obstacle, Scenario, Turn, Walls
 from .resources import scenario_names, scenario_path
 
 EXAMPLE = "compare config/scenarios/case1.yaml"
@@ -87,6 +87,8 @@ def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
         del plain["robot"]
     if not scenario.kidnappings:
         del plain["kidnappings"]
+    if not scenario.robots:
+        del plain["robots"]
     for obstacle in plain["obstacles"]:
         if not obstacle["turns"]:
             del obstacle["turns"]
@@ -129,7 +131,7 @@ def _as_written(data: dict[str, Any]) -> Scenario:
         raise _UnusualError
     if not isinstance(description, str):
         raise _UnusualError
-    _require_keys(data, Scenario, "robot", "kidnappings")
+    _require_keys(data, Scenario, "robot", "kidnappings", "robots")
     robot = data.get("robot", {})
     if not isinstance(robot, dict):
         raise _UnusualError
@@ -144,6 +146,16 @@ def _as_written(data: dict[str, Any]) -> Scenario:
         time_limit_s=_positive(data["time_limit_s"]),
         robot=robot_of(robot),
         kidnappings=tuple(_kidnapping(entry) for entry in _list(data.get("kidnappings", []))),
+        robots=tuple(_member(entry) for entry in _list(data.get("robots", []))),
+    )
+
+
+def _member(data: Any) -> Member:
+    _require_keys(data, Member)
+    if not isinstance(data["name"], str):
+        raise _UnusualError
+    return Member(
+        name=data["name"], start_m=_point(data["start_m"]), goal_m=_point(data["goal_m"])
     )
 
 

@@ -168,12 +168,12 @@ def test_a_shipped_name_is_not_confused_with_what_lies_about(
         ("cas1", "'cas1': no such scenario; did you mean 'case1'? (or give a .yaml file)"),
         (
             "",
-            "'': no such scenario; known: case1, case2, empty, kidnapped, walled "
+            "'': no such scenario; known: case1, case2, empty, kidnapped, swap, walled "
             "(or give a .yaml file)",
         ),
         (
             ".",
-            "'.': no such scenario; known: case1, case2, empty, kidnapped, walled "
+            "'.': no such scenario; known: case1, case2, empty, kidnapped, swap, walled "
             "(or give a .yaml file)",
         ),
         ("nope.yaml", "nope.yaml: No such file or directory; give a readable scenario .yaml"),
@@ -258,7 +258,8 @@ def test_not_yaml(text: str, problem: str) -> None:
     [
         (TASK + "goal: 3", "goal: unknown key; did you mean 'goal_m'?"),
         (TASK + "zzzz: 3", "zzzz: unknown key; known: description, goal_m, kidnappings, "
-                           "name, obstacles, robot, robot_radius_m, start_m, time_limit_s, walls"),
+                           "name, obstacles, robot, robot_radius_m, robots, start_m, "
+                           "time_limit_s, walls"),
         # the misspelt key is named, not the one that it leaves out
         ("name: x\nstart_m: [0, 0]\ngaol_m: [1, 1]",
          "gaol_m: unknown key; did you mean 'goal_m'?"),

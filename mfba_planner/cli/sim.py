@@ -34,6 +34,10 @@ def main(args: list[str]) -> int:
     found = parser.parse(args)
     _check(found)
     config = read_config(found, driver=Driver.CORE)
+    if config.scenario.robots:
+        from . import fleet
+
+        return fleet.simulate(config, found.seeds, found.out)
     if found.out is not None:
         from ..launcher.run import run as launch
 

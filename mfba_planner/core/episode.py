@@ -27,7 +27,7 @@ from .planner import (
     observe,
 )
 from .sensing import Ranges, SensorParams, aligned, blind, sense_circles, sense_scan
-from .world import Scenario
+from .world import Scenario, velocity_at
 
 DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
 
@@ -81,7 +81,15 @@ class World:
     def __init__(
         self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float, seed: int = 0
     ) -> None:
-        """Put the robot at the start, at tick 0; the seed is its instruments'."""
+        """Put the robot at the start, at tick 0; the seed is its instruments'.
+
+        Raises ConfigError for a scenario of several robots.
+        """
+        if scenario.robots:
+            raise ConfigError(
+                f"scenario {scenario.name!r}: names {len(scenario.robots)} robots, which share a "
+                "world; use core.fleet"
+            )
         self.scenario = scenario
         self.tick_ns = tick_ns
         self.goal_tolerance_m = goal_tolerance_m
@@ -98,6 +106,23 @@ class World:
         In the scenario's order; nobody who is within reach is missing.
         """
         return self._nearby.at(self.tick, position or self.pose.position, reach_m)
+
+    def centers(self) -> list[Point]:
+        """Centres of all that is around, now: the scenario's obstacles in its order."""
+        return self.scenario.centers(self.time_s)
+
+    @property
+    def left_m(self) -> float:
+        """How far the goal is."""
+        return distance(self.pose.position, self.scenario.goal_m)
+
+    def radius_m(self, index: int) -> float:
+        """Radius of whoever near() calls by that index, not enlarged."""
+        return self.scenario.obstacles[index].radius_m
+
+    def velocity(self, index: int) -> Point:
+        """(vx, vy) in m/s, now, of whoever near() calls by that index."""
+        return velocity_at(self.scenario.obstacles[index], self.time_s, self.scenario.walls)
 
     @property
     def stamp_ns(self) -> int:
@@ -144,9 +169,8 @@ class World:
         if self._read is None or self._read[0] != self.tick:
             surfaces: list[tuple[float, float, float]] = []
             if robot.lidar.beams:
-                obstacles = self.scenario.obstacles
                 surfaces = [
-                    (*center, obstacles[index].radius_m)
+                    (*center, self.radius_m(index))
                     for index, (center, _) in zip(*self.near(robot.lidar.range_max_m))
                 ]
             self._read = self.tick, self._instruments.read(self.stamp_ns, self.pose, surfaces)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -74,20 +75,23 @@ class Motion:
             contact = self._contact(square, along, distance[:-1], np.diff(times_s)[:, None])
         # A pose that is not finite was refused; it has no gap.
         gap = np.where(np.isnan(nearest), np.inf, nearest) - self.radius_m
-        for k, i in np.argwhere(self._may_kink(unfolded, rows)).tolist():
+        for k, i in np.argwhere(self._may_kink(unfolded, rows, times_s)).tolist():
             (x0, x1), (y0, y1) = positions_m[:, k : k + 2].tolist()
             t0, t1 = times_s[k : k + 2].tolist()
             obstacle = self._scenario.obstacles[i]
             gap[k, i] = clearance(self._scenario, obstacle, t0, t1, (x0, y0), (x1, y1))
         return Steps(gap, contact, distance)
 
-    def _rows(self, times_s: Array) -> Array:
-        """The stretch that each obstacle is in at each time, (K, N) or (1, N) row numbers."""
+    def _rows(self, times_s: Array, side: Literal["left", "right"] = "right") -> Array:
+        """The stretch that each obstacle is in at each time, (K, N) or (1, N) row numbers.
+
+        A turn's own moment belongs to what follows, on the left side to what was before.
+        """
         if not self._turning:
             return self._first[None, :]
         rows = np.repeat(self._first[None, :], len(times_s), axis=0)
         for i, since_s in self._turning:
-            rows[:, i] += np.searchsorted(since_s, times_s, side="right")
+            rows[:, i] += np.searchsorted(since_s, times_s, side=side)
         return rows
 
     def _unfolded(self, times_s: Array, rows: Array) -> Array:
@@ -108,11 +112,13 @@ class Motion:
         folded = np.where(length <= 0.0, low, folded)
         return np.where((low <= x) & (x <= high), x, folded)
 
-    def _may_kink(self, unfolded: Array, rows: Array) -> Array:
+    def _may_kink(self, unfolded: Array, rows: Array, times_s: Array) -> Array:
         """Who may meet a wall or turn between two successive times, (K, N)."""
         kinks = np.zeros((unfolded.shape[1] - 1, unfolded.shape[2]), dtype=bool)
         if len(rows) > 1:
-            kinks |= rows[:-1] != rows[1:]
+            # Without walls a turn at the end of a step is none within it.
+            ends = rows if self._box is not None else self._rows(times_s, "left")
+            kinks |= rows[:-1] != ends[1:]
         if self._box is not None:
             low, high = self._box
             with np.errstate(divide="ignore", invalid="ignore"):

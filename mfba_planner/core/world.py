@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 import math
+import re
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import pairwise
+from itertools import combinations, pairwise
+from operator import attrgetter
 
 from .errors import ConfigError
 from .geometry import Point, closest_approach, distance
@@ -66,8 +69,32 @@ class Kidnapping:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Member:
+    """One robot of a fleet: its name, which is its ROS namespace, its start and its goal (m)."""
+
+    name: str
+    start_m: Point
+    goal_m: Point
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a name that cannot be a namespace, or nothing to do."""
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", self.name):
+            raise ConfigError(
+                f"robot {self.name!r}: not a ROS namespace; give letters, digits and single _, "
+                "a letter first"
+            )
+        if self.start_m == self.goal_m:
+            raise ConfigError(
+                f"robot {self.name} goal_m={list(self.goal_m)}: equal to start_m; move one of them"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """A task: start, goal, robot, obstacles, walls and a limit of simulated time."""
+    """A task: start, goal, robot, obstacles, walls and a limit of simulated time.
+
+    robots makes it the task of a fleet (core.fleet); start_m and goal_m are its first robot's.
+    """
 
     name: str
     start_m: Point
@@ -79,6 +106,7 @@ class Scenario:
     description: str = ""
     robot: Robot = Robot()
     kidnappings: tuple[Kidnapping, ...] = ()
+    robots: tuple[Member, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a task that makes no sense from the first moment."""
@@ -95,6 +123,8 @@ class Scenario:
                 _check_inside(number, obstacle, self.walls)
             _check_turns(number, obstacle)
         _check_kidnappings(self)
+        if self.robots:
+            _check_fleet(self)
 
     def enlarged_radius(self, obstacle: Obstacle) -> float:
         """Obstacle radius plus robot radius (Fig. 4), metres."""
@@ -148,6 +178,27 @@ def _check_kidnappings(scenario: Scenario) -> None:
                 )
 
 
+def _check_fleet(scenario: Scenario) -> None:
+    first, wide = scenario.robots[0], 2.0 * scenario.robot_radius_m
+    if (scenario.start_m, scenario.goal_m) != (first.start_m, first.goal_m):
+        raise ConfigError("robots: start_m and goal_m say something else; leave those two out")
+    for what in ("walls", "kidnappings"):
+        if getattr(scenario, what):
+            raise ConfigError(f"robots: together with {what} not supported; leave one of them out")
+    for one, other in combinations(scenario.robots, 2):
+        if one.name == other.name:
+            raise ConfigError(f"robot {one.name}: named twice; give each a name of its own")
+        for what in ("start_m", "goal_m"):
+            gap = distance(getattr(one, what), getattr(other, what)) - wide
+            if gap < 0.0:
+                raise ConfigError(
+                    f"robots {one.name} and {other.name} {what}: {-gap:.3g} m into each other "
+                    "(radii added); move them apart"
+                )
+    for member in scenario.robots:  # each as the only one
+        replace(scenario, start_m=member.start_m, goal_m=member.goal_m, robots=())
+
+
 @lru_cache(maxsize=4096)
 def stretches_of(obstacle: Obstacle, walls: Walls | None) -> tuple[tuple[float, Obstacle], ...]:
     """The motion cut at its turns: since when (s), and an obstacle that starts there then."""
@@ -167,7 +218,7 @@ def stretches_of(obstacle: Obstacle, walls: Walls | None) -> tuple[tuple[float, 
 
 def _stretch(obstacle: Obstacle, t_s: float, walls: Walls | None) -> tuple[float, Obstacle]:
     """The stretch under way at time t; a turn's own moment belongs to what follows."""
-    number = sum(turn.at_s <= t_s for turn in obstacle.turns)
+    number = bisect_right(obstacle.turns, t_s, key=attrgetter("at_s"))
     return stretches_of(obstacle, walls)[number]
 
 
@@ -249,11 +300,14 @@ def bounce_times(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | No
 
 def _kinks(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:
     stretches = stretches_of(obstacle, walls)
-    times = {since_s for since_s, _ in stretches[1:] if t0_s < since_s < t1_s}
-    ends = [*(since_s for since_s, _ in stretches[1:]), math.inf]
-    starts = [-math.inf, *ends[:-1]]  # before t = 0 the first stretch goes on backwards
-    for start_s, end_s, (since_s, plain) in zip(starts, ends, stretches):
-        a, b = max(t0_s, start_s), min(t1_s, end_s)
+    begins = [turn.at_s for turn in obstacle.turns]
+    first, last = bisect_right(begins, t0_s), bisect_left(begins, t1_s)
+    times = set(begins[first:last])
+    # before t = 0 the first stretch goes on backwards
+    for number in range(first, last + 1):
+        since_s, plain = stretches[number]
+        a = max(t0_s, since_s) if number else t0_s
+        b = min(t1_s, begins[number]) if number < len(begins) else t1_s
         if a < b:
             bounces = bounce_times(plain, a - since_s, b - since_s, walls)
             times.update(t for t in (since_s + t for t in bounces) if t0_s < t < t1_s)

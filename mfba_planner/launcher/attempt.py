@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 
 from ..core.episode import World
-from ..core.geometry import distance
+from ..core.fleet import Fleet
 from .directory import RunDirectory
 from .options import Order
 from .screen import Screen
@@ -45,7 +45,7 @@ class Attempt:
         if self._began_at is not None:
             self.wall_s = time.monotonic() - self._began_at
 
-    def go_on(self, world: World) -> bool:
+    def go_on(self, world: World | Fleet) -> bool:
         """For drivers that let the world be seen: show it, and say whether to go on."""
         self.begin()
         try:
@@ -54,7 +54,7 @@ class Attempt:
             self.stopped = stopped
             return False
         if self.screen.wants_progress():
-            self.show(world.tick, distance(world.pose.position, world.scenario.goal_m))
+            self.show(world.tick, world.left_m)
         return True
 
     def show(self, tick: int, distance_m: float, mode: str = "") -> None:

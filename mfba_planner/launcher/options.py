@@ -60,8 +60,8 @@ def read_order(args: list[str], prog: str) -> Order:
     driver.add_argument(
         "--driver",
         choices=[member.value for member in Driver],
-        default=Driver.MULTI_PROCESS.value,
-        help="who turns the loop; the decisions are the same (default: %(default)s)",
+        help="who turns the loop; the decisions are the same (default: multi-process, of "
+        "several robots in-process)",
     )
     driver.add_argument(
         "--real-time", action="store_true", help="tick on a wall timer instead of in lockstep"
@@ -221,12 +221,17 @@ def _below(group: str, changes: dict[str, Any]) -> dict[str, Any]:
 
 
 def _order(found: argparse.Namespace) -> Order:
-    driver = Driver(found.driver)
+    driver = Driver(found.driver or _usual_driver(found.scenario))
     real_time = found.real_time or found.speed is not None
     if real_time and driver is Driver.CORE:
         raise ConfigError("--real-time: the core driver has no clock; choose another --driver")
     speed = {} if found.speed is None else {"speed_factor": found.speed}
     config = read_config(found, driver=driver, real_time=real_time, **speed)
+    if config.scenario.robots and driver is Driver.CORE:
+        raise ConfigError(
+            f"--driver core: of {len(config.scenario.robots)} robots it leaves no directory; "
+            "use `mfba sim`, or --driver in-process"
+        )
     node_args = {
         node: _split(f"--{node.replace('_', '-')}-args", getattr(found, f"{node}_args"))
         for node in (*NODES, RECORDER)
@@ -249,6 +254,11 @@ def _order(found: argparse.Namespace) -> Order:
         picture=not found.no_picture,
         node_args=node_args,
     )
+
+
+def _usual_driver(scenario: str) -> Driver:
+    """Every robot has two nodes: a fleet would need twice as many processes as robots."""
+    return Driver.IN_PROCESS if load_scenario(scenario).robots else Driver.MULTI_PROCESS
 
 
 def _split(option: str, texts: list[str]) -> list[str]:

@@ -13,6 +13,7 @@ from ..run_config import Driver
 from .attempt import Attempt
 from .conclusion import conclude
 from .directory import RunDirectory
+from .fleet import conclude_fleet
 from .options import Order
 from .screen import Screen
 from .stop import StoppedError, StopRequest
@@ -36,18 +37,26 @@ def run(order: Order) -> int:
         finally:
             if not attempt.has_begun:
                 attempt.directory.discard()
+    fleet = bool(order.config.scenario.robots)
     if failure is None:
-        conclusion = conclude(attempt, episode)
-        if order.view:
-            from ..report.viewer import show
-
-            show([(conclusion.directory.name, conclusion.episode)])
-        conclusion.judge()
+        (conclude_fleet if fleet else _conclude)(attempt, episode)
         return 0
     if attempt.has_begun:
         with suppress(BagError):  # nothing to tell of; the failure is told below
-            conclude(attempt, episode, str(failure))
+            if fleet:
+                conclude_fleet(attempt, failure=str(failure))
+            else:
+                conclude(attempt, episode, str(failure))
     return _fail(failure, attempt)
+
+
+def _conclude(attempt: Attempt, episode: Episode | None) -> None:
+    conclusion = conclude(attempt, episode)
+    if attempt.order.view:
+        from ..report.viewer import show
+
+        show([(conclusion.directory.name, conclusion.episode)])
+    conclusion.judge()
 
 
 def _drive(attempt: Attempt) -> Episode | None:

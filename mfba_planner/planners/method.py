@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..core.episode import Episode, World, look, look_at_scan, run
+from ..core.fleet import Fleet, run_fleet
 from ..core.guarded import Guarded
 from ..core.planner import Method, Planner, PlannerParams
 from ..core.sensing import SensorParams
@@ -36,5 +37,25 @@ def simulate(
         seed=seed,
         go_on=go_on,
         brain=brain(planner, sensor, seed),
+        look=look_at_scan if planner.tracks_scan else look,
+    )
+
+
+def simulate_fleet(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams,
+    sensor: SensorParams,
+    seed: int,
+    go_on: Callable[[Fleet], bool] = lambda _: True,
+) -> tuple[Episode, ...]:
+    """core.fleet.run_fleet with a planner of planner.method for every robot."""
+    return run_fleet(
+        scenario,
+        planner=planner,
+        sensor=sensor,
+        seed=seed,
+        go_on=go_on,
+        brain=lambda child: brain(planner, sensor, child),
         look=look_at_scan if planner.tracks_scan else look,
     )

@@ -16,7 +16,6 @@ from ..core.lidar import cast_rays
 from ..core.options import did_you_mean
 from ..core.planner import Circle, Observation
 from ..core.sensing import Ranges, Scan, SensorParams, sense_scan
-from ..core.world import velocity_at
 
 SENSOR_STREAM = 2  # spawn key of the noise's SeedSequence child; the planner's is 1
 BEAMS = {"scan-12": 12, "scan-360": 360}
@@ -100,13 +99,12 @@ class Perception:
         return None, None
 
     def _circles(self, world: World, sensor: SensorParams) -> tuple[Circle, ...]:
-        scenario, t_s = world.scenario, world.time_s
         reach, (px, py) = sensor.sensing_range_m, world.pose.position
         circles = []
         for index, (center, radius) in zip(*world.near(reach)):
             dx, dy = center[0] - px, center[1] - py
             if math.sqrt(dx * dx + dy * dy) <= radius + reach:
-                velocity = velocity_at(scenario.obstacles[index], t_s, scenario.walls)
+                velocity = world.velocity(index)
                 circles.append(Circle(center_m=center, radius_m=radius, velocity_mps=velocity))
         if not self.noise_m or not circles:
             return tuple(circles)
@@ -117,11 +115,10 @@ class Perception:
         )
 
     def _scan(self, world: World, sensor: SensorParams) -> Scan:
-        scenario = world.scenario
-        longest = sensor.sensing_range_m + scenario.robot_radius_m
+        longest = sensor.sensing_range_m + world.scenario.robot_radius_m
         near = []
         for index, (center, _) in zip(*world.near(sensor.sensing_range_m)):
-            radius = scenario.obstacles[index].radius_m
+            radius = world.radius_m(index)
             if distance(world.pose.position, center) <= longest + radius:
                 near.append((*center, radius))
         ranges = cast_rays(world.pose.position, near, self._beams, longest)

@@ -19,22 +19,41 @@ REMEMBERED = 10_000  # of sectors without a decision, of decisions without secto
 Answered = tuple[Decision, Any]
 
 
-def require_decisions(reader: BagReader) -> None:
-    """Raise BagError for a bag that holds none."""
-    for topic in (SECTORS, DECISION):
+def require_decisions(reader: BagReader, namespace: str = "") -> None:
+    """Raise BagError for a bag that holds none, or not in this namespace."""
+    if DECISION not in reader.topics and not namespace and _robots(reader):
+        raise of_a_fleet(reader)
+    for topic in (namespace + SECTORS, namespace + DECISION):
         if topic not in reader.topics or not reader.topics[topic].message_count:
             raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
 
 
-def stream_decisions(reader: BagReader) -> Iterator[Answered]:
+def of_a_fleet(reader: BagReader) -> BagError:
+    """What is said by whoever reads one robot's decisions only."""
+    return BagError(
+        f"{reader.path}: holds {_robots(reader)} robots, and a bag of one is read here; take "
+        "their results, or mfba_planner.recording.fleet.read_fleet"
+    )
+
+
+def _robots(reader: BagReader) -> int:
+    return sum(name.endswith(DECISION) for name in reader.topics)
+
+
+def stream_decisions(reader: BagReader, namespace: str = "") -> Iterator[Answered]:
     """Yield (decision, its sectors message) in the order of the bag, one for each stamp.
+
+    namespace is a fleet's robot's, "/NAME".
 
     The first counts: a later one on its stamp only says that its inputs have become stale.
     Raises BagError for a bag without decisions, for one that is garbled, and where the sectors
     of a decision are missing.
     """
-    require_decisions(reader)
-    waiting: dict[str, OrderedDict[int, Any]] = {SECTORS: OrderedDict(), DECISION: OrderedDict()}
+    require_decisions(reader, namespace)
+    waiting: dict[str, OrderedDict[int, Any]] = {
+        namespace + SECTORS: OrderedDict(),
+        namespace + DECISION: OrderedDict(),
+    }
     sectors, decisions = waiting.values()
     answered: OrderedDict[int, None] = OrderedDict()
     for message in reader.decoded(waiting):

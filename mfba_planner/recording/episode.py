@@ -21,7 +21,7 @@ from mfba_planner.scenarios import load_scenario
 from ..core.errors import BagError, ConfigError, InputError
 from ..messages import robot_pose, stamp_ns
 from .configuration import read_configuration
-from .decisions import rising_decisions, stream_decisions
+from .decisions import of_a_fleet, rising_decisions, stream_decisions
 from .reader import BagReader
 
 T = TypeVar("T")
@@ -43,7 +43,7 @@ def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
         ticks: dict[int, Decision] = {}
         for found, _ in stream_decisions(reader):
             ticks.setdefault(found.stamp_ns, found)
-        truth = _truth(reader)
+        truth = read_truth(reader)
     decisions = tuple(ticks[stamp] for stamp in sorted(ticks))
     return setup.episode(decisions, truth)
 
@@ -54,7 +54,7 @@ def summarize(path: str | Path, *, salvage: bool = False) -> tuple[Episode, Resu
     Streams; raises as read_episode does, and where the stamp of a decision goes back.
     """
     with BagReader(path, salvage=salvage) as reader:
-        setup, truth = read_setup(reader), _truth(reader)
+        setup, truth = read_setup(reader), read_truth(reader)
         stream = (found for found, _ in rising_decisions(reader))
         first = next(stream)  # or it raises
         tally, hashed = Tally(setup.episode((first,))), Digest()
@@ -92,16 +92,22 @@ class Setup(NamedTuple):
         )
 
 
-def read_setup(reader: BagReader) -> Setup:
-    """The configuration a bag carries, checked. Raises BagError."""
+def read_setup(reader: BagReader, *, fleet: bool = False, robot: str = "") -> Setup:
+    """The configuration a bag carries, checked; of a fleet's bag, that of a robot (the first).
+
+    Raises BagError, also where several robots were recorded and not asked for.
+    """
     configuration = read_configuration(reader)
     nodes = configuration.get("nodes", {})
     try:
-        world, planner, sensor = (
-            nodes[name] for name in ("world_sim", "planner", "virtual_sensor")
-        )
+        world = nodes["world_sim"]
+        scenario = load_scenario(world["scenario_json"])
+        if scenario.robots and not fleet:
+            raise of_a_fleet(reader)
+        above = f"{robot or scenario.robots[0].name}/" if scenario.robots else ""
+        planner, sensor = (nodes[above + name] for name in ("planner", "virtual_sensor"))
         return Setup(
-            scenario=load_scenario(world["scenario_json"]),
+            scenario=scenario,
             sensor=_only(SensorParams(), sensor),
             planner=_only(PlannerParams(), planner),
             seed=planner["seed"],
@@ -123,15 +129,16 @@ def _only(defaults: T, values: dict[str, Any]) -> T:
     return override(defaults, {name: values[name] for name in told})
 
 
-def _truth(reader: BagReader) -> dict[int, Pose2D]:
+def read_truth(reader: BagReader, namespace: str = "") -> dict[int, Pose2D]:
     """Where the robot really was, by stamp, in a bag that says so."""
-    if TRUTH not in reader.topics:
+    topic = namespace + TRUTH
+    if topic not in reader.topics:
         return {}
-    said = (message.message for message in reader.decoded([TRUTH]))
+    said = (message.message for message in reader.decoded([topic]))
     try:
         return {stamp_ns(odom.header.stamp): robot_pose(odom) for odom in said}
     except InputError as error:
-        raise BagError(f"{reader.path}: {TRUTH}: {error}") from None
+        raise BagError(f"{reader.path}: {topic}: {error}") from None
 
 
 def _outcome(scenario: Scenario, params: PlannerParams, last_ns: int, last: Pose2D) -> Outcome:

@@ -75,10 +75,10 @@ def choose_view(episode: Episode, passes: Sequence[Pass]) -> tuple[View, float]:
     circles = [(center, radius) for center, radius in circles if radius <= near]
     view = _holding(trip, [c for c in circles if trip.holds(c[0], near)])
     margin = max(scenario.robot_radius_m, _MARGIN * max(view.width, view.height))
-    view, _ = _fitted(view.grown(margin, margin))
+    view, _ = fitted(view.grown(margin, margin))
     # filling the sheet may have brought in a part of something: then show all of it
     cut = [(c, 1.1 * r) for c, r in circles if view.holds(c, r)]
-    return _fitted(_holding(view, cut))
+    return fitted(_holding(view, cut))
 
 
 def _holding(view: View, circles: Sequence[tuple[Point, float]]) -> View:
@@ -87,7 +87,7 @@ def _holding(view: View, circles: Sequence[tuple[Point, float]]) -> View:
     return view
 
 
-def _fitted(view: View) -> tuple[View, float]:
+def fitted(view: View) -> tuple[View, float]:
     """The view, grown where it is too slim to read, and its scale in inches per metre."""
     scale = min(_WIDEST / view.width, _HIGHEST / view.height)
     dx, dy = _SLIMMEST / scale - view.width, _LOWEST / scale - view.height

@@ -16,6 +16,7 @@ from . import topics
 from .answers import Answers
 from .deadman import Deadman
 from .letterboxes import Letter, Letterboxes
+from .namespaced import Namespaced
 from .runtime import GraphNode
 from .serialized import header_stamp_ns
 
@@ -25,7 +26,7 @@ class AnswerTopics:
 
     def __init__(
         self,
-        node: GraphNode,
+        node: GraphNode | Namespaced,
         settings: WorldSimSettings,
         on_twist: Callable[[Any], None],
         on_heard: Callable[[], None],

@@ -13,19 +13,26 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
-from ..core.episode import World
 from ..core.errors import GraphError
-from ..run_config import NODES, RunConfig, node_parameters, run_facts
+from ..run_config import NODES, RunConfig, fleet_parameters, node_parameters, run_facts
 from . import params, topics
+from .fleet_sim import FleetSim
 from .planner import PlannerNode
 from .recorder import Recorder
 from .runtime import GraphNode, make_executor
 from .virtual_sensor import VirtualSensor
 from .world_sim import WorldSim
 
+KINDS: dict[str, Callable[..., GraphNode]] = {
+    topics.RECORDER: Recorder,
+    topics.WORLD_SIM: WorldSim,
+    topics.VIRTUAL_SENSOR: VirtualSensor,
+    topics.PLANNER: PlannerNode,
+}
+
 # Nobody is there to call them, and the executor waits for each service at every turn.
 _UNATTENDED = {"start_type_description_service": False}
-READY_TIMEOUT_S = 10.0
+READY_TIMEOUT_S = 10.0  # and a second more for every robot
 DRAIN_TURNS = 500  # delivery within a process is synchronous: enough for what is queued
 
 
@@ -35,13 +42,13 @@ def run_in_process(
     *,
     domain_id: int,
     timeout_s: float = 600.0,
-    on_turn: Callable[[World], bool] = lambda _: True,
+    on_turn: Callable[[Any], bool] = lambda _: True,
 ) -> float:
     """Run the graph until goal or time limit; return the seconds the loop took.
 
-    bag names the directory to record into, None for no recording. on_turn sees the world
-    after every turn of the executor and ends the run by returning False. Raises GraphError
-    when the graph does not get ready or does not finish in time.
+    bag names the directory to record into, None for no recording. on_turn sees the World, of
+    several robots the Fleet, after every turn of the executor and ends the run by returning
+    False. Raises GraphError when the graph does not get ready or does not finish in time.
     """
     context = Context()
     context.init(domain_id=domain_id)
@@ -49,37 +56,37 @@ def run_in_process(
         stack.callback(context.destroy)
         stack.callback(context.try_shutdown)
         peers = (*NODES, topics.RECORDER) if bag else NODES
-        told = node_parameters(config, peers)
-        kinds: dict[str, Callable[..., GraphNode]] = {
-            topics.WORLD_SIM: WorldSim,
-            topics.VIRTUAL_SENSOR: VirtualSensor,
-            topics.PLANNER: PlannerNode,
-        }
+        robots = config.scenario.robots
+        told = (fleet_parameters if robots else node_parameters)(config, peers)
+        wanted = list(told)
         if bag:
-            kinds = {topics.RECORDER: Recorder, **kinds}
-            told[topics.RECORDER] = {
-                "output": str(bag),
-                "sim_time": True,
-                "run": json.dumps(run_facts(config)),
-            }
+            told = {topics.RECORDER: _for_recorder(config, bag)} | told
         executor = make_executor(context)
         stack.callback(executor.shutdown)
         nodes: dict[str, Any] = {}
-        for name, kind in kinds.items():
-            node = kind(
+        kinds = KINDS | {topics.WORLD_SIM: FleetSim} if robots else KINDS
+        for name, values in told.items():
+            namespace, _, which = name.rpartition("/")
+            node = kinds[which](
                 context=context,
-                parameter_overrides=_overrides(told[name] | _UNATTENDED),
+                namespace=namespace,
+                parameter_overrides=_overrides(values | _UNATTENDED),
                 start_parameter_services=False,
             )
             stack.callback(node.destroy_node)
             stack.callback(node.close)
             executor.add_node(node)
             nodes[name] = node
-        world: WorldSim = nodes[topics.WORLD_SIM]
+        world: WorldSim | FleetSim = nodes[topics.WORLD_SIM]
         if bag:
             recorder: Recorder = nodes[topics.RECORDER]
-            recorder.explain({name: params.values(nodes[name]) for name in NODES})
-        _spin(executor, lambda: not _missing(nodes), READY_TIMEOUT_S, lambda: _missing(nodes))
+            recorder.explain({name: params.values(nodes[name]) for name in wanted})
+        _spin(
+            executor,
+            lambda: not _missing(nodes),
+            READY_TIMEOUT_S + len(robots),
+            lambda: _missing(nodes),
+        )
         started = time.perf_counter()
         world.resume()
         _spin(
@@ -93,6 +100,15 @@ def run_in_process(
         for _ in range(DRAIN_TURNS):
             executor.spin_once(timeout_sec=0.0)
         return took_s
+
+
+def _for_recorder(config: RunConfig, bag: Path) -> dict[str, Any]:
+    return {
+        "output": str(bag),
+        "sim_time": True,
+        "run": json.dumps(run_facts(config)),
+        "namespaces": ",".join(member.name for member in config.scenario.robots),
+    }
 
 
 def _spin(

@@ -25,6 +25,7 @@ from ..recording.writer import BagWriter
 from . import params, topics
 from .drain import drain
 from .letterboxes import Deliver, Letter, Letterboxes
+from .namespaced import everywhere
 from .qos import offered
 from .runtime import GraphNode, spin_node
 from .serialized import has_header, header_stamp_ns, type_name
@@ -48,18 +49,18 @@ class Recorder(GraphNode):
         self.directory = Path(s.output) if s.output else new_run_directory()
         self.writer = BagWriter(self.directory)
         self._letterboxes = Letterboxes()
-        for topic in topics.GRAPH:
-            self._record(topic)
+        for topic, called in everywhere(names(s.namespaces)):
+            self._record(topic, called)
         self.every(EMPTY_PERIOD_S, self._letterboxes.empty)
         self.every(0.25, self._flush)
         self._survey = ParameterSurvey(self, names(s.nodes), self.explain)
         self.offer_ready(names(s.wait_for))
         self.get_logger().info(f"recording to {self.directory}")
 
-    def _record(self, topic: topics.Topic) -> None:
+    def _record(self, topic: topics.Topic, called: str) -> None:
         stamped = topic is topics.CMD_VEL and self.settings.enable_stamped_cmd_vel
         kind = TwistStamped if stamped else topic.type
-        name = self.resolve_topic_name(topic.name)
+        name = self.resolve_topic_name(called)
         self._types[name] = (type_name(kind), offered(topic.qos))
         definition_of(type_name(kind))  # found now, so that no first message waits for it
         is_of_tick = topic.every_tick and has_header(kind)
@@ -69,7 +70,7 @@ class Recorder(GraphNode):
         # In simulated time world_sim writes what every tick brings, and nobody else.
         from_anyone = not (topic.every_tick and self.settings.sim_time)
         profiles = topics.recording_qos(topic, from_anyone=from_anyone)
-        self.open_boxes(self._letterboxes, kind, topic.name, deliver, profiles)
+        self.open_boxes(self._letterboxes, kind, called, deliver, profiles)
 
     def _on_clock(self, letter: Letter) -> None:
         self._tick_before_ns = self._log_time_ns

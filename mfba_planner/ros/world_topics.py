@@ -11,6 +11,7 @@ from ..core.geometry import Point, towards
 from ..core.robot import Robot
 from ..node_settings import WorldSimSettings
 from . import convert, markers, topics
+from .namespaced import Namespaced
 from .runtime import GraphNode
 
 TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is shown
@@ -19,10 +20,17 @@ TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is 
 class WorldTopics:
     """The publishers of world_sim."""
 
-    def __init__(self, node: GraphNode, settings: WorldSimSettings, robot: Robot) -> None:
-        """Advertise them all."""
+    def __init__(
+        self,
+        node: GraphNode | Namespaced,
+        settings: WorldSimSettings,
+        robot: Robot,
+        *,
+        clock: bool = True,
+    ) -> None:
+        """Advertise them all; clock=False leaves the time to somebody else."""
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
-        self._clock = node.advertise(topics.CLOCK)
+        self._clock = node.advertise(topics.CLOCK) if clock else None
         self._odom = node.advertise(topics.ODOM)
         errs = robot.noise.of_odometry
         self._truth = node.advertise(topics.GROUND_TRUTH) if errs else None
@@ -57,7 +65,7 @@ class WorldTopics:
     def tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
         """One tick under one stamp; odom completes the sensor's pair, views can wait."""
         frame, reading = self._frame, world.read()
-        centers = world.scenario.centers(world.time_s)
+        centers = world.centers()
         turn = 0.0
         if world.scenario.robot.turns:
             velocity, turn = (
@@ -67,7 +75,8 @@ class WorldTopics:
         odom = convert.odometry_msg(
             reading.pose, velocity, stamp_ns, frame, self._base_frame, turn
         )
-        self._clock.publish(convert.clock_msg(stamp_ns))
+        if self._clock:
+            self._clock.publish(convert.clock_msg(stamp_ns))
         self._obstacles.publish(convert.obstacles_msg(centers, stamp_ns, frame))
         if self._tf:
             self._tf.publish(markers.tf_msg(odom))

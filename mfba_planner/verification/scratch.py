@@ -60,7 +60,8 @@ class FromScratch:
 def is_foreign(reader: BagReader) -> bool:
     """Whether a bag has scans and odometry, but neither decisions nor sectors of ours."""
     types = {topic.type_name for topic in reader.topics.values()}
-    ours = {DECISION, SECTORS} & set(reader.topics)
+    # of a fleet they are in namespaces
+    ours = SECTORS in reader.topics or any(name.endswith(DECISION) for name in reader.topics)
     return not ours and {ODOMETRY, SCAN} <= types
 
 

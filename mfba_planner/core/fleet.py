@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several robots in one world: each sees the others as circles that move; an Episode of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from .drive import command
+from .episode import Episode, Look, Outcome, World, look
+from .errors import ConfigError
+from .geometry import Point, Pose2D, bearing, distance
+from .nearby import Found
+from .planner import NANO, Decision, Method, PathPlanner, Planner, PlannerParams
+from .sensing import SensorParams
+from .world import Obstacle, Scenario, Turn
+
+FLEET_STREAM = 6  # spawn key of the robots' SeedSequence children; one number per purpose
+DRIFT_M = 1e-12  # by which a way of straight stretches may miss a pose
+
+MakeBrain = Callable[[int], PathPlanner]  # from a robot's seed
+
+
+def seed_of(seed: int, number: int) -> int:
+    """The seed of a fleet's robot (from 0) for its planner and its instruments."""
+    child = np.random.SeedSequence(seed, spawn_key=(FLEET_STREAM, number))
+    return int(child.generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+
+def alone(scenario: Scenario, number: int) -> Scenario:
+    """The scenario of one robot (from 0) of a fleet, without the others."""
+    member = scenario.robots[number]
+    return replace(
+        scenario,
+        name=f"{scenario.name}.{member.name}"[:100],
+        start_m=member.start_m,
+        goal_m=member.goal_m,
+        robots=(),
+    )
+
+
+class Place(World):
+    """The world as one robot of a fleet has it: the scenario's obstacles, then the others."""
+
+    def __init__(self, fleet: Fleet, number: int, tolerance_m: float) -> None:
+        """Put the robot at its start, at tick 0."""
+        seed = seed_of(fleet.seed, number)
+        super().__init__(alone(fleet.scenario, number), fleet.tick_ns, tolerance_m, seed)
+        self.name = fleet.scenario.robots[number].name
+        self.poses = [self.pose]  # one per tick of the fleet
+        self.seed = seed
+        self._fleet, self._number = fleet, number
+        self._own = len(self.scenario.obstacles)
+
+    @property
+    def others(self) -> list[Place]:
+        """The other robots' places, in the scenario's order."""
+        return [p for p in self._fleet.places if p is not self]
+
+    def near(self, reach_m: float, position: Point | None = None) -> Found:
+        """As World.near(); all other robots are in it."""
+        names, circles = super().near(reach_m, position)
+        wide = 2.0 * self.scenario.robot_radius_m
+        others = [(place.pose.position, wide) for place in self.others]
+        return [*names, *range(self._own, self._own + len(others))], [*circles, *others]
+
+    def radius_m(self, index: int) -> float:
+        """As World.radius_m()."""
+        if index < self._own:
+            return super().radius_m(index)
+        return self.scenario.robot_radius_m
+
+    def velocity(self, index: int) -> Point:
+        """As World.velocity(); a robot's is that of its last tick: the next is not decided yet."""
+        if index < self._own:
+            return super().velocity(index)
+        return self.others[index - self._own].moved
+
+    @property
+    def moved(self) -> Point:
+        """Mean velocity (m/s) during the last tick."""
+        (x0, y0, _), (x1, y1, _) = self.poses[-2:] if len(self.poses) > 1 else self.poses * 2
+        dt = self.tick_ns * NANO
+        return ((x1 - x0) / dt, (y1 - y0) / dt)
+
+    def centers(self) -> list[Point]:
+        """The scenario's obstacles, then the other robots, in near()'s order."""
+        return [*super().centers(), *(place.pose.position for place in self.others)]
+
+
+class Fleet:
+    """All robots of a scenario, one tick for all; who has ended stands where it is."""
+
+    def __init__(
+        self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float, seed: int = 0
+    ) -> None:
+        """Put every robot at its start. ConfigError for a scenario that names no robots."""
+        if not scenario.robots:
+            raise ConfigError(f"scenario {scenario.name!r}: names no robots; add robots to it")
+        self.scenario, self.tick_ns, self.seed = scenario, tick_ns, seed
+        self.tick = 0
+        count = len(scenario.robots)
+        self.places = [Place(self, number, goal_tolerance_m) for number in range(count)]
+        self.outcomes: list[Outcome | None] = [place.outcome() for place in self.places]
+
+    @property
+    def under_way(self) -> list[int]:
+        """Who has not ended yet, as numbers from 0."""
+        return [number for number, outcome in enumerate(self.outcomes) if outcome is None]
+
+    @property
+    def left_m(self) -> float:
+        """How far the farthest robot is from its goal."""
+        return max(place.left_m for place in self.places)
+
+    def step(self, told: dict[int, Point]) -> None:
+        """Move everybody who is under way and time on by one tick; told as for World.step()."""
+        going = self.under_way
+        for number in going:
+            self.places[number].step(told[number])
+        for place in self.places:
+            place.poses.append(place.pose)
+        self.tick += 1
+        for number in going:
+            self.outcomes[number] = self.places[number].outcome()
+
+
+def seen_by(
+    scenario: Scenario, number: int, poses: Sequence[Sequence[Pose2D]], tick_ns: int
+) -> Scenario:
+    """The scenario of one robot with all others as obstacles that went as they did.
+
+    poses holds those of each robot, one per tick until it ended.
+    """
+    own = alone(scenario, number)
+    ways = [way(p, tick_ns, scenario.robot_radius_m) for n, p in enumerate(poses) if n != number]
+    return replace(own, obstacles=(*own.obstacles, *ways))
+
+
+def way(poses: Sequence[Pose2D], tick_ns: int, radius_m: float) -> Obstacle:
+    """A robot that was at these poses, one per tick, as an obstacle that moves and turns.
+
+    Between two ticks it is uniform, as for all metrics; ticks that lie on one straight way at
+    one speed are one stretch.
+    """
+    dt = tick_ns * NANO
+    stretches: list[tuple[int, float, float]] = []  # first tick, speed, heading
+    (x, y), first = poses[0].position, 0
+    vx = vy = 0.0
+    for tick, (a, b) in enumerate(pairwise(poses)):
+        ahead_s = (tick + 1 - first) * dt
+        on_s = (tick - first) * dt
+        if stretches and distance((x + vx * ahead_s, y + vy * ahead_s), b.position) <= DRIFT_M:
+            continue
+        x, y, first = x + vx * on_s, y + vy * on_s, tick
+        speed, heading = distance((x, y), b.position) / dt, bearing((x, y), b.position)
+        if distance(a.position, b.position) <= DRIFT_M:
+            speed = heading = 0.0
+        vx, vy = _velocity(speed, heading)
+        stretches.append((tick, speed, heading))
+    (_, speed, heading), *turns = stretches or [(0, 0.0, 0.0)]
+    if len(poses) > 1 and stretches[-1][1] > 0.0:
+        turns.append((len(poses) - 1, 0.0, 0.0))  # what came later nobody knows
+    return Obstacle(
+        center_m=poses[0].position,
+        radius_m=radius_m,
+        speed_mps=speed,
+        heading_rad=heading,
+        turns=tuple(
+            Turn(at_s=tick * tick_ns * NANO, speed_mps=speed, heading_rad=heading)
+            for tick, speed, heading in turns
+        ),
+    )
+
+
+def _velocity(speed: float, heading: float) -> Point:
+    return Obstacle(
+        center_m=(0.0, 0.0), radius_m=1.0, speed_mps=speed, heading_rad=heading
+    ).velocity
+
+
+def run_fleet(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams | None = None,
+    sensor: SensorParams | None = None,
+    seed: int = 0,
+    go_on: Callable[[Fleet], bool] = lambda _: True,
+    brain: MakeBrain | None = None,
+    look: Look = look,
+) -> tuple[Episode, ...]:
+    """core.episode.run for every robot of a scenario at once: an Episode each, in its order.
+
+    brain makes the planner of a robot from its seed. The obstacles of an episode's scenario are
+    the scenario's own, then the other robots as they went.
+    """
+    planner, sensor = planner or PlannerParams(), sensor or SensorParams()
+    if brain is None and planner.method is not Method.PAPER:
+        raise ConfigError(
+            f"method={planner.method.value}: not the core's own; use planners.method"
+        )
+    make = brain or (lambda seed: Planner(planner, seed))
+    fleet = Fleet(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
+    brains = [make(place.seed) for place in fleet.places]
+    ticks: list[list[Decision]] = [[] for _ in brains]
+
+    def decide(numbers: Sequence[int]) -> dict[int, Point]:
+        for number in numbers:
+            ticks[number].append(brains[number].plan(look(fleet.places[number], sensor)))
+        return {n: command(ticks[n][-1], scenario.robot, planner.tick_ns) for n in numbers}
+
+    told = decide(range(len(brains)))
+    while (going := fleet.under_way) and go_on(fleet):
+        fleet.step(told)
+        told = decide(going)
+    return episodes(fleet, ticks, planner, sensor, "core")
+
+
+def episodes(
+    fleet: Fleet,
+    ticks: Sequence[Sequence[Decision]],
+    planner: PlannerParams,
+    sensor: SensorParams,
+    driver: str,
+) -> tuple[Episode, ...]:
+    """What came of a fleet: an Episode of each robot."""
+    errs = fleet.scenario.robot.noise.of_odometry
+    poses = [place.poses for place in fleet.places]
+    return tuple(
+        Episode(
+            scenario=seen_by(fleet.scenario, number, poses, fleet.tick_ns),
+            sensor=sensor,
+            planner=planner,
+            seed=place.seed,
+            driver=driver,
+            ticks=tuple(ticks[number]),
+            outcome=fleet.outcomes[number] or Outcome.INTERRUPTED,
+            truth=tuple(place.poses[: len(ticks[number])]) if errs else (),
+        )
+        for number, place in enumerate(fleet.places)
+    )

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is left of a fleet's run: a table, a result file for each robot, the picture, a verdict."""
+
+from __future__ import annotations
+
+import sys
+
+from ..core.errors import MfbaError
+from ..core.metrics import evaluate
+from ..recording.fleet import read_fleet
+from .attempt import Attempt
+
+
+def conclude_fleet(attempt: Attempt, _: object = None, *, failure: str = "") -> None:
+    """Print the table, write NAME.json for each robot and run.png.
+
+    Raises MfbaError where the run, otherwise fine, was no success, and BagError where the bag
+    holds no decision of a robot or was not closed.
+    """
+    from ..report.fleet import draw_fleet, fleet_text, why_no_success
+    from ..report.result import result_to_dict, write_result
+
+    directory, config = attempt.directory, attempt.order.config
+    names = [member.name for member in config.scenario.robots]
+    episodes = read_fleet(directory.bag)
+    results = [evaluate(episode) for episode in episodes]
+    extra = {"fleet_seed": config.seed, "wall_s": attempt.wall_s, "failure": failure or None}
+    for name, episode in zip(names, episodes):
+        write_result(directory.path / f"{name}.json", result_to_dict(episode, extra))
+    if attempt.order.picture:
+        title = config.scenario.description or config.scenario.name
+        draw_fleet(title, names, episodes, results, config.seed, directory.picture)
+    sys.stdout.write(fleet_text(names, results))
+    print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
+    if failure:
+        return
+    if attempt.order.view:
+        from ..report.viewer import show
+
+        show(list(zip(names, episodes)))
+    if why := why_no_success(results):
+        raise MfbaError(f"{directory.path}: {why}")

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A fleet's run: a row for each robot, and all their ways in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from mfba_planner.core.episode import Episode, Outcome
+from mfba_planner.core.metrics import Result
+from mfba_planner.outputs import write_new
+
+from . import legend, style, words
+from .moments import is_finite
+from .page import Page
+from .scene import draw_ends, draw_path
+from .sheet import to_bytes
+from .view import View, fitted
+
+
+def draw_fleet(
+    title: str, names: Sequence[str], episodes: Sequence[Episode], results: Sequence[Result],
+    seed: int, path: Path,
+) -> None:  # fmt: skip
+    """Write the picture of a fleet's run as PNG; OutputError when path exists already."""
+    with style.context():
+        figure = fleet_figure(title, names, episodes, results, seed)
+        write_new(path, to_bytes(figure, "png"))
+
+
+def fleet_figure(
+    title: str,
+    names: Sequence[str],
+    episodes: Sequence[Episode],
+    results: Sequence[Result],
+    seed: int,
+) -> Figure:
+    """Compose head, ways, panel and strip; to be called and saved within style.context()."""
+    first = episodes[0].scenario
+    view = View(*first.start_m, *first.start_m)
+    for episode in episodes:
+        view = view.around(episode.scenario.start_m, first.robot_radius_m)
+        view = view.around(episode.scenario.goal_m, first.robot_radius_m)
+        for tick in episode.ticks:
+            if is_finite(tick.pose.position):
+                view = view.around(tick.pose.position, first.robot_radius_m)
+    page = Page(*fitted(view.grown(first.robot_radius_m, first.robot_radius_m)))
+    for name, episode in zip(names, episodes):
+        draw_path(page.ax, episode)
+        draw_ends(page.ax, episode)
+        x, y = episode.scenario.start_m
+        page.ax.text(x, y + 1.2 * first.robot_radius_m, name, **style.NUMBER)
+    good = sum(result.success for result in results)
+    page.head(title, f"{len(episodes)} robots in one world")
+    page.legend(legend.entries(page.ax))
+    page.rows(
+        "Closest pass, edge to edge",
+        [
+            (
+                name,
+                words.number(result.min_clearance_m, 2, "m"),
+                "" if result.success else words.outcome(result),
+            )
+            for name, result in zip(names, results)
+        ],
+    )
+    page.strip(
+        [
+            (
+                "at the goal, untouched",
+                f"{good} of {len(results)}",
+                style.GOOD if good == len(results) else style.BAD,
+            ),
+            ("longest", f"{max(r.length_m for r in results):.2f} m", style.INK),
+            ("last", f"{max(r.time_s for r in results):.1f} s", style.INK),
+            ("min clearance", f"{min(r.min_clearance_m for r in results):.2f} m", style.INK),
+            ("collisions", str(sum(r.collisions for r in results)), style.INK),
+            ("algorithm", episodes[0].label, style.INK),
+            ("seed", str(seed), style.INK),
+        ]
+    )
+    return page.figure
+
+
+_HEAD = "{:<12}  outcome       length     time  clearance  collisions  encounters\n"
+_ROW = "{:<12}  {:<12}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}  {:>10}\n"
+
+
+def fleet_text(names: Sequence[str], results: Sequence[Result]) -> str:
+    """A row for each robot, and how many were at the goal without collision."""
+    rows = [
+        _ROW.format(
+            name, r.outcome.value, r.length_m, r.time_s, r.min_clearance_m, r.collisions,
+            len(r.encounters),
+        )
+        for name, r in zip(names, results, strict=True)
+    ]  # fmt: skip
+    good = sum(r.success for r in results)
+    end = f"{good} of {len(results)} robots at the goal without collision\n"
+    return _HEAD.format("robot") + "".join(rows) + end
+
+
+def why_no_success(results: Sequence[Result]) -> str:
+    """What kept a fleet from success, in words; empty where nothing did."""
+    hits = sum(r.collisions for r in results)
+    late = sum(r.outcome is not Outcome.GOAL_REACHED for r in results)
+    faults = [f"{hits} collisions"] if hits else []
+    faults += [f"{late} of {len(results)} robots not at the goal"] if late else []
+    return f"no success: {', '.join(faults)}; try another --seed or --planner" if faults else ""

@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several robots in one world: what they see, who touches whom, and that seeds say it all."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mfba_planner import cli
+from mfba_planner.core.digest import digest
+from mfba_planner.core.episode import Outcome, World, run
+from mfba_planner.core.errors import BagError, ConfigError
+from mfba_planner.core.fleet import Fleet, alone, run_fleet, seed_of, way
+from mfba_planner.core.geometry import Point, Pose2D, closest_approach, distance
+from mfba_planner.core.metrics import evaluate, tick_clearances
+from mfba_planner.core.planner import Decision, Method, Mode, Observation, PlannerParams
+from mfba_planner.core.robot import Drive, Lidar, Robot
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.core.world import Kidnapping, Member, Obstacle, Scenario, Walls, center_at
+from mfba_planner.planners.method import simulate_fleet
+from mfba_planner.planners.perception import Perception
+from mfba_planner.planners.predictive import preset
+from mfba_planner.planners.registry import make
+from mfba_planner.recording.episode import read_episode
+from mfba_planner.recording.fleet import read_fleet
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.report.result import read_result
+from mfba_planner.scenarios import load_scenario, scenario_to_json
+
+TICK_NS = PlannerParams().tick_ns
+
+
+def fleet_of(*ends: tuple[Point, Point], **more: Any) -> Scenario:
+    """Robots a, b, ... with these starts and goals."""
+    members = tuple(
+        Member(name=chr(ord("a") + k), start_m=start, goal_m=goal)
+        for k, (start, goal) in enumerate(ends)
+    )
+    start, goal = ends[0]
+    return Scenario(name="fleet", start_m=start, goal_m=goal, robots=members, **more)
+
+
+def head_on(**more: Any) -> Scenario:
+    return fleet_of(((-4.0, 0.0), (4.0, 0.0)), ((4.0, 0.0), (-4.0, 0.0)), **more)
+
+
+class Blind:
+    """Drives straight on to its goal whatever it sees, at 1.5 m per tick."""
+
+    def __init__(self, seed: int) -> None:
+        self.inner = make("straight", PlannerParams(step_length_m=1.5), seed=seed)
+
+    def plan(self, obs: Observation) -> Decision:
+        return self.inner.plan(replace(obs, ranges_m=(math.inf,) * 12))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_robots_head_on_pass_each_other(seed: int) -> None:
+    planner = preset(PlannerParams(method=Method.PREDICTIVE))
+    done = simulate_fleet(head_on(), planner=planner, sensor=SensorParams(), seed=seed)
+    for episode in done:
+        result = evaluate(episode)
+        assert result.success
+        assert result.encounters == (1,)
+
+
+def test_algorithm_1_head_on_never_touches_but_may_go_on_side_by_side() -> None:
+    """Who evades to the same side as the other is beside him at the next tick as well."""
+    results = [evaluate(e) for seed in range(6) for e in run_fleet(head_on(), seed=seed)]
+    assert not any(result.collisions for result in results)
+    assert {result.outcome for result in results} == {Outcome.GOAL_REACHED, Outcome.TIME_LIMIT}
+
+
+def test_ten_robots_swap_places_on_the_shipped_circle() -> None:
+    scenario = load_scenario("swap")
+    done = run_fleet(scenario, seed=1)
+    assert [episode.scenario.name for episode in done][:2] == ["swap.robot0", "swap.robot1"]
+    for member, episode in zip(scenario.robots, done, strict=True):
+        assert evaluate(episode).success
+        assert distance(episode.ticks[0].pose.position, member.start_m) == 0.0
+        assert distance(episode.ticks[-1].pose.position, member.goal_m) <= 0.02
+        assert episode.ticks[-1].mode is Mode.ARRIVED
+
+
+def test_a_contact_between_two_ticks_is_seen_by_both() -> None:
+    """They change places within one tick: apart at every tick, through each other between."""
+    scenario = fleet_of(((-0.7, 0.0), (3.0, 0.0)), ((0.7, 0.0), (-3.0, 0.0)))
+    params = PlannerParams(step_length_m=1.5)
+    done = run_fleet(scenario, planner=params, brain=Blind)
+    for mine, other in zip(done, done[::-1]):
+        assert all(distance(a.pose.position, b.pose.position) > 0.6
+                   for a, b in zip(mine.ticks, other.ticks))  # fmt: skip
+        result = evaluate(mine)
+        assert result.collisions == 1
+        assert result.min_clearance_m == pytest.approx(-0.6, abs=1e-9)
+        assert result.outcome is Outcome.GOAL_REACHED
+        assert not result.success
+
+
+def test_who_has_arrived_is_still_in_the_way() -> None:
+    scenario = fleet_of(((1.5, 0.0), (2.0, 0.0)), ((-4.0, 0.0), (6.0, 0.0)))
+    near, far = run_fleet(scenario, brain=Blind, planner=PlannerParams(step_length_m=1.5))
+    assert len(near.ticks) < len(far.ticks)
+    assert evaluate(far).collisions == 1
+    assert evaluate(near).collisions == 0  # its own run was over
+
+
+def test_the_others_are_where_they_went() -> None:
+    done = run_fleet(load_scenario("swap"), seed=2)
+    for episode in done:
+        others = [e for e in done if e is not episode]
+        for obstacle, other in zip(episode.scenario.obstacles, others, strict=True):
+            for tick in other.ticks:
+                there = center_at(obstacle, other.time_s(tick.stamp_ns))
+                assert distance(there, tick.pose.position) < 1e-9
+            last_s = other.time_s(other.ticks[-1].stamp_ns)
+            assert (
+                distance(center_at(obstacle, last_s + 50.0), other.ticks[-1].pose.position) < 1e-9
+            )
+        gaps = tick_clearances(episode)
+        for k, (a, b) in enumerate(zip(episode.ticks, episode.ticks[1:])):
+            for gap, other in zip(gaps[k], others):
+                if k + 1 < len(other.ticks):
+                    c, d = other.ticks[k], other.ticks[k + 1]
+                    apart = closest_approach(
+                        a.pose.position, b.pose.position, c.pose.position, d.pose.position
+                    )
+                    assert gap == pytest.approx(apart - 0.6, abs=1e-9)
+        result = evaluate(episode)
+        assert result.min_clearance_m == pytest.approx(min(map(min, gaps)), abs=1e-12)
+
+
+def test_an_episode_is_an_ordinary_one() -> None:
+    """Run again as the one robot among obstacles, it decides the same."""
+    for episode in run_fleet(head_on(), seed=3):
+        text = scenario_to_json(episode.scenario)
+        assert load_scenario(text) == episode.scenario
+        again = run(episode.scenario, seed=episode.seed)
+        assert digest(again.ticks) == digest(episode.ticks)
+
+
+def test_equal_seeds_equal_decisions_and_streams_of_their_own() -> None:
+    scenario = load_scenario("swap")
+    one, same, other = (run_fleet(scenario, seed=seed) for seed in (5, 5, 6))
+    assert [digest(e.ticks) for e in one] == [digest(e.ticks) for e in same]
+    assert [digest(e.ticks) for e in one] != [digest(e.ticks) for e in other]
+    assert len({seed_of(seed, n) for seed in range(50) for n in range(10)}) == 500
+    assert all(0 <= seed_of(seed, n) < 2**63 for seed in range(50) for n in range(10))
+
+
+def test_a_fleet_of_one_is_a_robot_alone() -> None:
+    case = load_scenario("case1")
+    only = Member(name="a", start_m=case.start_m, goal_m=case.goal_m)
+    (episode,) = run_fleet(replace(case, robots=(only,)), seed=4)
+    assert digest(episode.ticks) == digest(run(case, seed=seed_of(4, 0)).ticks)
+
+
+def test_obstacles_and_robots_are_seen_alike() -> None:
+    still = Obstacle(center_m=(0.0, 1.0), radius_m=0.2)
+    scenario = fleet_of(((0.0, 0.0), (9.0, 0.0)), ((1.0, 0.0), (9.0, 5.0)), obstacles=(still,))
+    fleet = Fleet(scenario, TICK_NS, 0.02)
+    first, second = fleet.places
+    assert first.near(3.0)[1] == [((0.0, 1.0), 0.5), ((1.0, 0.0), 0.6)]
+    assert second.near(3.0)[1] == [((0.0, 1.0), 0.5), ((0.0, 0.0), 0.6)]
+    assert [first.radius_m(k) for k in (0, 1)] == [0.2, 0.3]
+    assert first.velocity(1) == (0.0, 0.0)
+    fleet.step({0: (0.0, 0.0), 1: (0.5, -0.25)})
+    assert first.velocity(1) == pytest.approx((0.5, -0.25))
+    assert second.velocity(1) == (0.0, 0.0)
+    seen = Perception("known")(first, SensorParams())
+    assert seen.circles is not None
+    assert [c.velocity_mps for c in seen.circles] == [(0.0, 0.0), first.velocity(1)]
+
+
+@pytest.mark.parametrize("beams", [0, 360])
+def test_a_lidar_sees_the_other_robots(beams: int) -> None:
+    scenario = fleet_of(((0.0, 0.0), (9.0, 0.0)), ((1.5, 0.0), (9.0, 5.0)),
+                        robot=Robot(lidar=Lidar(beams=beams)))  # fmt: skip
+    scan = Fleet(scenario, TICK_NS, 0.02).places[0].read().scan
+    assert (scan is None) == (beams == 0)
+    if scan is not None:
+        assert float(min(scan.ranges_m)) == pytest.approx(1.2, abs=1e-3)
+
+
+def test_differential_robots_with_lidars_share_a_world() -> None:
+    robot = Robot(drive=Drive.DIFFERENTIAL, lidar=Lidar(beams=180))
+    scenario = replace(head_on(), robot=robot)
+    params = PlannerParams(method=Method.PREDICTIVE, scan_radius_m=0.35)
+    done = simulate_fleet(scenario, planner=preset(params), sensor=SensorParams(), seed=0)
+    assert all(evaluate(episode).success for episode in done)
+
+
+@given(
+    st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.integers(1, 4)), max_size=12)
+)
+def test_a_way_goes_through_its_poses(stretches: list[tuple[float, float, int]]) -> None:
+    poses = [Pose2D(1.0, -2.0)]
+    for vx, vy, ticks in stretches:
+        for _ in range(ticks):
+            poses.append(Pose2D(poses[-1].x + 0.1 * vx, poses[-1].y + 0.1 * vy))
+    obstacle = way(poses, 100_000_000, 0.3)
+    for k, pose in enumerate(poses):
+        there = center_at(obstacle, k * 100_000_000 * 1e-9)
+        assert distance(there, pose.position) < 1e-9
+    assert len(obstacle.turns) <= len(stretches) + 1
+
+
+def test_scenario_files_name_robots_and_come_back_the_same() -> None:
+    scenario = load_scenario("swap")
+    assert len(scenario.robots) == 10
+    assert (scenario.start_m, scenario.goal_m) == ((6.0, 0.0), (-6.0, 0.0))
+    assert load_scenario(scenario_to_json(scenario)) == scenario
+    assert "robots" not in scenario_to_json(load_scenario("case1"))
+    assert alone(scenario, 1).start_m == scenario.robots[1].start_m
+
+
+TWO = (((0.0, 0.0), (5.0, 0.0)), ((2.0, 0.0), (5.0, 5.0)))
+
+
+@pytest.mark.parametrize(
+    ("make_it", "what"),
+    [
+        (lambda: Member(name="a/b", start_m=(0.0, 0.0), goal_m=(1.0, 0.0)), "not a ROS namespace"),
+        (
+            lambda: Member(name="a__b", start_m=(0.0, 0.0), goal_m=(1.0, 0.0)),
+            "not a ROS namespace",
+        ),
+        (lambda: Member(name="a", start_m=(0.0, 0.0), goal_m=(0.0, 0.0)), "equal to start_m"),
+        (lambda: fleet_of(*TWO, ((0.4, 0.0), (5.0, 9.0))), "start_m: 0.2 m into each other"),
+        (lambda: fleet_of(*TWO, ((9.0, 0.0), (5.1, 5.0))), "goal_m: 0.5 m into each other"),
+        (lambda: replace(fleet_of(*TWO), start_m=(1.0, 1.0)), "leave those two out"),
+        (
+            lambda: fleet_of(*TWO, walls=Walls(lower_m=(-9.0, -9.0), upper_m=(9.0, 9.0))),
+            "walls not supported",
+        ),
+        (
+            lambda: fleet_of(*TWO, kidnappings=(Kidnapping(at_s=1.0, to_m=(0.0, 0.0)),)),
+            "kidnappings not supported",
+        ),
+        (
+            lambda: fleet_of(*TWO, obstacles=(Obstacle(center_m=(2.0, 0.3), radius_m=0.3),)),
+            "inside obstacle 1",
+        ),
+        (lambda: run(head_on()), "names 2 robots"),
+        (lambda: World(head_on(), TICK_NS, 0.02), "names 2 robots"),
+        (lambda: Fleet(load_scenario("case1"), TICK_NS, 0.02), "names no robots"),
+        (lambda: load_scenario('{"name": "x", "robots": [{"name": "a"}]}'), "missing"),
+        (lambda: load_scenario('{"name": "x", "robots": []}'), "start_m: missing"),
+    ],
+)
+def test_what_cannot_be_a_fleet(make_it: Any, what: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        make_it()
+    assert what in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_sim_prints_a_row_per_robot_or_per_seed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["sim", "swap"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 12
+    assert said[1].split()[:2] == ["robot0", "goal_reached"]
+    assert said[-1] == "10 of 10 robots at the goal without collision"
+    assert cli.main(["sim", "swap", "--seeds", "2"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[1].split()[:4] == ["0", "10", "of", "10"]
+    assert said[-1] == "2 of 2 seeds with all robots at the goal without collision"
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`mfba run` of four robots: the whole graph, one call."""
+    place = tmp_path_factory.mktemp("fleet")
+    whole = load_scenario("swap")
+    some = replace(whole, robots=whole.robots[::5] + whole.robots[2::5])
+    file = place / "some.json"
+    file.write_text(scenario_to_json(some), encoding="utf-8")
+    assert cli.main(["run", str(file), "--seed", "3", "--out", str(place / "run")]) == 0
+    return place / "run"
+
+
+def test_the_graph_decides_as_the_core_does(driven: Path) -> None:
+    scenario = load_scenario(str(driven.parent / "some.json"))
+    core = run_fleet(scenario, seed=3)
+    recorded = read_fleet(driven / "bag")
+    assert [digest(e.ticks) for e in recorded] == [digest(e.ticks) for e in core]
+    assert tuple(replace(e, driver="core") for e in recorded) == core
+
+
+def test_every_robot_has_its_topics_in_its_namespace(driven: Path) -> None:
+    names = {member.name for member in load_scenario(str(driven.parent / "some.json")).robots}
+    core = run_fleet(load_scenario(str(driven.parent / "some.json")), seed=3)
+    with BagReader(driven / "bag") as reader:
+        counts = {name: topic.message_count for name, topic in reader.topics.items()}
+    assert counts["/clock"] == max(len(episode.ticks) for episode in core)
+    for episode, name in zip(core, ["robot0", "robot5", "robot2", "robot7"], strict=True):
+        assert name in names
+        for topic in ("odom", "obstacles", "sectors", "goal_step", "cmd_vel", "planner/decision"):
+            assert counts[f"/{name}/{topic}"] == len(episode.ticks)
+    assert "/odom" not in counts
+
+
+def test_a_result_for_each_robot_and_one_picture(driven: Path) -> None:
+    found = sorted(path.name for path in driven.iterdir())
+    assert found == ["bag", *(f"robot{n}.json" for n in (0, 2, 5, 7)), "run.png"]
+    core = run_fleet(load_scenario(str(driven.parent / "some.json")), seed=3)
+    told = read_result(driven / "robot0.json")
+    assert told["digest"] == digest(core[0].ticks)
+    assert told["result"]["success"]
+    assert told["extra"]["fleet_seed"] == 3
+    assert told["seed"] == seed_of(3, 0)
+
+
+def test_what_knows_one_robot_only_says_so(driven: Path) -> None:
+    with pytest.raises(BagError, match="holds 4 robots, and a bag of one"):
+        read_episode(driven / "bag")
+    for command in ("verify", "digest", "export"):
+        with pytest.raises(BagError, match="holds 4 robots"):
+            cli.main([command, str(driven / "bag")] + ["x.csv"] * (command == "export"))
+    for args, what in (
+        (["--driver", "multi-process"], "give --driver in-process"),
+        (["--real-time"], "give --driver in-process"),
+        (["--driver", "core"], "use `mfba sim`"),
+    ):
+        with pytest.raises(ConfigError, match=what):
+            cli.main(["run", "swap", *args])
+    with pytest.raises(ConfigError, match="leave it out"):
+        cli.main(["sim", "swap", "--out", "x"])
+
+
+def test_a_bag_of_one_robot_is_none_of_a_fleet(tmp_path: Path) -> None:
+    assert cli.main(["run", "empty", "--driver", "in-process", "--out", str(tmp_path / "r")]) == 0
+    with pytest.raises(BagError, match="one robot's run"):
+        read_fleet(tmp_path / "r" / "bag")

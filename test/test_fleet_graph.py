@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""world_sim of a fleet as others see it: one tick for all, over when the last has answered."""
+
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Twist, Vector3
+from graph import Graph
+
+from mfba_planner.core.errors import ConfigError, GraphError
+from mfba_planner.core.planner import PlannerParams
+from mfba_planner.core.world import Member, Obstacle, Scenario
+from mfba_planner.messages import obstacle_centers, robot_pose, stamp_ns
+from mfba_planner.ros import topics
+from mfba_planner.ros.convert import pose_stamped_msg
+from mfba_planner.ros.fleet_sim import FleetSim
+from mfba_planner.ros.namespaced import below
+from mfba_planner.scenarios import scenario_to_json
+
+TICK_NS = PlannerParams().tick_ns
+TICK_S = TICK_NS * 1e-9
+STONE = Obstacle(center_m=(5.0, 5.0), radius_m=0.5)
+PAIR = Scenario(
+    name="pair",
+    start_m=(0.0, 0.0),
+    goal_m=(9.0, 0.0),
+    obstacles=(STONE,),
+    robots=(
+        Member(name="a", start_m=(0.0, 0.0), goal_m=(9.0, 0.0)),
+        Member(name="b", start_m=(0.0, 3.0), goal_m=(0.3, 3.0)),
+    ),
+)
+
+
+class Pair:
+    """A world of two robots, and somebody who answers for both by hand."""
+
+    def __init__(self, graph: Graph, **parameters: Any) -> None:
+        self.graph = graph
+        self.clock = graph.hear(topics.CLOCK)
+        self.odom = {name: graph.hear(below(name, topics.ODOM)) for name in "ab"}
+        self.seen = {name: graph.hear(below(name, topics.OBSTACLES)) for name in "ab"}
+        self.ends = {name: graph.hear(below(name, topics.OUTCOME)) for name in "ab"}
+        self.steps = {name: graph.writer(below(name, topics.GOAL_STEP)) for name in "ab"}
+        self.twists = {name: graph.writer(below(name, topics.CMD_VEL)) for name in "ab"}
+        told = {"lockstep": True, "answer_timeout_s": 60.0, "scenario": scenario_to_json(PAIR)}
+        self.world = graph.start(FleetSim, {**told, **parameters})
+        graph.until(lambda: all(self.odom.values()))
+
+    def answer(self, name: str, vx: float, vy: float = 0.0) -> None:
+        stamp = stamp_ns(self.odom[name][-1].header.stamp)
+        self.steps[name].publish(pose_stamped_msg((0.0, 0.0), stamp, "odom"))
+        self.twists[name].publish(Twist(linear=Vector3(x=vx, y=vy)))
+
+    def until_tick(self, count: int) -> None:
+        """Wait until robot a was asked so often, and for what goes with it."""
+        self.graph.until(lambda: len(self.odom["a"]) == count)
+        self.graph.settle()
+
+    def stamps(self, name: str) -> list[int]:
+        return [stamp_ns(message.header.stamp) for message in self.odom[name]]
+
+
+def test_a_tick_is_over_when_the_last_has_answered(graph: Graph) -> None:
+    pair = Pair(graph)
+    pair.answer("b", 0.1)
+    graph.settle()
+    pair.answer("b", 0.7)  # said twice: the first counts
+    graph.settle()
+    assert pair.stamps("a") == pair.stamps("b") == [TICK_NS]
+    pair.answer("a", 0.5, -0.25)
+    pair.until_tick(2)
+    assert pair.stamps("a") == pair.stamps("b") == [TICK_NS, 2 * TICK_NS]
+    assert len(pair.clock) == 2
+    a, b = (robot_pose(pair.odom[name][-1]).position for name in "ab")
+    assert a == (0.5 * TICK_S, -0.25 * TICK_S)
+    assert b == (0.1 * TICK_S, 3.0)
+    assert obstacle_centers(pair.seen["a"][-1]) == [STONE.center_m, b]
+    assert obstacle_centers(pair.seen["b"][-1]) == [STONE.center_m, a]
+    assert pair.odom["a"][-1].child_frame_id == "a/base_link"
+
+
+def test_who_has_arrived_is_asked_once_more_and_then_left_alone(graph: Graph) -> None:
+    pair = Pair(graph)
+    pair.answer("a", 0.0)
+    pair.answer("b", 0.3 / TICK_S)
+    pair.until_tick(2)
+    assert pair.ends["b"][-1].message == "running"
+    pair.answer("a", 0.0)
+    graph.settle()
+    assert len(pair.odom["a"]) == 2  # b has to say that it has arrived
+    pair.answer("b", 0.0)
+    pair.until_tick(3)
+    assert pair.ends["b"][-1].message == "goal_reached"
+    pair.answer("a", 9.0 / TICK_S)
+    pair.until_tick(4)
+    assert len(pair.odom["b"]) == 2
+    assert obstacle_centers(pair.seen["a"][-1])[1] == pytest.approx((0.3, 3.0))
+    pair.answer("a", 0.0)
+    graph.until(lambda: pair.world.over)
+    graph.settle()
+    assert pair.ends["a"][-1].message == "goal_reached"
+
+
+def test_only_who_is_silent_is_asked_again_and_not_for_ever(graph: Graph) -> None:
+    pair = Pair(graph, answer_timeout_s=0.05, answer_retries=2)
+    pair.answer("a", 0.1)
+    with pytest.raises(GraphError, match="published 3 times"):
+        graph.until(lambda: False)
+    assert pair.stamps("a")[0] == TICK_NS
+    assert pair.stamps("b") == [TICK_NS] * 3
+
+
+def test_a_twist_that_is_none_stops_its_robot_alone(graph: Graph) -> None:
+    pair = Pair(graph)
+    pair.answer("a", float("nan"))
+    pair.answer("b", 0.2)
+    pair.until_tick(2)
+    a, b = (robot_pose(pair.odom[name][-1]).position for name in "ab")
+    assert a == (0.0, 0.0)
+    assert b == (0.2 * TICK_S, 3.0)
+
+
+def test_what_a_fleet_cannot_be_told(graph: Graph) -> None:
+    with pytest.raises(ConfigError, match="no wall timer"):
+        graph.start(FleetSim, {"scenario": scenario_to_json(PAIR)})
+    with pytest.raises(ConfigError, match="names no robots"):
+        graph.start(FleetSim, {"scenario": "case1", "lockstep": True})
