@@ -208,7 +208,9 @@ def test_a_way_goes_through_its_poses(stretches: list[tuple[float, float, int]])
     for k, pose in enumerate(poses):
         there = center_at(obstacle, k * 100_000_000 * 1e-9)
         assert distance(there, pose.position) < 1e-9
-    assert len(obstacle.turns) <= len(stretches) + 1
+    # What moves by less than can be told from rounding may count as several stretches.
+    if all(v == 0.0 or abs(v) > 1e-3 for vx, vy, _ in stretches for v in (vx, vy)):
+        assert len(obstacle.turns) <= len(stretches) + 1
 
 
 def test_scenario_files_name_robots_and_come_back_the_same() -> None:

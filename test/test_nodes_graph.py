@@ -38,7 +38,9 @@ TABLE = [
     ("/outcome", "diagnostic_msgs/msg/DiagnosticStatus", ["world_sim"], [], True),
     ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", [], ["world_sim"], False),
     ("/markers", "visualization_msgs/msg/MarkerArray", ["planner", "world_sim"], [], False),
+    # Only the recorder asks for these: the paper's robot has no lidar and its odometry never errs.
     ("/scan", "sensor_msgs/msg/LaserScan", [], [], False),
+    ("/ground_truth", "nav_msgs/msg/Odometry", [], [], False),
 ]
 RCLPYS_OWN = {"/parameter_events", "/rosout", "/planner/transition_event"}
 ONE_FOR_ALL = {"/clock", "/diagnostics"}  # time and health are the whole site's
