@@ -20,12 +20,14 @@ from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Episode, run
 from mfba_planner.core.errors import InputError, OutputError
 from mfba_planner.core.gaps import gap_heading
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.planner import Mode
+from mfba_planner.core.metrics import evaluate, tick_clearances
+from mfba_planner.core.planner import Mode, PlannerParams
+from mfba_planner.core.robot import Noise
 from mfba_planner.recording.episode import read_episode
 from mfba_planner.report import words
 from mfba_planner.report.html.data import MOST_RUNS, clearances
 from mfba_planner.report.html.page import as_json, page, write_page
+from mfba_planner.report.moments import closest_passes
 from mfba_planner.report.table import result_rows
 from mfba_planner.scenarios import load_scenario
 
@@ -503,3 +505,16 @@ def test_without_a_chromium_one_line_says_what_to_install(tmp_path: Path) -> Non
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("no Chromium with chromedriver on PATH: ")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "noise"), [("case2", Noise()), ("case2", Noise(odom_m=0.05)), ("kidnapped", Noise())]
+)
+def test_the_least_clearance_is_the_result_s(name: str, noise: Noise) -> None:
+    """Where the robot really was, and not on the way on which it was carried off."""
+    scenario = load_scenario(name)
+    scenario = replace(scenario, robot=replace(scenario.robot, noise=noise))
+    episode = run(scenario, planner=PlannerParams(goal_tolerance_m=0.1), seed=1)
+    assert min(clearances(episode)) == evaluate(episode).min_clearance_m
+    least = min(closest_passes(episode), key=lambda found: found.gap_m)
+    assert least.gap_m == pytest.approx(min(map(min, tick_clearances(episode))), abs=1e-3)

@@ -17,7 +17,6 @@ from .geometry import Pose2D, distance
 from .jump import carried_off
 from .motion import Array, Motion, Steps
 from .planner import NANO, Decision, Mode
-from .world import step_clearances
 
 BLOCK = 512  # ticks
 
@@ -191,19 +190,31 @@ class Tally:
         return np.array(times_s), np.array([tick.pose.position for tick in ticks]).T
 
 
+def steps_driven(episode: Episode) -> list[tuple[Decision, Decision]]:
+    """Each tick and the next, where the robot really was; of a single tick it twice.
+
+    Who is carried off drives nowhere: it stands until the tick at which it finds itself elsewhere.
+    """
+    ticks = [
+        tick if pose is None else replace(tick, pose=pose)
+        for tick, pose in zip_longest(episode.ticks, episode.truth)
+    ]
+    pairs = pairwise(ticks if len(ticks) > 1 else ticks * 2)
+    return [(a, replace(b, pose=a.pose) if carried_off(b.reason) else b) for a, b in pairs]
+
+
 def tick_clearances(episode: Episode) -> list[list[float]]:
     """Smallest gap (m) to each obstacle during each step; ticks - 1 rows (one if no step)."""
-    ticks = episode.ticks
-    if len(ticks) == 1:
-        ticks = (ticks[0], ticks[0])
-    return [_clearances(episode, a, b) for a, b in pairwise(ticks)]
-
-
-def _clearances(run: Episode, a: Decision, b: Decision) -> list[float]:
-    if carried_off(b.reason):
-        b = replace(b, pose=a.pose)
-    times_s = run.time_s(a.stamp_ns), run.time_s(b.stamp_ns)
-    return step_clearances(run.scenario, *times_s, a.pose.position, b.pose.position)
+    steps, motion = steps_driven(episode), Motion(episode.scenario)
+    moments = [*(a for a, _ in steps), steps[-1][1]]
+    times_s = np.array([episode.time_s(tick.stamp_ns) for tick in moments])
+    positions_m = np.array([tick.pose.position for tick in moments]).T
+    gaps_m = motion.steps(times_s, positions_m).gap_m
+    for k, (_, b) in enumerate(steps):
+        if carried_off(b.reason):  # the next step begins elsewhere
+            standing_m = positions_m[:, [k, k]]
+            gaps_m[k] = motion.steps(times_s[k : k + 2], standing_m).gap_m[0]
+    return [[float(gap) for gap in row] for row in gaps_m]
 
 
 def within_range(episode: Episode, tick: Decision) -> tuple[int, ...]:

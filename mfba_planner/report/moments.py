@@ -11,7 +11,7 @@ import numpy as np
 
 from mfba_planner.core.episode import Episode
 from mfba_planner.core.geometry import Point, distance
-from mfba_planner.core.metrics import tick_clearances
+from mfba_planner.core.metrics import steps_driven, tick_clearances
 from mfba_planner.core.planner import Decision, Mode
 from mfba_planner.core.world import Obstacle, Walls, bounce_times, center_at
 
@@ -77,7 +77,7 @@ def closest_passes(episode: Episode) -> list[Pass]:
 
 def _closest_within(episode: Episode, index: int, step: int) -> Pass:
     """Search one step, in which robot and obstacle move uniformly but for bounces."""
-    a, b = episode.ticks[step], episode.ticks[min(step + 1, len(episode.ticks) - 1)]
+    a, b = steps_driven(episode)[step]
     (ax, ay), (bx, by) = a.pose.position, b.pose.position
     ta, tb = episode.time_s(a.stamp_ns), episode.time_s(b.stamp_ns)
     moments = (

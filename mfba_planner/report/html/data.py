@@ -16,7 +16,8 @@ import numpy as np
 from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Episode
 from mfba_planner.core.gaps import gap_heading
-from mfba_planner.core.metrics import evaluate, within_range
+from mfba_planner.core.jump import carried_off
+from mfba_planner.core.metrics import evaluate, tick_clearances, within_range
 from mfba_planner.core.motion import Motion
 from mfba_planner.core.options import walk
 from mfba_planner.core.planner import Mode, PlannerParams
@@ -134,11 +135,14 @@ def _obstacles(episode: Episode) -> list[Plain]:
 
 
 def clearances(episode: Episode) -> list[float]:
-    """The smallest gap (m) from each tick to the next, as metrics.tick_clearances; then inf."""
-    times_s = np.array([episode.time_s(tick.stamp_ns) for tick in episode.ticks])
-    positions_m = np.array([tick.pose.position for tick in episode.ticks]).T
-    gaps = Motion(episode.scenario).steps(times_s, positions_m).gap_m
-    return [*gaps.min(axis=1, initial=math.inf).tolist(), math.inf]
+    """The smallest gap (m) from each tick to the next, over which Result takes its least.
+
+    inf after the last tick, and while the robot is carried off.
+    """
+    gaps = [min(row, default=math.inf) for row in tick_clearances(episode)]
+    afterwards = episode.ticks[1:]
+    driven = [math.inf if carried_off(b.reason) else gap for gap, b in zip(gaps, afterwards)]
+    return [*driven, math.inf]
 
 
 def speeds(episode: Episode) -> list[float]:
