@@ -176,6 +176,16 @@ def test_blocked_it_waits_backs_off_replans_and_gives_up_until_there_is_a_goal()
     assert guarded.plan(seen(10, free)).mode is Mode.PATH_GENERATION
 
 
+def test_who_is_carried_off_has_not_been_blocked_before() -> None:
+    params = override(PlannerParams(), {"recovery.enabled": True, "recovery.attempts": 1})
+    guarded = brain(params, seed=1)
+    assert drive(guarded, 9)[-1].reason.startswith("gave up")
+    there = guarded.plan(seen(9, x=5.0))
+    assert there.reason.startswith("carried off 5 m in 1 s")
+    assert there.reason.endswith("every gap is closed; waiting for 0.0 s")
+    assert guarded.phase is Phase.WAIT
+
+
 def test_what_cannot_be_trusted_moves_nobody_in_any_phase() -> None:
     params = override(PlannerParams(), {"recovery.enabled": True})
     guarded = brain(params, seed=1)

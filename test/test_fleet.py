@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner import cli
+from mfba_planner.core.caution import CautionParams
 from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Outcome, World, run
 from mfba_planner.core.errors import BagError, ConfigError
@@ -211,6 +212,14 @@ def test_a_way_goes_through_its_poses(stretches: list[tuple[float, float, int]])
     # What moves by less than can be told from rounding may count as several stretches.
     if all(v == 0.0 or abs(v) > 1e-3 for vx, vy, _ in stretches for v in (vx, vy)):
         assert len(obstacle.turns) <= len(stretches) + 1
+
+
+def test_options_of_the_planner_count_in_a_fleet_without_a_brain_of_its_own() -> None:
+    params = PlannerParams(caution=CautionParams(slow_within_m=0.8))
+    own = run_fleet(head_on(), planner=params, seed=3)
+    named = simulate_fleet(head_on(), planner=params, sensor=SensorParams(), seed=3)
+    assert [e.ticks for e in own] == [e.ticks for e in named]
+    assert any("% speed so near" in tick.reason for e in own for tick in e.ticks)
 
 
 def test_scenario_files_name_robots_and_come_back_the_same() -> None:

@@ -11,17 +11,15 @@ from enum import Enum
 from .drive import Speeds, command, obey
 from .errors import ConfigError, InputError
 from .geometry import Point, Pose2D, distance
-from .guarded import Guarded
+from .guarded import algorithm_1
 from .instruments import Instruments, Reading
 from .motion import Motion
 from .nearby import Found, Nearby
 from .planner import (
     NANO,
     Decision,
-    Method,
     Observation,
     PathPlanner,
-    Planner,
     PlannerParams,
     Refused,
     observe,
@@ -138,7 +136,7 @@ class World:
         """How the run has ended by the present tick, None while it goes on."""
         # Who sees itself there need not be: the robot stops where its odometry says so.
         doubt_m = DOUBTS * self.scenario.robot.noise.odom_m
-        if distance(self.pose.position, self.scenario.goal_m) <= self.goal_tolerance_m + doubt_m:
+        if self.left_m <= self.goal_tolerance_m + doubt_m:
             return Outcome.GOAL_REACHED
         if self.time_s >= self.scenario.time_limit_s:
             return Outcome.TIME_LIMIT
@@ -233,12 +231,7 @@ def run(
     planner = planner or PlannerParams()
     sensor = sensor or SensorParams()
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
-    if brain is None:
-        if planner.method is not Method.PAPER:
-            raise ConfigError(
-                f"method={planner.method.value}: not the core's own; use planners.method.simulate"
-            )
-        brain = Guarded(Planner(planner, seed))
+    brain = brain or algorithm_1(planner, seed)
     ticks, truth = [brain.plan(look(world, sensor))], [world.pose]
     while (outcome := world.outcome()) is None and go_on(world):
         world.step(command(ticks[-1], scenario.robot, planner.tick_ns))

@@ -12,9 +12,10 @@ import numpy as np
 from .drive import command
 from .episode import Episode, Look, Outcome, World, look
 from .errors import ConfigError
-from .geometry import Point, Pose2D, bearing, distance
+from .geometry import Point, Pose2D, bearing, distance, towards
+from .guarded import algorithm_1
 from .nearby import Found
-from .planner import NANO, Decision, Method, PathPlanner, Planner, PlannerParams
+from .planner import NANO, Decision, PathPlanner, PlannerParams
 from .sensing import SensorParams
 from .world import Obstacle, Scenario, Turn
 
@@ -159,7 +160,7 @@ def way(poses: Sequence[Pose2D], tick_ns: int, radius_m: float) -> Obstacle:
         speed, heading = distance((x, y), b.position) / dt, bearing((x, y), b.position)
         if distance(a.position, b.position) <= DRIFT_M:
             speed = heading = 0.0
-        vx, vy = _velocity(speed, heading)
+        vx, vy = towards((0.0, 0.0), heading, speed)
         stretches.append((tick, speed, heading))
     (_, speed, heading), *turns = stretches or [(0, 0.0, 0.0)]
     if len(poses) > 1 and stretches[-1][1] > 0.0:
@@ -174,12 +175,6 @@ def way(poses: Sequence[Pose2D], tick_ns: int, radius_m: float) -> Obstacle:
             for tick, speed, heading in turns
         ),
     )
-
-
-def _velocity(speed: float, heading: float) -> Point:
-    return Obstacle(
-        center_m=(0.0, 0.0), radius_m=1.0, speed_mps=speed, heading_rad=heading
-    ).velocity
 
 
 def run_fleet(
@@ -198,11 +193,7 @@ def run_fleet(
     the scenario's own, then the other robots as they went.
     """
     planner, sensor = planner or PlannerParams(), sensor or SensorParams()
-    if brain is None and planner.method is not Method.PAPER:
-        raise ConfigError(
-            f"method={planner.method.value}: not the core's own; use planners.method"
-        )
-    make = brain or (lambda seed: Planner(planner, seed))
+    make = brain or (lambda seed: algorithm_1(planner, seed))
     fleet = Fleet(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
     brains = [make(place.seed) for place in fleet.places]
     ticks: list[list[Decision]] = [[] for _ in brains]

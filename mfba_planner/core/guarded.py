@@ -7,9 +7,19 @@ from dataclasses import replace
 from typing import Protocol
 
 from .caution import allowed_share
+from .errors import ConfigError
 from .geometry import Point, bearing, distance, towards
 from .jump import carried_off
-from .planner import NANO, Decision, Mode, Observation, PathPlanner, PlannerParams
+from .planner import (
+    NANO,
+    Decision,
+    Method,
+    Mode,
+    Observation,
+    PathPlanner,
+    Planner,
+    PlannerParams,
+)
 from .recovery import Phase, Recovery, advance, most_room
 
 TRAIL_M = 0.05  # so far back is where the robot came from
@@ -66,11 +76,8 @@ class Guarded:
 
     def plan(self, obs: Observation) -> Decision:
         """Answer one observation."""
-        if obs.goal != self._goal:
-            self._forget()
-            self._goal = obs.goal
         decision = self.inner.plan(obs)
-        if carried_off(decision.reason):
+        if obs.goal != self._goal or carried_off(decision.reason):
             self._forget()
             self._goal = obs.goal
         if self.params.recovery.enabled:
@@ -127,6 +134,13 @@ class Guarded:
             ),
             candidates=(),
         )
+
+
+def algorithm_1(params: PlannerParams, seed: int) -> Guarded:
+    """The paper's planner. Raises ConfigError where params name another one, or for the seed."""
+    if params.method is not Method.PAPER:
+        raise ConfigError(f"method={params.method.value}: not the core's own; use planners.method")
+    return Guarded(Planner(params, seed))
 
 
 def _standing(decision: Decision, reason: str) -> Decision:

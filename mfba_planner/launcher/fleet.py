@@ -11,7 +11,7 @@ from ..recording.fleet import read_fleet
 from .attempt import Attempt
 
 
-def conclude_fleet(attempt: Attempt, _: object = None, *, failure: str = "") -> None:
+def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
     """Print the table, write NAME.json for each robot and run.png.
 
     Raises MfbaError where the run, otherwise fine, was no success, and BagError where the bag

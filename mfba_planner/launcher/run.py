@@ -37,21 +37,23 @@ def run(order: Order) -> int:
         finally:
             if not attempt.has_begun:
                 attempt.directory.discard()
-    fleet = bool(order.config.scenario.robots)
     if failure is None:
-        (conclude_fleet if fleet else _conclude)(attempt, episode)
+        _conclude(attempt, episode)
         return 0
     if attempt.has_begun:
         with suppress(BagError):  # nothing to tell of; the failure is told below
-            if fleet:
-                conclude_fleet(attempt, failure=str(failure))
-            else:
-                conclude(attempt, episode, str(failure))
+            _conclude(attempt, episode, str(failure))
     return _fail(failure, attempt)
 
 
-def _conclude(attempt: Attempt, episode: Episode | None) -> None:
-    conclusion = conclude(attempt, episode)
+def _conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> None:
+    """Leave what is left of a run; judge and show it unless it failed."""
+    if attempt.order.config.scenario.robots:
+        conclude_fleet(attempt, failure)
+        return
+    conclusion = conclude(attempt, episode, failure)
+    if failure:
+        return
     if attempt.order.view:
         from ..report.viewer import show
 

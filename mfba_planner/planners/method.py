@@ -7,18 +7,19 @@ from collections.abc import Callable
 
 from ..core.episode import Episode, World, look, look_at_scan, run
 from ..core.fleet import Fleet, run_fleet
-from ..core.guarded import Guarded
-from ..core.planner import Method, Planner, PlannerParams
+from ..core.guarded import Guarded, algorithm_1
+from ..core.planner import Method, PlannerParams
 from ..core.sensing import SensorParams
 from ..core.world import Scenario
-from .predictive import Predictive
 
 
 def brain(params: PlannerParams, sensor: SensorParams | None = None, seed: int = 0) -> Guarded:
     """A fresh planner of params.method. Raises ConfigError for a negative seed."""
     if params.method is Method.PREDICTIVE:
+        from .predictive import Predictive  # much to load, and mostly not asked for
+
         return Guarded(Predictive(params, sensor or SensorParams(), seed))
-    return Guarded(Planner(params, seed))
+    return algorithm_1(params, seed)
 
 
 def simulate(
