@@ -112,11 +112,6 @@ class _Scenario(_Strict):
 
     def build(self) -> Scenario:
         walls = self.walls
-        if walls and not all(a < b for a, b in zip(walls.lower_m, walls.upper_m)):
-            raise ConfigError(
-                f"walls {list(walls.lower_m)} to {list(walls.upper_m)}: "
-                "give lower_m below upper_m on both axes"
-            )
         return Scenario(
             name=self.name,
             description=self.description,

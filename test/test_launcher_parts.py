@@ -24,8 +24,9 @@ from mfba_planner.launcher.child import Child
 from mfba_planner.launcher.crew import Crew, parameters_yaml
 from mfba_planner.launcher.directory import RunDirectory
 from mfba_planner.launcher.domain import DOMAINS, claim_domain, private_domain, require_network
-from mfba_planner.launcher.options import option_rows, read_order
+from mfba_planner.launcher.options import read_order
 from mfba_planner.launcher.screen import Screen
+from mfba_planner.launcher.settings import option_rows
 from mfba_planner.launcher.stop import StoppedError, StopRequest
 from mfba_planner.paper import readings
 from mfba_planner.run_config import Driver, RunConfig, node_parameters

@@ -12,8 +12,7 @@ from ..core.errors import BagError, ConfigError
 from ..core.geometry import Point
 from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
-from ..launcher.options import with_settings
-from ..node_settings import VirtualSensorSettings
+from ..launcher.settings import with_settings
 from ..verification.check import Report
 from ..verification.scratch import FromScratch, Robot, decide_from_scratch
 
@@ -68,6 +67,8 @@ def report(bag: Path, found: argparse.Namespace) -> int:
 
 
 def _robot(found: argparse.Namespace) -> Robot:
+    from ..node_settings import VirtualSensorSettings  # a bag of ours does without
+
     planner, sensor = with_settings(PlannerParams(), SensorParams(), found.settings)
     told = {"robot_radius_m": found.robot_radius, "scan_yaw": found.scan_yaw}
     given = VirtualSensorSettings(**{k: v for k, v in told.items() if v is not None})

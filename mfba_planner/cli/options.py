@@ -8,7 +8,7 @@ from typing import Any
 
 from ..arguments import Parser
 from ..core.options import Spec
-from ..launcher.options import option_rows
+from ..launcher.settings import option_rows
 
 
 def main(args: list[str]) -> int:

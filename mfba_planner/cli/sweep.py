@@ -15,7 +15,7 @@ from ..arguments import Parser
 from ..core.options import Scalar, flatten
 from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
-from ..launcher.options import add_set_argument, with_settings
+from ..launcher.settings import add_set_argument, with_settings
 from ..outputs import new_run_directory, write_same
 from ..planners.registry import PLANNERS
 from ..study.compute import check_workers

@@ -9,7 +9,7 @@ from pathlib import Path
 from ..arguments import Parser
 from ..core.episode import Episode
 from ..core.errors import BagError, ConfigError
-from ..launcher.options import add_set_argument, with_settings
+from ..launcher.settings import add_set_argument, with_settings
 from ..outputs import bag_in
 from ..planners.method import simulate
 from ..recording.reader import BagReader

@@ -59,6 +59,14 @@ class Walls:
     lower_m: Point
     upper_m: Point
 
+    def __post_init__(self) -> None:
+        """Raise ConfigError unless there is room between them."""
+        if not all(a < b for a, b in zip(self.lower_m, self.upper_m)):
+            raise ConfigError(
+                f"walls {list(self.lower_m)} to {list(self.upper_m)}: "
+                "give lower_m below upper_m on both axes"
+            )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kidnapping:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,14 +12,14 @@ from typing import Any
 from ..arguments import Parser
 from ..core.bat import Algorithm
 from ..core.errors import ConfigError
-from ..core.options import did_you_mean, override, walk
-from ..core.planner import Method, PlannerParams
-from ..core.robot import Robot
+from ..core.options import override
+from ..core.planner import Method
 from ..core.sensing import SensorParams
 from ..paper import readings
 from ..planners.predictive import preset
 from ..run_config import NODES, Driver, RunConfig
 from ..scenarios import load_scenario
+from .settings import add_set_argument, with_robot_settings, with_settings
 
 RECORDER = "recorder"
 TIMEOUT_S = 600.0
@@ -133,19 +132,6 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
     add_set_argument(parser)
 
 
-def add_set_argument(parser: argparse.ArgumentParser) -> None:
-    """--set, as often as wanted."""
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="settings",
-        help="an option of planner, sensor or robot, such as planner.bat.population=30; "
-        "`mfba options` lists them",
-    )
-
-
 def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
     """The RunConfig that add_world_arguments' values describe; later ones override earlier."""
     planner = readings.planner(found.reading)
@@ -156,10 +142,8 @@ def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
     if found.planner == Method.PREDICTIVE.value:
         planner = preset(replace(planner, method=Method.PREDICTIVE))
     scenario = load_scenario(found.scenario)
-    of_robot = [text for text in found.settings if text.startswith("robot.")]
-    rest = [text for text in found.settings if text not in of_robot]
-    planner, sensor = with_settings(planner, SensorParams(), rest)
-    robot = override(scenario.robot, _below("robot", dict(map(_setting, of_robot))))
+    robot, others = with_robot_settings(scenario.robot, found.settings)
+    planner, sensor = with_settings(planner, SensorParams(), others)
     return RunConfig(
         scenario=replace(scenario, robot=robot),
         planner=planner,
@@ -167,57 +151,6 @@ def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
         seed=found.seed,
         **more,
     )
-
-
-def with_settings(
-    planner: PlannerParams, sensor: SensorParams, settings: list[str]
-) -> tuple[PlannerParams, SensorParams]:
-    """Both with NAME=VALUE changes of --set; ConfigError for what cannot be set so."""
-    changes = dict(map(_setting, settings))
-    for name in _below("robot", changes):
-        raise ConfigError(f"--set robot.{name}: the scenario says that here; leave it out")
-    return (
-        override(planner, _below("planner", changes)),
-        override(sensor, _below("sensor", changes)),
-    )
-
-
-def option_rows() -> Iterable[tuple[str, Any, Any]]:
-    """(name for --set, default, Spec) of every option."""
-    for group, defaults in (
-        ("planner", PlannerParams()),
-        ("sensor", SensorParams()),
-        ("robot", Robot()),
-    ):
-        for name, value, item in walk(defaults):
-            yield f"{group}.{name}", value, item.metadata["spec"]
-
-
-def _setting(text: str) -> tuple[str, Any]:
-    name, found, value = text.partition("=")
-    if not found:
-        raise ConfigError(f"--set {text}: no value; give NAME=VALUE")
-    known = [row[0] for row in option_rows()]
-    if name not in known:
-        raise ConfigError(f"--set {name}: unknown option; {did_you_mean(name, known)}")
-    return name, _literal(value)
-
-
-def _literal(text: str) -> Any:
-    """The number or truth value that text shows, otherwise text itself."""
-    if text in ("true", "false"):
-        return text == "true"
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
-
-
-def _below(group: str, changes: dict[str, Any]) -> dict[str, Any]:
-    head = f"{group}."
-    return {name[len(head) :]: value for name, value in changes.items() if name.startswith(head)}
 
 
 def _order(found: argparse.Namespace) -> Order:

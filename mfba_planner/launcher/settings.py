@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`--set NAME=VALUE`: what can be changed by name, and to what."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from typing import Any
+
+from ..core.errors import ConfigError
+from ..core.options import did_you_mean, override, walk
+from ..core.planner import PlannerParams
+from ..core.robot import Robot
+from ..core.sensing import SensorParams
+
+
+def add_set_argument(parser: argparse.ArgumentParser) -> None:
+    """--set, as often as wanted."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help="an option of planner, sensor or robot, such as planner.bat.population=30; "
+        "`mfba options` lists them",
+    )
+
+
+def with_settings(
+    planner: PlannerParams, sensor: SensorParams, settings: list[str]
+) -> tuple[PlannerParams, SensorParams]:
+    """Both with NAME=VALUE changes of --set; ConfigError for what cannot be set so."""
+    changes = dict(map(_setting, settings))
+    for name in _below("robot", changes):
+        raise ConfigError(f"--set robot.{name}: the scenario says that here; leave it out")
+    return (
+        override(planner, _below("planner", changes)),
+        override(sensor, _below("sensor", changes)),
+    )
+
+
+def with_robot_settings(robot: Robot, settings: list[str]) -> tuple[Robot, list[str]]:
+    """The robot with the robot.NAME=VALUE changes of --set, and the other settings."""
+    of_robot = [text for text in settings if text.startswith("robot.")]
+    others = [text for text in settings if text not in of_robot]
+    return override(robot, _below("robot", dict(map(_setting, of_robot)))), others
+
+
+def option_rows() -> Iterable[tuple[str, Any, Any]]:
+    """(name for --set, default, Spec) of every option."""
+    for group, defaults in (
+        ("planner", PlannerParams()),
+        ("sensor", SensorParams()),
+        ("robot", Robot()),
+    ):
+        for name, value, item in walk(defaults):
+            yield f"{group}.{name}", value, item.metadata["spec"]
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, found, value = text.partition("=")
+    if not found:
+        raise ConfigError(f"--set {text}: no value; give NAME=VALUE")
+    known = [row[0] for row in option_rows()]
+    if name not in known:
+        raise ConfigError(f"--set {name}: unknown option; {did_you_mean(name, known)}")
+    return name, _literal(value)
+
+
+def _literal(text: str) -> Any:
+    """The number or truth value that text shows, otherwise text itself."""
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _below(group: str, changes: dict[str, Any]) -> dict[str, Any]:
+    head = f"{group}."
+    return {name[len(head) :]: value for name, value in changes.items() if name.startswith(head)}
