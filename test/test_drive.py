@@ -56,6 +56,15 @@ def test_ahead_it_drives_and_aside_it_turns_first() -> None:
     assert track(decision((0.0, 0.0)), BASE, TICK_NS) == (0.0, 0.0)
 
 
+def test_half_as_far_aside_as_it_turns_first_it_drives_at_half_the_speed() -> None:
+    u = 0.5  # m/s, slow enough for every limit
+    wanted = (u * math.cos(0.4), u * math.sin(0.4))
+    told = track(decision(wanted), replace(BASE, turn_first_rad=0.8), TICK_NS)
+    assert told.v == pytest.approx(0.5 * u)
+    a, t = BASE.max_turn_accel_radps2, 0.1
+    assert told.omega == pytest.approx(a * (math.sqrt(t * t + 2.0 * 0.4 / a) - t))
+
+
 def test_behind_it_reverses_only_where_it_may() -> None:
     back = track(decision((-0.5, 0.05)), BASE, TICK_NS)
     assert back.v < 0.0

@@ -214,6 +214,17 @@ def test_a_way_goes_through_its_poses(stretches: list[tuple[float, float, int]])
         assert len(obstacle.turns) <= len(stretches) + 1
 
 
+def test_the_others_are_seen_and_remembered_in_the_scenario_s_order() -> None:
+    scenario = load_scenario("swap")
+    fleet = Fleet(scenario, TICK_NS, 0.02)
+    starts = [member.start_m for member in scenario.robots]
+    without_the_third = starts[:2] + starts[3:]
+    assert fleet.places[2].centers() == without_the_third
+    assert [center for center, _ in fleet.places[2].near(1.0)[1]] == without_the_third
+    third = run_fleet(scenario, seed=0, go_on=lambda fleet: fleet.tick < 3)[2]
+    assert [o.center_m for o in third.scenario.obstacles] == without_the_third
+
+
 def test_options_of_the_planner_count_in_a_fleet_without_a_brain_of_its_own() -> None:
     params = PlannerParams(caution=CautionParams(slow_within_m=0.8))
     own = run_fleet(head_on(), planner=params, seed=3)

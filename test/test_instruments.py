@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core.episode import World, look, sense
+from mfba_planner.core.episode import Outcome, World, look, sense
 from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.instruments import Instruments
 from mfba_planner.core.lidar import cast_walls, rays, scan_at
@@ -34,6 +34,14 @@ SENSOR = SensorParams(sensing_range_m=2.0)
 
 def seen(scan: Any, k: int) -> float:
     return float(scan.ranges_m[k])
+
+
+@pytest.mark.parametrize(("left_m", "there"), [(0.49, True), (0.51, False)])
+def test_who_errs_may_miss_the_goal_by_four_deviations_more(left_m: float, there: bool) -> None:
+    scenario = Scenario(
+        name="x", start_m=(0.0, 0.0), goal_m=(left_m, 0.0), robot=Robot(noise=Noise(odom_m=0.1))
+    )
+    assert World(scenario, TICK_NS, 0.1).outcome() is (Outcome.GOAL_REACHED if there else None)
 
 
 def test_ranges_are_those_of_real_surfaces() -> None:
