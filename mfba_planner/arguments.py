@@ -25,6 +25,17 @@ class Parser(argparse.ArgumentParser):
         """A bag to read: outputs.bag_in finds it in a run directory."""
         self.add_argument(name, type=Path, metavar="BAG", help="run or bag directory, or .mcap")
 
+    def add_robots(self) -> None:
+        """Which robots of a fleet's bag are meant; recording.robots.chosen finds them."""
+        self.add_argument(
+            "--robot",
+            dest="robots",
+            action="append",
+            default=[],
+            metavar="NAME",
+            help="of a fleet's bag this robot only (may be given several times)",
+        )
+
     def parse(self, args: Sequence[str]) -> argparse.Namespace:
         """Parse all of args; ConfigError for whatever is unknown, missing or refused."""
         found, unknown = self.parse_known_args(args)

@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+import argparse
+
 from ..arguments import Parser
 from ..core.digest import digest
 from ..core.episode import Episode
+from ..core.errors import BagError
 from ..core.metrics import evaluate
 from ..core.options import flatten
 from ..outputs import bag_in
-from ..recording.episode import read_episode
+from ..recording.episode import read_recording
+from ..recording.robots import of_robot
 from ..report.table import comparison_text
 from ..verification.compare import first_divergence, side_by_side
 
@@ -19,19 +23,34 @@ def main(args: list[str]) -> int:
     parser = Parser(prog="mfba diff", description="Say where the decisions of two bags differ.")
     for name in ("left", "right"):
         parser.add_bag(name)
+    parser.add_robots()
     given = parser.parse(args)
-    left, right = (read_episode(bag_in(path)) for path in (given.left, given.right))
+    left, right = (
+        read_recording(bag_in(path), given.robots).episodes for path in (given.left, given.right)
+    )
+    if left.keys() != right.keys():
+        raise BagError(
+            f"{given.right}: holds other robots than {given.left}; name one that both have with "
+            "--robot"
+        )
+    differ = [_compare(given, robot, left[robot], right[robot]) for robot in left]
+    return int(any(differ))
+
+
+def _compare(given: argparse.Namespace, robot: str, left: Episode, right: Episode) -> bool:
+    """Print how two runs of a robot differ; whether they do."""
     found = first_divergence(left.ticks, right.ticks)
     if found is None:
-        print(f"identical, {len(left.ticks)} decisions, digest {digest(left.ticks)}")
-        return 0
+        said = f"identical, {len(left.ticks)} decisions, digest {digest(left.ticks)}"
+        print(of_robot(robot, said))
+        return False
     for name, a, b in _settings(left, right):
-        print(f"{name}: {a} against {b}")
+        print(of_robot(robot, f"{name}: {a} against {b}"))
     names = (str(given.left), str(given.right))
     print(comparison_text((names[0], evaluate(left)), (names[1], evaluate(right))))
-    print(f"first difference at tick {found.tick}:")
+    print(of_robot(robot, f"first difference at tick {found.tick}:"))
     print("\n".join(side_by_side(found, *names)))
-    return 1
+    return True
 
 
 def _settings(left: Episode, right: Episode) -> list[tuple[str, object, object]]:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from ..arguments import Parser
 from ..outputs import bag_in
-from ..recording.episode import summarize
+from ..recording.episode import summaries
+from ..recording.robots import ALONE, chosen
 from ..report.result import read_result
 
 
@@ -16,17 +17,22 @@ def main(args: list[str]) -> int:
     parser = Parser(
         prog="mfba digest",
         description="Print the decision digest of bags or results: equal digests mean equal "
-        "decisions, bit for bit. docs/determinism.md describes it.",
+        "decisions, bit for bit. Of a fleet's bag there is one for each robot. "
+        "docs/determinism.md describes it.",
     )
     parser.add_argument(
         "paths", type=Path, nargs="+", metavar="BAG|RESULT", help="bag, run directory or result"
     )
-    for path in parser.parse(args).paths:
-        print(f"{_digest(path)}  {path}")
+    parser.add_robots()
+    found = parser.parse(args)
+    for path in found.paths:
+        for robot, digest in _digests(path, found.robots).items():
+            print(f"{digest}  {path} {robot}".rstrip())
     return 0
 
 
-def _digest(path: Path) -> str:
+def _digests(path: Path, robots: list[str]) -> dict[str, str]:
     if path.suffix == ".json":
-        return str(read_result(path)["digest"])
-    return summarize(bag_in(path))[2]
+        chosen(path, [ALONE], robots)
+        return {ALONE: str(read_result(path)["digest"])}
+    return {name: run.digest for name, run in summaries(bag_in(path), robots).items()}

@@ -13,7 +13,9 @@ from typing import Any, BinaryIO
 from ..arguments import Parser
 from ..core.errors import BagError, ConfigError
 from ..outputs import bag_in, new_file
+from ..recording.decisions import deciders
 from ..recording.reader import BagReader
+from ..recording.robots import chosen
 from ..recording.table import COLUMNS, Row, read_rows
 
 BATCH = 5000  # rows that are held at a time
@@ -24,18 +26,20 @@ def main(args: list[str]) -> int:
     lines = [f"  {name:<12} {meaning}" for name, (_, meaning) in COLUMNS.items()]
     parser = Parser(
         prog="mfba export",
-        description="Write a bag's ticks and decisions as one table, a row per decision.",
+        description="Write a bag's ticks and decisions as one table, a row per decision; "
+        "of a fleet's bag with the robot's name.",
         epilog="columns:\n" + "\n".join([*lines, "  range_1 ...  range of each sector, m"]),
     )
     parser.add_bag()
     parser.add_argument("table", type=Path, metavar="FILE", help="a .csv or .parquet to create")
+    parser.add_robots()
     found = parser.parse(args)
     writers = {".csv": _write_csv, ".parquet": _write_parquet}
     write = writers.get(found.table.suffix)
     if write is None:
         raise ConfigError(f"{found.table}: unknown kind of table; give a name in .csv or .parquet")
     with BagReader(bag_in(found.bag)) as reader:
-        rows = read_rows(reader)
+        rows = read_rows(reader, chosen(reader.path, deciders(reader), found.robots))
         first = next(rows, None)
         if first is None:
             raise BagError(f"{found.bag}: holds no decision to export; give another bag")

@@ -10,7 +10,7 @@ from ..core.episode import Episode, Outcome
 from ..core.errors import ConfigError, MfbaError
 from ..core.metrics import Result, evaluate
 from ..planners.method import simulate_fleet
-from ..report.fleet import fleet_text, why_no_success
+from ..report.roster import fleet_text, why_no_success
 from ..run_config import RunConfig
 
 _SEED_HEAD = "    seed  at the goal   longest     last  clearance  collisions"

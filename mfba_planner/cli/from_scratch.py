@@ -13,10 +13,12 @@ from ..core.geometry import Point
 from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
 from ..launcher.settings import with_settings
+from ..recording.robots import ALONE, of_robot
 from ..verification.check import Report
 from ..verification.scratch import FromScratch, Robot, decide_from_scratch
 
 SHOWN = 10  # faults; more of them say nothing new
+_OURS = {"closed_loop": "--closed-loop", "picture": "--picture", "robots": "--robot"}
 _OWN = ("goal", "seed", "robot_radius", "scan_yaw", "scan", "odom")
 
 
@@ -48,11 +50,11 @@ def refuse_arguments(bag: Path, found: argparse.Namespace) -> None:
 
 def report(bag: Path, found: argparse.Namespace) -> int:
     """Decide from scratch and print what there is to say; raises BagError for faults."""
-    for name in ("closed_loop", "picture"):
+    for name, option in _OURS.items():
         if getattr(found, name):
             raise ConfigError(
-                f"--{name.replace('_', '-')}: {bag} is not a recording of ours, so there is no "
-                "world to simulate; leave it out"
+                f"{option}: {bag} is not a recording of ours, so there is no world to simulate; "
+                "leave it out"
             )
     result = decide_from_scratch(bag, _robot(found))
     show_remarks(result)
@@ -92,11 +94,11 @@ def _goal(given: list[float] | None) -> Point | None:
     return (given[0], given[1])
 
 
-def show_remarks(report: Report | FromScratch) -> None:
+def show_remarks(report: Report | FromScratch, robot: str = ALONE) -> None:
     """Notes, then faults, not too many of them."""
     for note in report.notes:
-        print(f"note: {note}")
+        print(of_robot(robot, f"note: {note}"))
     for fault in report.faults[:SHOWN]:
-        print(f"fault: {fault}")
+        print(of_robot(robot, f"fault: {fault}"))
     if len(report.faults) > SHOWN:
-        print(f"fault: ... and {len(report.faults) - SHOWN} more")
+        print(of_robot(robot, f"fault: ... and {len(report.faults) - SHOWN} more"))

@@ -8,8 +8,10 @@ from ..core.errors import BagError
 from ..launcher.conclusion import show
 from ..outputs import bag_in
 from ..recording.configuration import ATTACHMENT_NAME
-from ..recording.episode import summarize
+from ..recording.episode import Summary, summaries
 from ..recording.info import describe, format_info
+from ..recording.robots import ALONE
+from ..report.roster import fleet_text
 
 
 def main(args: list[str]) -> int:
@@ -21,11 +23,20 @@ def main(args: list[str]) -> int:
     print(format_info(info))
     if any(name == ATTACHMENT_NAME for name, _, _ in info.attachments):
         try:
-            episode, result, digest = summarize(bag, salvage=not info.complete)
+            runs = summaries(bag, salvage=not info.complete)
         except BagError as error:
             print(f"Run:         {error}")
         else:
             print()
-            show(episode, result)
-            print(f"digest {digest}")
+            _show(runs)
     return 0
+
+
+def _show(runs: dict[str, Summary]) -> None:
+    if ALONE in runs:
+        alone = runs[ALONE]
+        show(alone.episode, alone.result)
+    else:
+        print(fleet_text(list(runs), [run.result for run in runs.values()]), end="")
+    for robot, run in runs.items():
+        print(" ".join(filter(None, ("digest", robot, run.digest))))

@@ -7,7 +7,8 @@ import sys
 
 from ..core.errors import MfbaError
 from ..core.metrics import evaluate
-from ..recording.fleet import read_fleet
+from ..recording.episode import read_fleet
+from ..report.roster import fleet_text, why_no_success
 from .attempt import Attempt
 
 
@@ -17,7 +18,7 @@ def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
     Raises MfbaError where the run, otherwise fine, was no success, and BagError where the bag
     holds no decision of a robot or was not closed.
     """
-    from ..report.fleet import draw_fleet, fleet_text, why_no_success
+    from ..report.fleet import draw_fleet
     from ..report.result import result_to_dict, write_result
 
     directory, config = attempt.directory, attempt.order.config

@@ -4,89 +4,101 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 from ..core.errors import BagError, InputError
 from ..core.planner import Decision
 from ..core.sensing import Ranges
 from ..messages import decision, sector_ranges, stamp_ns
-from .reader import BagReader
+from .reader import BagReader, DecodedMessage
+from .robots import ALONE, below, heard_by_robot, of_robot
 
 SECTORS, DECISION = "/sectors", "/planner/decision"
 REMEMBERED = 10_000  # of sectors without a decision, of decisions without sectors, of stamps
 
-Answered = tuple[Decision, Any]
+
+class Answer(NamedTuple):
+    """A decision, the sectors message it answers, and who decided."""
+
+    decision: Decision
+    sectors: Any
+    robot: str = ALONE
 
 
-def require_decisions(reader: BagReader, namespace: str = "") -> None:
-    """Raise BagError for a bag that holds none, or not in this namespace."""
-    if DECISION not in reader.topics and not namespace and _robots(reader):
-        raise of_a_fleet(reader)
-    for topic in (namespace + SECTORS, namespace + DECISION):
+def deciders(reader: BagReader) -> list[str]:
+    """The robots whose decisions are in a bag, as its topics have them; ALONE where none is."""
+    found = [name for name in reader.topics if name.endswith(DECISION)]
+    names = [name.removesuffix(DECISION).lstrip("/") for name in found]
+    return [ALONE] if ALONE in names else names or [ALONE]
+
+
+def require_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> None:
+    """Raise BagError for a bag that holds none of one of these robots."""
+    for topic in (below(robot, topic) for robot in robots for topic in (SECTORS, DECISION)):
         if topic not in reader.topics or not reader.topics[topic].message_count:
             raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
 
 
-def of_a_fleet(reader: BagReader) -> BagError:
-    """What is said by whoever reads one robot's decisions only."""
-    return BagError(
-        f"{reader.path}: holds {_robots(reader)} robots, and a bag of one is read here; take "
-        "their results, or mfba_planner.recording.fleet.read_fleet"
-    )
-
-
-def _robots(reader: BagReader) -> int:
-    return sum(name.endswith(DECISION) for name in reader.topics)
-
-
-def stream_decisions(reader: BagReader, namespace: str = "") -> Iterator[Answered]:
-    """Yield (decision, its sectors message) in the order of the bag, one for each stamp.
-
-    namespace is a fleet's robot's, "/NAME".
+def stream_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> Iterator[Answer]:
+    """Yield each robot's decisions in the order of the bag, one for each stamp, in one pass.
 
     The first counts: a later one on its stamp only says that its inputs have become stale.
     Raises BagError for a bag without decisions, for one that is garbled, and where the sectors
     of a decision are missing.
     """
-    require_decisions(reader, namespace)
-    waiting: dict[str, OrderedDict[int, Any]] = {
-        namespace + SECTORS: OrderedDict(),
-        namespace + DECISION: OrderedDict(),
-    }
-    sectors, decisions = waiting.values()
-    answered: OrderedDict[int, None] = OrderedDict()
-    for message in reader.decoded(waiting):
+    require_decisions(reader, robots)
+    pairs = {robot: _Pairs() for robot in robots}
+    for robot, message in heard_by_robot(reader, robots, (SECTORS, DECISION)):
+        pair = pairs[robot].take(message)
+        if pair is not None:
+            said, sectors = pair
+            yield Answer(_decision(reader, said, sectors), sectors, robot)
+        if len(pairs[robot].decisions) > REMEMBERED:
+            break
+    for robot in robots:
+        for stamp in pairs[robot].decisions:
+            said = of_robot(robot, f"no sectors at stamp {stamp} ns; was the bag edited?")
+            raise BagError(f"{reader.path}: {said}")
+
+
+class _Pairs:
+    """Decisions and sectors of one robot that wait for each other, by stamp."""
+
+    def __init__(self) -> None:
+        self.sectors: OrderedDict[int, Any] = OrderedDict()
+        self.decisions: OrderedDict[int, Any] = OrderedDict()
+        self._answered: OrderedDict[int, None] = OrderedDict()
+        self._waiting = {SECTORS: self.sectors, DECISION: self.decisions}
+
+    def take(self, message: DecodedMessage) -> tuple[Any, Any] | None:
+        """Take the next message; (decision, sectors) where both have come now."""
         stamp = stamp_ns(message.message.header.stamp)
-        if stamp in answered:
-            continue
-        waiting[message.topic].setdefault(stamp, message.message)
-        if stamp in sectors and stamp in decisions:
-            answered[stamp] = None
-            seen = sectors.pop(stamp)
-            yield _decision(reader, decisions.pop(stamp), seen), seen
-        for kept in (sectors, answered):
+        if stamp in self._answered:
+            return None
+        self._waiting[message.topic].setdefault(stamp, message.message)
+        pair = None
+        if stamp in self.sectors and stamp in self.decisions:
+            self._answered[stamp] = None
+            pair = self.decisions.pop(stamp), self.sectors.pop(stamp)
+        for kept in (self.sectors, self._answered):
             if len(kept) > REMEMBERED:
                 kept.popitem(last=False)
-        if len(decisions) > REMEMBERED:
-            break
-    if decisions:
-        raise BagError(
-            f"{reader.path}: no sectors at stamp {next(iter(decisions))} ns; was the bag edited?"
-        )
+        return pair
 
 
-def rising_decisions(reader: BagReader) -> Iterator[Answered]:
-    """stream_decisions; raises BagError where a stamp goes back."""
-    last_ns = -1
-    for found, sectors in stream_decisions(reader):
-        if found.stamp_ns < last_ns:
+def rising_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> Iterator[Answer]:
+    """stream_decisions; raises BagError where a robot's stamp goes back."""
+    last_ns = dict.fromkeys(robots, -1)
+    for answer in stream_decisions(reader, robots):
+        stamp, before_ns = answer.decision.stamp_ns, last_ns[answer.robot]
+        if stamp < before_ns:
             raise BagError(
-                f"{reader.path}: the decision at stamp {found.stamp_ns} ns comes after that at "
-                f"{last_ns} ns; `mfba verify` says what else was edited"
+                f"{reader.path}: the decision at stamp {stamp} ns comes after that at "
+                f"{before_ns} ns; `mfba verify` says what else was edited"
             )
-        last_ns = found.stamp_ns
-        yield found, sectors
+        last_ns[answer.robot] = stamp
+        yield answer
 
 
 def ranges_seen(sectors: Any) -> Ranges:

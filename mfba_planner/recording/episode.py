@@ -1,148 +1,135 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a bag back to an Episode: what the planner saw and decided, tick by tick, without ROS."""
+"""From a bag back to Episodes: what a planner saw and decided, tick by tick, without ROS."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
-from mfba_planner.core.digest import Digest
-from mfba_planner.core.episode import Episode, Outcome, World
-from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.metrics import Result, Tally
-from mfba_planner.core.options import flatten, override
-from mfba_planner.core.planner import Decision, PlannerParams
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Scenario
-from mfba_planner.scenarios import load_scenario
-
-from ..core.errors import BagError, ConfigError, InputError
+from ..core.digest import Digest, digest
+from ..core.episode import Episode
+from ..core.errors import BagError, InputError
+from ..core.fleet import seen_by
+from ..core.geometry import Pose2D
+from ..core.metrics import Result, Tally, evaluate
+from ..core.planner import Decision
+from ..core.world import Scenario
 from ..messages import robot_pose, stamp_ns
-from .configuration import read_configuration
-from .decisions import of_a_fleet, rising_decisions, stream_decisions
+from .decisions import rising_decisions, stream_decisions
 from .reader import BagReader
-
-T = TypeVar("T")
+from .robots import ALONE, below, chosen, heard_by_robot
+from .setup import read_setup, read_setups
 
 TRUTH = "/ground_truth"
 
-# Options younger than the oldest bags: what they default to is what was done then.
-LATER = ("method", "jump_m", "scan_radius_m", "caution.", "recovery.")
+
+class Recording(NamedTuple):
+    """What a bag holds: the scenario as it was given, its seed, and an Episode by robot."""
+
+    scenario: Scenario
+    seed: int
+    episodes: dict[str, Episode]  # in the scenario's order; a robot alone is called ALONE
+
+
+def read_recording(
+    path: str | Path, robots: Sequence[str] = (), *, salvage: bool = False
+) -> Recording:
+    """The Episodes of a bag, of all its robots or those named; the others move as they went.
+
+    `salvage` also reads a bag that was never closed. Raises BagError for a bag without
+    configuration or without decisions, where a decision's inputs are missing, and for a robot
+    that is not there.
+    """
+    with BagReader(path, salvage=salvage) as reader:
+        scenario, seed, setups = read_setups(reader)
+        names = list(setups)
+        wanted = chosen(reader.path, names, robots)
+        ticks: dict[str, dict[int, Decision]] = {name: {} for name in names}
+        for found in stream_decisions(reader, names):
+            ticks[found.robot].setdefault(found.decision.stamp_ns, found.decision)
+        truth = _read_truth(reader, names)
+    episodes = {
+        name: setup.episode(tuple(said for _, said in sorted(ticks[name].items())), truth[name])
+        for name, setup in setups.items()
+    }
+    if scenario.robots:
+        poses = [e.truth or tuple(tick.pose for tick in e.ticks) for e in episodes.values()]
+        episodes = {
+            name: replace(
+                episode, scenario=seen_by(scenario, number, poses, episode.planner.tick_ns)
+            )
+            for number, (name, episode) in enumerate(episodes.items())
+            if name in wanted
+        }
+    return Recording(scenario, seed, episodes)
 
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
-    """The Episode a bag of ours holds; `salvage` also reads one that was never closed.
-
-    Raises BagError for a bag without configuration or without decisions, and where a
-    decision's inputs are missing.
-    """
+    """read_recording() of a bag of one robot; BagError for that of a fleet."""
     with BagReader(path, salvage=salvage) as reader:
-        setup = read_setup(reader)
-        ticks: dict[int, Decision] = {}
-        for found, _ in stream_decisions(reader):
-            ticks.setdefault(found.stamp_ns, found)
-        truth = read_truth(reader)
-    decisions = tuple(ticks[stamp] for stamp in sorted(ticks))
-    return setup.episode(decisions, truth)
+        read_setup(reader)
+    return read_recording(path, salvage=salvage).episodes[ALONE]
 
 
-def summarize(path: str | Path, *, salvage: bool = False) -> tuple[Episode, Result, str]:
-    """Of a bag of any length: an Episode with its last tick only, the Result, the digest.
+def read_fleet(path: str | Path, *, salvage: bool = False) -> tuple[Episode, ...]:
+    """read_recording() of a bag of several robots, in the scenario's order; BagError for one."""
+    episodes = read_recording(path, salvage=salvage).episodes
+    if ALONE in episodes:
+        raise BagError(f"{path}: holds one robot's run; read it with read_episode")
+    return tuple(episodes.values())
+
+
+class Summary(NamedTuple):
+    """A run in short: episode has its last tick only where the bag was streamed."""
+
+    episode: Episode
+    result: Result
+    digest: str
+
+
+def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
+    """The Summary of a bag of one robot, of any length.
 
     Streams; raises as read_episode does, and where the stamp of a decision goes back.
     """
     with BagReader(path, salvage=salvage) as reader:
-        setup, truth = read_setup(reader), read_truth(reader)
-        stream = (found for found, _ in rising_decisions(reader))
+        setup, truth = read_setup(reader), _read_truth(reader, [ALONE])[ALONE]
+        stream = (found.decision for found in rising_decisions(reader))
         first = next(stream)  # or it raises
         tally, hashed = Tally(setup.episode((first,))), Digest()
         for tick in chain([first], stream):
             tally.add(tick, truth.get(tick.stamp_ns))
             hashed.add(tick)
     episode = setup.episode((tick,), truth)
-    return episode, tally.result(episode.outcome), hashed.hexdigest()
+    return Summary(episode, tally.result(episode.outcome), hashed.hexdigest())
 
 
-class Setup(NamedTuple):
-    """What a bag's configuration says about the run."""
-
-    scenario: Scenario
-    sensor: SensorParams
-    planner: PlannerParams
-    seed: int
-    driver: str
-    lockstep: bool
-    odom_frame: str = ""  # that its inputs must be in; "": any
-
-    def episode(self, ticks: tuple[Decision, ...], truth: Mapping[int, Pose2D] = {}) -> Episode:
-        """The Episode of these decisions, at least one; truth is where the robot was, by stamp."""
-        true = tuple(truth.get(tick.stamp_ns, tick.pose) for tick in ticks) if truth else ()
-        last = true[-1] if true else ticks[-1].pose
-        return Episode(
-            scenario=self.scenario,
-            sensor=self.sensor,
-            planner=self.planner,
-            seed=self.seed,
-            driver=self.driver,
-            ticks=ticks,
-            outcome=_outcome(self.scenario, self.planner, ticks[-1].stamp_ns, last),
-            truth=true,
-        )
+def summaries(
+    path: str | Path, robots: Sequence[str] = (), *, salvage: bool = False
+) -> dict[str, Summary]:
+    """The Summary of each robot of a bag, or of those named; raises as read_recording does."""
+    with BagReader(path, salvage=salvage) as reader:
+        names = list(read_setups(reader).by_robot)
+        chosen(reader.path, names, robots)
+    if names == [ALONE]:
+        return {ALONE: summarize(path, salvage=salvage)}
+    # What the others did is part of what happened to each, so all has to be read first.
+    episodes = read_recording(path, robots, salvage=salvage).episodes
+    return {name: Summary(e, evaluate(e), digest(e.ticks)) for name, e in episodes.items()}
 
 
-def read_setup(reader: BagReader, *, fleet: bool = False, robot: str = "") -> Setup:
-    """The configuration a bag carries, checked; of a fleet's bag, that of a robot (the first).
-
-    Raises BagError, also where several robots were recorded and not asked for.
-    """
-    configuration = read_configuration(reader)
-    nodes = configuration.get("nodes", {})
-    try:
-        world = nodes["world_sim"]
-        scenario = load_scenario(world["scenario_json"])
-        if scenario.robots and not fleet:
-            raise of_a_fleet(reader)
-        above = f"{robot or scenario.robots[0].name}/" if scenario.robots else ""
-        planner, sensor = (nodes[above + name] for name in ("planner", "virtual_sensor"))
-        return Setup(
-            scenario=scenario,
-            sensor=_only(SensorParams(), sensor),
-            planner=_only(PlannerParams(), planner),
-            seed=planner["seed"],
-            driver=configuration["run"].get("driver", "by hand"),
-            lockstep=bool(planner["lockstep"]),
-            odom_frame=planner.get("odom_frame", ""),
-        )
-    except (ConfigError, InputError) as error:
-        raise BagError(f"{reader.path}: {error}") from None
-    except KeyError as error:
-        raise BagError(
-            f"{reader.path}: its configuration lacks {error}; record with `mfba run`"
-        ) from None
-
-
-def _only(defaults: T, values: dict[str, Any]) -> T:
-    """The options of one dataclass out of all parameters of a node."""
-    told = [name for name in flatten(defaults) if name in values or not name.startswith(LATER)]
-    return override(defaults, {name: values[name] for name in told})
-
-
-def read_truth(reader: BagReader, namespace: str = "") -> dict[int, Pose2D]:
-    """Where the robot really was, by stamp, in a bag that says so."""
-    topic = namespace + TRUTH
-    if topic not in reader.topics:
-        return {}
-    said = (message.message for message in reader.decoded([topic]))
-    try:
-        return {stamp_ns(odom.header.stamp): robot_pose(odom) for odom in said}
-    except InputError as error:
-        raise BagError(f"{reader.path}: {topic}: {error}") from None
-
-
-def _outcome(scenario: Scenario, params: PlannerParams, last_ns: int, last: Pose2D) -> Outcome:
-    """How the run ended, judged as the simulated world judges it."""
-    world = World(scenario, params.tick_ns, params.goal_tolerance_m)
-    world.tick, world.pose = last_ns // params.tick_ns - 1, last
-    return world.outcome() or Outcome.INTERRUPTED
+def _read_truth(reader: BagReader, robots: Sequence[str]) -> dict[str, dict[int, Pose2D]]:
+    """Where each robot really was, by stamp, in a bag that says so."""
+    found: dict[str, dict[int, Pose2D]] = {robot: {} for robot in robots}
+    if not any(below(robot, TRUTH) in reader.topics for robot in robots):
+        return found
+    for robot, message in heard_by_robot(reader, robots, [TRUTH]):
+        odom = message.message
+        try:
+            found[robot][stamp_ns(odom.header.stamp)] = robot_pose(odom)
+        except InputError as error:
+            raise BagError(f"{reader.path}: {below(robot, TRUTH)}: {error}") from None
+    return found

@@ -3,18 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Any
 
 from ..core.planner import NANO
 from ..messages import bits_text
-from .decisions import rising_decisions
+from .decisions import Answer, rising_decisions
 from .reader import BagReader
+from .robots import ALONE
 
 Row = dict[str, Any]
 
 # name: (type, meaning); the ranges of the sectors follow as range_1, range_2, ...
 COLUMNS: dict[str, tuple[type, str]] = {
+    "robot": (str, "whose row it is; of fleets only"),
     "stamp_ns": (int, "stamp of the tick, ns"),
     "time_s": (float, "time since the first row's stamp, s"),
     "mode": (str, "mode of the planner"),
@@ -34,24 +37,35 @@ COLUMNS: dict[str, tuple[type, str]] = {
 }
 
 
-def read_rows(reader: BagReader) -> Iterator[Row]:
-    """Yield the rows under rising stamps. Raises BagError as rising_decisions does."""
+def read_rows(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> Iterator[Row]:
+    """Yield the rows under rising stamps, those of a stamp in the order of robots.
+
+    Raises BagError as rising_decisions does.
+    """
     first_ns: int | None = None
-    for found, sectors in rising_decisions(reader):
-        first_ns = found.stamp_ns if first_ns is None else first_ns
-        goal = found.goal or (None, None)
-        yield {
-            "stamp_ns": found.stamp_ns,
-            "time_s": (found.stamp_ns - first_ns) * NANO,
-            "mode": found.mode.value,
-            "reason": found.reason,
-            **dict(zip(("x", "y", "yaw"), found.pose)),
-            "goal_x": goal[0],
-            "goal_y": goal[1],
-            **dict(zip(("waypoint_x", "waypoint_y"), found.waypoint)),
-            **dict(zip(("velocity_x", "velocity_y"), found.velocity)),
-            "gap": found.gap,
-            "vs": bits_text(found.vs),
-            "vg": bits_text(found.vg),
-            **{f"range_{number}": r for number, r in enumerate(sectors.ranges, start=1)},
-        }
+    answers = rising_decisions(reader, robots)
+    for stamp, found in groupby(answers, lambda answer: answer.decision.stamp_ns):
+        first_ns = stamp if first_ns is None else first_ns
+        for answer in sorted(found, key=lambda answer: robots.index(answer.robot)):
+            yield _row(answer, first_ns)
+
+
+def _row(answer: Answer, first_ns: int) -> Row:
+    found = answer.decision
+    goal = found.goal or (None, None)
+    return {
+        **({} if answer.robot == ALONE else {"robot": answer.robot}),
+        "stamp_ns": found.stamp_ns,
+        "time_s": (found.stamp_ns - first_ns) * NANO,
+        "mode": found.mode.value,
+        "reason": found.reason,
+        **dict(zip(("x", "y", "yaw"), found.pose)),
+        "goal_x": goal[0],
+        "goal_y": goal[1],
+        **dict(zip(("waypoint_x", "waypoint_y"), found.waypoint)),
+        **dict(zip(("velocity_x", "velocity_y"), found.velocity)),
+        "gap": found.gap,
+        "vs": bits_text(found.vs),
+        "vg": bits_text(found.vg),
+        **{f"range_{k}": r for k, r in enumerate(answer.sectors.ranges, start=1)},
+    }

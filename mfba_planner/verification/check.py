@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -27,9 +28,10 @@ from ..messages import (
 )
 from ..messages import decision as read_decision
 from ..planners.method import brain
-from ..recording.episode import Setup, read_setup
 from ..recording.integrity import check_data
 from ..recording.reader import BagReader
+from ..recording.robots import ALONE, chosen
+from ..recording.setup import Setup, read_setup, read_setups
 from .compare import Divergence, first_divergence
 from .evidence import (
     DECISION,
@@ -42,6 +44,7 @@ from .evidence import (
     VECTOR,
     Evidence,
     Tick,
+    collect,
     gather,
 )
 
@@ -72,14 +75,29 @@ class Report:
 
 
 def verify(path: str | Path) -> Report:
-    """Check a bag of ours. Raises BagError for one that cannot be checked at all."""
+    """Check a bag of one robot. Raises BagError for one that cannot be checked at all."""
+    with BagReader(path) as reader:
+        read_setup(reader)
+    return verify_each(path)[ALONE]
+
+
+def verify_each(path: str | Path, robots: Sequence[str] = ()) -> dict[str, Report]:
+    """Check a bag of ours: every robot's decisions, or those of the robots named.
+
+    Raises BagError for a bag that cannot be checked at all, and for a robot that is not there.
+    """
     with BagReader(path) as reader:
         for file in reader.file_paths:
             check_data(file)
-        setup = read_setup(reader)
+        setups = read_setups(reader).by_robot
+        names = chosen(reader.path, list(setups), robots)
+        messages = collect(reader, names)
+    found = {}
+    for name in names:
+        setup = setups[name]
         tick_ns = setup.planner.tick_ns if setup.lockstep else None
-        evidence = gather(reader, tick_ns, setup.odom_frame)
-    return _check(setup, evidence)
+        found[name] = _check(setup, gather(messages.pop(name), tick_ns, setup.odom_frame))
+    return found
 
 
 def _check(setup: Setup, evidence: Evidence) -> Report:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -11,12 +12,14 @@ from ..core.errors import InputError
 from ..core.geometry import Point
 from ..messages import goal_point, stamp_ns, waypoint_points
 from ..recording.decisions import DECISION, SECTORS, ranges_seen, require_decisions
-from ..recording.reader import BagReader
+from ..recording.reader import BagReader, DecodedMessage
+from ..recording.robots import heard_by_robot
 
 ODOM, OBSTACLES, VECTOR, SCAN = "/odom", "/obstacles", "/sensory_vector", "/scan"
 GOAL, WAYPOINTS = "/goal_pose", "/waypoints"
 STEP, TWIST = "/goal_step", "/cmd_vel"
 STAMPED = (ODOM, OBSTACLES, SECTORS, STEP, DECISION)
+HEARD = (*STAMPED, SCAN, VECTOR, TWIST)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -37,16 +40,26 @@ class Evidence:
     notes: list[str] = field(default_factory=list)
 
 
-def gather(reader: BagReader, tick_ns: int | None, frame: str = "") -> Evidence:
-    """Join a bag's messages; tick_ns is the duration of a tick, None where it is not fixed.
+def collect(reader: BagReader, robots: Sequence[str]) -> dict[str, list[DecodedMessage]]:
+    """All that speaks of each robot's ticks, in one pass.
 
-    frame is the one that goals must be in, "" for any.
     Raises BagError for a bag without decisions, and for one that cannot be read to its end.
     """
-    require_decisions(reader)
-    heard: dict[str, list[Any]] = {name: [] for name in (*STAMPED, SCAN, VECTOR, TWIST)}
+    require_decisions(reader, robots)
+    found: dict[str, list[DecodedMessage]] = {robot: [] for robot in robots}
+    for robot, message in heard_by_robot(reader, robots, (*HEARD, GOAL, WAYPOINTS)):
+        found[robot].append(message)
+    return found
+
+
+def gather(messages: Iterable[DecodedMessage], tick_ns: int | None, frame: str = "") -> Evidence:
+    """Join a robot's messages; tick_ns is the duration of a tick, None where it is not fixed.
+
+    frame is the one that goals must be in, "" for any.
+    """
+    heard: dict[str, list[Any]] = {name: [] for name in HEARD}
     found = Evidence(ticks=[], goals=[])
-    for message in reader.decoded([*heard, GOAL, WAYPOINTS]):
+    for message in messages:
         if message.topic in (GOAL, WAYPOINTS):
             found.goals += _goals(message.topic, message.message, frame)
         else:

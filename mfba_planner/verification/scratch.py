@@ -17,9 +17,10 @@ from ..core.planner import Decision, PlannerParams, Refused, observe
 from ..core.sensing import Ranges, SensorParams, aligned, sense_scan
 from ..messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
 from ..planners.method import brain
-from ..recording.decisions import DECISION, SECTORS
+from ..recording.decisions import DECISION, SECTORS, deciders
 from ..recording.integrity import check_data
 from ..recording.reader import BagReader, DecodedMessage
+from ..recording.robots import ALONE
 
 ODOMETRY, SCAN, GOAL = (
     "nav_msgs/msg/Odometry",
@@ -60,8 +61,7 @@ class FromScratch:
 def is_foreign(reader: BagReader) -> bool:
     """Whether a bag has scans and odometry, but neither decisions nor sectors of ours."""
     types = {topic.type_name for topic in reader.topics.values()}
-    # of a fleet they are in namespaces
-    ours = SECTORS in reader.topics or any(name.endswith(DECISION) for name in reader.topics)
+    ours = SECTORS in reader.topics or DECISION in reader.topics or deciders(reader) != [ALONE]
     return not ours and {ODOMETRY, SCAN} <= types
 
 
