@@ -7,11 +7,12 @@ that the result's digest stands for.
 
 from __future__ import annotations
 
-import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from ..arguments import Parser
 from ..core.digest import digest
 from ..core.episode import Episode
 from ..core.errors import ConfigError, InputError
@@ -21,7 +22,8 @@ from ..core.sensing import SensorParams
 from ..core.world import Scenario
 from ..outputs import bag_in
 from ..planners.method import simulate
-from ..recording.episode import read_episode
+from ..recording.episode import Recording, read_recording
+from ..recording.robots import ALONE, chosen
 from ..report.result import read_result
 from ..resources import scenario_names
 from ..scenarios import load_scenario
@@ -29,16 +31,32 @@ from ..scenarios import load_scenario
 _RESULT = "result.json"
 
 
-def add_paths(parser: argparse.ArgumentParser) -> None:
-    """The argument `paths`: one run or more."""
+def add_paths(parser: Parser) -> None:
+    """The argument `paths`: one run or more; and which robots of a fleet's."""
     parser.add_argument(
         "paths", type=Path, nargs="+", metavar="BAG|RESULT", help="run or bag directory, or file"
     )
+    parser.add_robots()
 
 
-def named_episodes(paths: list[Path]) -> list[tuple[str, Episode]]:
+class Named(NamedTuple):
+    """Runs by name; roster names all robots of the fleet, where the runs are of one only."""
+
+    runs: list[tuple[str, Episode]]
+    roster: tuple[str, ...] = ()
+
+
+def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> Named:
     """Read or make the runs; raises BagError, InputError."""
-    return [(_name(path), _episode(path)) for path in paths]
+    if len(paths) == 1:
+        scenario, _, episodes = _runs(paths[0], robots)
+        if ALONE not in episodes:
+            return Named(list(episodes.items()), tuple(member.name for member in scenario.robots))
+    runs = []
+    for path in paths:
+        for robot, episode in _runs(path, robots).episodes.items():
+            runs.append((".".join(filter(None, (_name(path), robot))), episode))
+    return Named(runs)
 
 
 def _name(path: Path) -> str:
@@ -49,13 +67,15 @@ def _name(path: Path) -> str:
     return path.name if path.is_dir() else path.stem
 
 
-def _episode(path: Path) -> Episode:
-    if path.suffix == ".json":
-        return _again(path)
+def _runs(path: Path, robots: Sequence[str]) -> Recording:
     bag = bag_in(path)
     if bag == path and not any(path.glob("*.mcap")) and (path / _RESULT).is_file():
-        return _again(path / _RESULT)
-    return read_episode(bag)
+        path = path / _RESULT
+    if path.suffix != ".json":
+        return read_recording(bag, robots)
+    chosen(path, [ALONE], robots)
+    episode = _again(path)
+    return Recording(episode.scenario, episode.seed, {ALONE: episode})
 
 
 def _again(path: Path) -> Episode:

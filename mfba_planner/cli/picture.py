@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..arguments import Parser
 from ..outputs import bag_in
-from ..recording.episode import read_episode
+from ..recording.episode import read_recording
 
 
 def main(args: list[str]) -> int:
@@ -17,10 +17,18 @@ def main(args: list[str]) -> int:
     )
     parser.add_bag()
     parser.add_argument("png", type=Path, metavar="PNG", help="file to create")
+    parser.add_robots()
     found = parser.parse(args)
-    episode = read_episode(bag_in(found.bag))
-    from ..report.figure import draw_run  # takes its time: only where there is something to draw
+    scenario, seed, runs = read_recording(bag_in(found.bag), found.robots)
+    # What draws takes its time: only where there is something to draw.
+    if len(runs) == 1:
+        from ..report.figure import draw_run
 
-    draw_run(episode, found.png)
+        (episode,) = runs.values()
+        draw_run(episode, found.png)
+    else:
+        from ..report.fleet import draw_fleet
+
+        draw_fleet(scenario, seed, runs, found.png)
     print(f"wrote {found.png}")
     return 0

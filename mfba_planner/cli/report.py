@@ -12,7 +12,8 @@ from .episodes import add_paths, named_episodes
 _DESCRIPTION = """Write runs as one HTML file that needs nothing else: no network, no ROS.
 
 A bag is read. Of a result (`mfba sim --out`) the run is made again, and must take the decisions
-that the result's digest stands for."""
+that the result's digest stands for. A fleet's bag is one scene, seen with the eyes of
+the robot that is chosen in it; with --robot NAME, and with other runs, they stand side by side."""
 
 
 def main(args: list[str]) -> int:
@@ -31,6 +32,7 @@ def main(args: list[str]) -> int:
 
     check_size(len(found.paths))
     refuse_existing(found.out)
-    write_page(named_episodes(found.paths), found.out)
+    named = named_episodes(found.paths, found.robots)
+    write_page(named.runs, found.out, named.roster)
     print(f"wrote {found.out}")
     return 0

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..arguments import Parser
-from ..core.episode import Episode, Outcome
+from ..core.episode import Episode, Outcome, stamp_of
 from ..core.errors import BagError, ConfigError
 from ..launcher.settings import add_set_argument, with_settings
 from ..outputs import bag_in
@@ -58,16 +58,14 @@ def main(args: list[str]) -> int:
     if wrong:
         more = f" (and {len(wrong) - 1} more robots)" if wrong[1:] else ""
         raise BagError(f"{bag}: {wrong[0]}{more}; see above")
-    if ALONE not in reports:
-        if found.closed_loop or found.settings:
-            _fleet_again(bag, found)
-    elif found.closed_loop or found.settings:
-        report = reports[ALONE]
-        recorded = report.setup.episode(report.recorded)
-        if found.settings:
-            _what_if(recorded, _again(recorded, found.settings), found)
-        else:
-            _closed_loop(bag, recorded, _again(recorded, []))
+    if found.picture and len(reports) > 1:
+        raise ConfigError("--picture: it is of one robot's trails; give --robot NAME as well")
+    if found.closed_loop or found.settings:
+        for robot, recorded, again in _again(bag, reports, found.settings):
+            if found.settings:
+                _what_if(robot, recorded, again, found)
+            else:
+                _closed_loop(bag, robot, recorded, again)
     return 0
 
 
@@ -97,49 +95,49 @@ def _verdict(robot: str, report: Report) -> str:
     return of_robot(robot, f"not identical: {'; '.join(wrong)}")
 
 
-def _again(recorded: Episode, settings: list[str]) -> Episode:
+def _again(
+    bag: Path, reports: dict[str, Report], settings: list[str]
+) -> Iterator[tuple[str, Episode, Episode]]:
+    """Yield (robot, recorded, simulated again, which is cut short where the recording was)."""
+    if ALONE not in reports:
+        yield from _fleet_again(bag, reports, settings)
+        return
+    report = reports[ALONE]
+    recorded = report.setup.episode(report.recorded)
+    planner, sensor = with_settings(recorded.planner, recorded.sensor, settings)
     again = simulate(
         recorded.scenario,
-        **_told(recorded, settings),
+        planner=planner,
+        sensor=sensor,
         seed=recorded.seed,
-        # A recording that was interrupted ends where it ends.
         go_on=lambda world: bool(settings) or world.stamp_ns < recorded.ticks[-1].stamp_ns,
     )
-    return replace(again, driver="core")
+    yield ALONE, recorded, replace(again, driver="core")
 
 
-def _told(recorded: Episode, settings: list[str]) -> dict[str, Any]:
-    planner, sensor = with_settings(recorded.planner, recorded.sensor, settings)
-    return {"planner": planner, "sensor": sensor}
-
-
-def _fleet_again(bag: Path, found: argparse.Namespace) -> None:
-    """Closed loop or what if of all robots of a fleet at once, as they shared a world."""
-    recording = read_recording(bag)
-    recorded, settings = recording.episodes, found.settings
-    names = list(recorded)
-    wanted = found.robots or names
-    if found.picture and len(wanted) > 1:
-        raise ConfigError("--picture: it is of one robot's trails; give --robot NAME as well")
-    last = max(episode.ticks[-1].stamp_ns for episode in recorded.values())
+def _fleet_again(
+    bag: Path, reports: dict[str, Report], settings: list[str]
+) -> Iterator[tuple[str, Episode, Episode]]:
+    """All robots at once, since they shared a world; yields those that were asked for."""
+    scenario, seed, episodes = read_recording(bag)
+    first = next(iter(episodes.values()))
+    planner, sensor = with_settings(first.planner, first.sensor, settings)
+    last_ns = max(episode.ticks[-1].stamp_ns for episode in episodes.values())
     made = simulate_fleet(
-        recording.scenario,
-        **_told(recorded[names[0]], settings),
-        seed=recording.seed,
-        go_on=lambda fleet: bool(settings) or (fleet.tick + 1) * fleet.tick_ns < last,
+        scenario,
+        planner=planner,
+        sensor=sensor,
+        seed=seed,
+        go_on=lambda fleet: bool(settings) or stamp_of(fleet.tick, fleet.tick_ns) < last_ns,
     )
-    again = dict(zip(names, made))
-    for name in wanted:
-        if settings:
-            _what_if(recorded[name], again[name], found, name)
-        else:
-            # A recording that was interrupted ends where it ends, each robot's at its own tick.
-            asked = recorded[name].ticks if recorded[name].outcome is Outcome.INTERRUPTED else None
-            ticks = again[name].ticks[: len(asked) if asked else None]
-            _closed_loop(bag, recorded[name], replace(again[name], ticks=ticks), name)
+    for (robot, recorded), again in zip(episodes.items(), made):
+        if recorded.outcome is Outcome.INTERRUPTED and not settings:
+            again = replace(again, ticks=again.ticks[: len(recorded.ticks)])
+        if robot in reports:
+            yield robot, recorded, replace(again, driver="core")
 
 
-def _closed_loop(bag: Path, recorded: Episode, again: Episode, robot: str = ALONE) -> None:
+def _closed_loop(bag: Path, robot: str, recorded: Episode, again: Episode) -> None:
     found = first_divergence(recorded.ticks, again.ticks)
     if found:
         _show_divergence(found, "recorded", "simulated again", robot)
@@ -151,9 +149,7 @@ def _closed_loop(bag: Path, recorded: Episode, again: Episode, robot: str = ALON
     print(of_robot(robot, f"closed loop: identical, {len(again.ticks)} ticks"))
 
 
-def _what_if(
-    recorded: Episode, again: Episode, given: argparse.Namespace, robot: str = ALONE
-) -> None:
+def _what_if(robot: str, recorded: Episode, again: Episode, given: argparse.Namespace) -> None:
     from ..core.metrics import evaluate
     from ..report.table import comparison_text
 
@@ -162,7 +158,7 @@ def _what_if(
     print(comparison_text(("recorded", evaluate(recorded)), ("what if", evaluate(again))))
     found = first_divergence(recorded.ticks, again.ticks)
     if found:
-        _show_divergence(found, "recorded", "what if")
+        _show_divergence(found, "recorded", "what if", robot)
     else:
         print("no decision differs")
     if given.picture:

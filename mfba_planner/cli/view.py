@@ -20,12 +20,12 @@ def main(args: list[str]) -> int:
         "--save", type=Path, metavar="RRD", help="file to create instead, for `rerun RRD`"
     )
     found = parser.parse(args)
-    runs = named_episodes(found.paths)
+    runs, roster = named_episodes(found.paths, found.robots)
     from ..report.viewer import save, show
 
     if found.save is None:
-        show(runs)
+        show(runs, roster)
         return 0
-    save(runs, found.save)
+    save(runs, found.save, roster)
     print(f"wrote {found.save}")
     return 0

@@ -7,7 +7,7 @@ import sys
 
 from ..core.errors import MfbaError
 from ..core.metrics import evaluate
-from ..recording.episode import read_fleet
+from ..recording.episode import read_recording
 from ..report.roster import fleet_text, why_no_success
 from .attempt import Attempt
 
@@ -22,22 +22,20 @@ def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
     from ..report.result import result_to_dict, write_result
 
     directory, config = attempt.directory, attempt.order.config
-    names = [member.name for member in config.scenario.robots]
-    episodes = read_fleet(directory.bag)
-    results = [evaluate(episode) for episode in episodes]
+    runs = read_recording(directory.bag).episodes
+    results = [evaluate(episode) for episode in runs.values()]
     extra = {"fleet_seed": config.seed, "wall_s": attempt.wall_s, "failure": failure or None}
-    for name, episode in zip(names, episodes):
+    for name, episode in runs.items():
         write_result(directory.path / f"{name}.json", result_to_dict(episode, extra))
     if attempt.order.picture:
-        title = config.scenario.description or config.scenario.name
-        draw_fleet(title, names, episodes, results, config.seed, directory.picture)
-    sys.stdout.write(fleet_text(names, results))
+        draw_fleet(config.scenario, config.seed, runs, directory.picture)
+    sys.stdout.write(fleet_text(list(runs), results))
     print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
     if failure:
         return
     if attempt.order.view:
         from ..report.viewer import show
 
-        show(list(zip(names, episodes)))
+        show(list(runs.items()), list(runs))
     if why := why_no_success(results):
         raise MfbaError(f"{directory.path}: {why}")

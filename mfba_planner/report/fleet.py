@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from mfba_planner.core.episode import Episode
-from mfba_planner.core.metrics import Result
+from mfba_planner.core.metrics import evaluate
+from mfba_planner.core.world import Scenario
 from mfba_planner.outputs import write_new
 
 from . import legend, style, words
@@ -20,24 +21,19 @@ from .sheet import to_bytes
 from .view import View, fitted
 
 
-def draw_fleet(
-    title: str, names: Sequence[str], episodes: Sequence[Episode], results: Sequence[Result],
-    seed: int, path: Path,
-) -> None:  # fmt: skip
-    """Write the picture of a fleet's run as PNG; OutputError when path exists already."""
+def draw_fleet(scenario: Scenario, seed: int, runs: Mapping[str, Episode], path: Path) -> None:
+    """Write the picture of a fleet's run as PNG; OutputError when path exists already.
+
+    runs are the Episodes of its robots, or some of them, by name.
+    """
     with style.context():
-        figure = fleet_figure(title, names, episodes, results, seed)
-        write_new(path, to_bytes(figure, "png"))
+        write_new(path, to_bytes(_fleet_figure(scenario, seed, runs), "png"))
 
 
-def fleet_figure(
-    title: str,
-    names: Sequence[str],
-    episodes: Sequence[Episode],
-    results: Sequence[Result],
-    seed: int,
-) -> Figure:
+def _fleet_figure(scenario: Scenario, seed: int, runs: Mapping[str, Episode]) -> Figure:
     """Compose head, ways, panel and strip; to be called and saved within style.context()."""
+    names, episodes = list(runs), list(runs.values())
+    results = [evaluate(episode) for episode in episodes]
     first = episodes[0].scenario
     view = View(*first.start_m, *first.start_m)
     for episode in episodes:
@@ -53,7 +49,7 @@ def fleet_figure(
         x, y = episode.scenario.start_m
         page.ax.text(x, y + 1.2 * first.robot_radius_m, name, **style.NUMBER)
     good = sum(result.success for result in results)
-    page.head(title, f"{len(episodes)} robots in one world")
+    page.head(scenario.description or scenario.name, f"{len(episodes)} robots in one world")
     page.legend(legend.entries(page.ax))
     page.rows(
         "Closest pass, edge to edge",

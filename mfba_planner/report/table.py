@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 from rich.table import Table
@@ -22,9 +22,13 @@ Row = tuple[str, str, str]
 
 
 def result_rows(
-    episode: Episode, result: Result, ticks_per_s: float | None = None
+    episode: Episode,
+    result: Result,
+    ticks_per_s: float | None = None,
+    *,
+    names: Sequence[str] = (),
 ) -> Iterator[Row]:
-    """Yield (name, figure, remark) for each line of the table."""
+    """Yield (name, figure, remark) for each line of the table; names are the obstacles'."""
     yield "outcome", words.outcome(result), _why_no_success(result)
     yield "length", words.length(result), _against_straight(episode, result)
     yield "time", words.time(result), "simulated"
@@ -32,7 +36,7 @@ def result_rows(
     between = "edge to edge" if math.isfinite(result.min_clearance_m) else ""
     yield "min clearance", words.clearance(result), between
     yield "collisions", str(result.collisions), ""
-    yield "encounters", str(len(result.encounters)), _numbered(result)
+    yield "encounters", str(len(result.encounters)), _numbered(result, names)
     yield "mode switches", str(result.mode_switches), _standing(result)
     rate = "" if ticks_per_s is None else f"{words.number(ticks_per_s, 0)} ticks/s"
     yield "ticks", str(result.ticks), rate
@@ -52,11 +56,13 @@ def _against_straight(episode: Episode, result: Result) -> str:
     return f"{line} ({excess:+.1f} %)"
 
 
-def _numbered(result: Result) -> str:
-    if not result.encounters:
-        return ""
-    plural = "s" if len(result.encounters) > 1 else ""
-    return f"obstacle{plural} {', '.join(map(str, result.encounters))}"
+def _numbered(result: Result, names: Sequence[str] = ()) -> str:
+    """Who was encountered: obstacles by number, robots by name."""
+    met = [names[number - 1] if names else str(number) for number in result.encounters]
+    numbers = [name for name in met if name.isdecimal()]
+    plural = "s" if len(numbers) > 1 else ""
+    told = [f"obstacle{plural} {', '.join(numbers)}"] if numbers else []
+    return ", ".join(told + [name for name in met if not name.isdecimal()])
 
 
 def _standing(result: Result) -> str:

@@ -22,27 +22,30 @@ from mfba_planner.core.world import velocity_at
 from mfba_planner.outputs import refuse_existing
 
 from . import style, words
-from .html.data import clearances, speeds
+from .html.data import clearances, in_one_scene, obstacle_names, speeds
 
 _GREY, _DARK = style.FAINT, style.QUIET
 _AHEAD_S = 2.0  # arrows lead to where obstacles will be
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, 49)
 
 
-def save(runs: Sequence[tuple[str, Episode]], path: Path) -> None:
-    """Write a recording that `rerun FILE` opens. Raises OutputError where path exists."""
+def save(runs: Sequence[tuple[str, Episode]], path: Path, roster: Sequence[str] = ()) -> None:
+    """Write a recording that `rerun FILE` opens. Raises OutputError where path exists.
+
+    roster names the robots of the fleet that the runs are of, if they are: all are one scene.
+    """
     refuse_existing(path)
     rerun, stream = _stream()
-    stream.save(str(path), default_blueprint=_layout(rerun, runs))
-    _log_all(rerun, stream, runs)
+    stream.save(str(path), default_blueprint=_layout(rerun, runs, roster))
+    _log_all(rerun, stream, runs, roster)
 
 
-def show(runs: Sequence[tuple[str, Episode]]) -> None:
-    """Open the viewer's window; raises as require_viewer does."""
+def show(runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = ()) -> None:
+    """Open the viewer's window on what save() would write; raises as require_viewer does."""
     require_viewer()
     rerun, stream = _stream()
-    stream.spawn(default_blueprint=_layout(rerun, runs))
-    _log_all(rerun, stream, runs)
+    stream.spawn(default_blueprint=_layout(rerun, runs, roster))
+    _log_all(rerun, stream, runs, roster)
 
 
 def require_viewer() -> None:
@@ -67,23 +70,31 @@ def _stream() -> tuple[Any, Any]:
     return rerun, rerun.RecordingStream("mfba_planner")
 
 
-def _layout(rerun: Any, runs: Sequence[tuple[str, Episode]]) -> Any:
+def _layout(rerun: Any, runs: Sequence[tuple[str, Episode]], roster: Sequence[str]) -> Any:
+    """A column for each run; of a whole fleet one, in which all robots are."""
     view = rerun.blueprint
-    runs_in_columns = [
+    groups = [runs] if in_one_scene(runs, roster) else [[run] for run in runs]
+    columns = [
         view.Vertical(
             view.Spatial3DView(
-                origin=f"{name}/world",
-                name=name,
-                overrides={f"{name}/world/trail": _since_the_start(view)},
-                eye_controls=_from_above(view, episode),
+                **_below(group, "world"),
+                name=", ".join(name for name, _ in group),
+                overrides={f"{name}/world/trail": _since_the_start(view) for name, _ in group},
+                eye_controls=_from_above(view, [episode for _, episode in group]),
             ),
-            view.TextLogView(origin=f"{name}/decision", name="decisions"),
-            view.TimeSeriesView(origin=f"{name}/curves", name="clearance (m), speed (m/s)"),
+            view.TextLogView(**_below(group, "decision"), name="decisions"),
+            view.TimeSeriesView(**_below(group, "curves"), name="clearance (m), speed (m/s)"),
             row_shares=[6, 2, 2],
         )
-        for name, episode in runs
+        for group in groups
     ]
-    return view.Blueprint(view.Horizontal(*runs_in_columns), view.TimePanel(timeline="sim_time"))
+    return view.Blueprint(view.Horizontal(*columns), view.TimePanel(timeline="sim_time"))
+
+
+def _below(runs: Sequence[tuple[str, Episode]], part: str) -> dict[str, Any]:
+    """What a view of some runs shows."""
+    paths = [f"/{name}/{part}" for name, _ in runs]
+    return {"origin": paths[0]} if len(paths) == 1 else {"contents": [f"{p}/**" for p in paths]}
 
 
 def _since_the_start(view: Any) -> Any:
@@ -98,10 +109,10 @@ def _since_the_start(view: Any) -> Any:
     return view.VisibleTimeRanges(ranges)
 
 
-def _from_above(view: Any, episode: Episode) -> Any:
-    """The whole way in sight, +y away from who looks on."""
-    corners = [episode.scenario.start_m, episode.scenario.goal_m]
-    corners += [tick.pose.position for tick in episode.ticks]
+def _from_above(view: Any, episodes: Sequence[Episode]) -> Any:
+    """All ways in sight, +y away from who looks on."""
+    corners = [end for e in episodes for end in (e.scenario.start_m, e.scenario.goal_m)]
+    corners += [tick.pose.position for episode in episodes for tick in episode.ticks]
     xs, ys = zip(*corners)
     x, y = (min(xs) + max(xs)) / 2.0, (min(ys) + max(ys)) / 2.0
     height_m = 1.2 * max(max(xs) - min(xs), max(ys) - min(ys)) + 2.0
@@ -110,17 +121,34 @@ def _from_above(view: Any, episode: Episode) -> Any:
     )
 
 
-def _log_all(rerun: Any, stream: Any, runs: Sequence[tuple[str, Episode]]) -> None:
+def _log_all(
+    rerun: Any, stream: Any, runs: Sequence[tuple[str, Episode]], roster: Sequence[str]
+) -> None:
+    is_fleet = in_one_scene(runs, roster)
+    last, _ = max(runs, key=lambda run: len(run[1].ticks))
     for name, episode in runs:
-        _Log(rerun, stream, name, episode).all()
+        names = obstacle_names(name, episode, roster)
+        if is_fleet:  # the others are there themselves, and what is common is there once
+            names = [own for own in names if own not in roster and name == last]
+        _Log(rerun, stream, name, episode, names, [name] if is_fleet else None).all()
     stream.flush()
 
 
 class _Log:
     """One run below an entity path of its name."""
 
-    def __init__(self, rerun: Any, stream: Any, name: str, episode: Episode) -> None:
+    def __init__(
+        self,
+        rerun: Any,
+        stream: Any,
+        name: str,
+        episode: Episode,
+        names: Sequence[str],
+        label: list[str] | None,
+    ) -> None:
+        """Draw the first obstacles, which have these names, and the robot with this label."""
         self.rr, self.stream, self.name, self.episode = rerun, stream, name, episode
+        self.names, self.label = names, label
         self.scenario = episode.scenario
 
     def all(self) -> None:
@@ -159,15 +187,15 @@ class _Log:
             self._put("world/walls", lines, static=True)
 
     def _obstacles(self, xs: Any, ys: Any, time_s: float) -> None:
-        obstacles = self.scenario.obstacles
+        obstacles = self.scenario.obstacles[: len(self.names)]
         if not obstacles:
             return
-        rr, centers = self.rr, [(x, y, 0.0) for x, y in zip(xs.tolist(), ys.tolist())]
-        numbers = [str(number) for number in range(1, len(obstacles) + 1)]
+        rr = self.rr
+        centers = [(x, y, 0.0) for x, y, _ in zip(xs.tolist(), ys.tolist(), self.names)]
         radii = [obstacle.radius_m for obstacle in obstacles]
         self._put(
             "world/obstacles",
-            rr.Points3D(centers, radii=radii, colors=_rgb(_GREY), labels=numbers),
+            rr.Points3D(centers, radii=radii, colors=_rgb(_GREY), labels=list(self.names)),
         )
         edges = [
             _ring(center, self.scenario.enlarged_radius(obstacle))
@@ -181,7 +209,8 @@ class _Log:
     def _robot(self, tick: Decision) -> None:
         rr, here = self.rr, (tick.pose.x, tick.pose.y, 0.0)
         color = _rgb(style.MODE_COLOURS[tick.mode])
-        body = rr.Points3D([here], radii=self.scenario.robot_radius_m, colors=color)
+        radius_m = self.scenario.robot_radius_m
+        body = rr.Points3D([here], radii=radius_m, colors=color, labels=self.label)
         self._put("world/robot", body)
         reach = self.episode.sensor.sensing_range_m
         self._put(

@@ -32,7 +32,21 @@ class Charts {
     this.cursor = this.element.querySelector(".cursor");
     const [, , w, h] = drawn.getAttribute("viewBox").split(" ").map(Number);
     this.size = { w, h };
+    this.highlight();
     this.show();
+  }
+
+  /** Let the line of one run stand out. */
+  choose(number) {
+    this.chosen = number;
+    this.highlight();
+  }
+
+  highlight() {
+    if (this.chosen === undefined) return;
+    for (const line of this.element.querySelectorAll('[id^="line-"]')) {
+      line.classList.toggle("aside", line.id !== `line-${this.chosen + 1}`);
+    }
   }
 
   show() {

@@ -41,6 +41,12 @@ _VARIABLES = [
 _STAND_IN = {name: f"#fe{number:02x}a7" for number, name in enumerate(_VARIABLES)}
 
 
+def look(number: int) -> tuple[int, tuple[float, ...]]:
+    """Colour (1 to MOST_RUNS) and dashes of the run with a number from 0, no two alike."""
+    turn, colour = divmod(number, MOST_RUNS)
+    return colour + 1, DASHES[(colour + turn) % len(DASHES)]
+
+
 def charts(episodes: Sequence[Episode]) -> list[dict[str, Any]]:
     """The drawings, narrowest first: SVG text, and where (of its width) begin and end lie."""
     return [_chart(episodes, *sheet) for sheet in SHEETS]
@@ -60,8 +66,13 @@ def _chart(
         lower = _axes(figure, "Speed (m/s)", _BOTTOM, low)
         upper.tick_params(labelbottom=False)
         upper.axhline(0.0, color=_STAND_IN["bad"], linewidth=0.9, linestyle=(0, (2, 2)))
-        for number, episode in enumerate(episodes, start=1):
-            looks = {"color": _STAND_IN[f"run-{number}"], "linestyle": (0, DASHES[number - 1])}
+        for number, episode in enumerate(episodes):
+            colour, dashes = look(number)
+            looks: style.Looks = {
+                "color": _STAND_IN[f"run-{colour}"],
+                "linestyle": (0, dashes),
+                "gid": f"line-{number + 1}",
+            }
             if len(episodes) == 1:
                 looks["color"] = _STAND_IN["ink"]  # the bands bring colour enough
             _steps(upper, episode, clearances(episode), looks)

@@ -29,28 +29,73 @@ from mfba_planner.report.table import result_rows
 from mfba_planner.report.view import View, choose_view
 
 MOST_RUNS = 6  # side by side
+MOST_ROBOTS = 36  # of a fleet in one scene: as many lines can be told apart
 MOST_TICKS = 20_000  # in all: beyond that a browser takes long to open the page
 
 Plain = dict[str, Any]
 _MODES = list(Mode)
 
 
-def pages_data(runs: Sequence[tuple[str, Episode]], version: str) -> Plain:
-    """What the page of these named runs holds; runs in equal worlds share one view."""
+def pages_data(
+    runs: Sequence[tuple[str, Episode]], version: str, roster: Sequence[str] = ()
+) -> Plain:
+    """What the page of these named runs holds; runs in equal worlds share one view.
+
+    roster names the fleet that the runs are of: all of them are one scene.
+    """
+    is_fleet = in_one_scene(runs, roster)
     views = [choose_view(episode, closest_passes(episode))[0] for _, episode in runs]
     shared = [
-        _union(view for view, (_, other) in zip(views, runs) if other.scenario == episode.scenario)
+        _union(
+            view
+            for view, (_, other) in zip(views, runs)
+            if roster or other.scenario == episode.scenario
+        )
         for _, episode in runs
     ]
+    # In a fleet's scene the others go on when one has arrived.
+    longest = max((episode for _, episode in runs), key=lambda episode: len(episode.ticks))
+    times_s = [longest.time_s(tick.stamp_ns) for tick in longest.ticks] if is_fleet else None
     return {
         "version": version,
+        "fleet": is_fleet,
         "modes": [{"key": mode.value, "label": words.MODES[mode]} for mode in _MODES],
-        "runs": [run_data(name, episode, view) for (name, episode), view in zip(runs, shared)],
+        "runs": [
+            run_data(name, episode, view, obstacle_names(name, episode, roster), times_s)
+            for (name, episode), view in zip(runs, shared)
+        ],
     }
 
 
-def run_data(name: str, episode: Episode, view: View) -> Plain:
-    """One run, drawn within a view of its world."""
+def in_one_scene(runs: Sequence[tuple[str, Episode]], roster: Sequence[str]) -> bool:
+    """Whether the runs are all robots of a fleet, which shared a world."""
+    return len(runs) == len(roster) > 1
+
+
+def world_name(name: str, episode: Episode, roster: Sequence[str]) -> str:
+    """The world's name; of a fleet it is that of all, without the robot's."""
+    scenario = episode.scenario.name
+    return scenario.removesuffix(f".{name}") if roster else scenario
+
+
+def obstacle_names(name: str, episode: Episode, roster: Sequence[str]) -> list[str]:
+    """What a run's obstacles are called: by number, and other robots of its fleet by name."""
+    others = [other for other in roster if other != name]
+    own = len(episode.scenario.obstacles) - len(others)
+    return [*(str(number) for number in range(1, own + 1)), *others]
+
+
+def run_data(
+    name: str,
+    episode: Episode,
+    view: View,
+    names: Sequence[str],
+    times_s: Sequence[float] | None = None,
+) -> Plain:
+    """One run, drawn within a view of its world, with its obstacles' names.
+
+    times_s are those at which obstacles are shown, if not those of the run's ticks.
+    """
     result = evaluate(episode)
     reasons = list(dict.fromkeys(tick.reason for tick in episode.ticks))
     number_of = {reason: number for number, reason in enumerate(reasons)}
@@ -68,7 +113,8 @@ def run_data(name: str, episode: Episode, view: View) -> Plain:
             "goal": list(episode.scenario.goal_m),
             "robot_radius": episode.scenario.robot_radius_m,
             "walls": _walls(episode),
-            "obstacles": _obstacles(episode),
+            "times": times_s,
+            "obstacles": _obstacles(episode, names, times_s),
         },
         "reach": episode.sensor.sensing_range_m,
         "sectors": sectors,
@@ -94,7 +140,7 @@ def run_data(name: str, episode: Episode, view: View) -> Plain:
             "near": [list(within_range(episode, tick)) for tick in episode.ticks],
             "bats": [_drawn(v for bat in tick.candidates for v in bat) for tick in episode.ticks],
         },
-        "result": [list(row) for row in result_rows(episode, result)],
+        "result": [list(row) for row in result_rows(episode, result, names=names)],
         "configuration": _configuration(episode),
         "digest": digest(episode.ticks),
     }
@@ -113,10 +159,12 @@ def _walls(episode: Episode) -> list[float] | None:
     return [*walls.lower_m, *walls.upper_m] if walls else None
 
 
-def _obstacles(episode: Episode) -> list[Plain]:
-    """Each obstacle's radius, and its centre and velocity at every tick."""
+def _obstacles(
+    episode: Episode, names: Sequence[str], times_s: Sequence[float] | None
+) -> list[Plain]:
+    """Each obstacle's name and radius, and its centre and velocity at every tick."""
     scenario = episode.scenario
-    times_s = [episode.time_s(tick.stamp_ns) for tick in episode.ticks]
+    times_s = times_s or [episode.time_s(tick.stamp_ns) for tick in episode.ticks]
     xs, ys = Motion(scenario).centers(np.array(times_s))
     moves = (
         [velocity_at(obstacle, t, scenario.walls) for t in times_s]
@@ -124,13 +172,14 @@ def _obstacles(episode: Episode) -> list[Plain]:
     )
     return [
         {
+            "name": name,
             "radius": obstacle.radius_m,
             "x": _drawn(x.tolist()),
             "y": _drawn(y.tolist()),
             "vx": _drawn(vx for vx, _ in velocities),
             "vy": _drawn(vy for _, vy in velocities),
         }
-        for obstacle, x, y, velocities in zip(scenario.obstacles, xs.T, ys.T, moves)
+        for name, obstacle, x, y, velocities in zip(names, scenario.obstacles, xs.T, ys.T, moves)
     ]
 
 

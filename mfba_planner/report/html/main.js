@@ -8,20 +8,27 @@ const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const views = runs.map((run) => ({ run, scene: new Scene(run), readout: new Readout(run) }));
 const charts = new Charts(DATA.charts, clock);
 const transport = new Transport(runs, clock, () =>
-  views.map(({ run, readout }) => readout.sentence(tickOf(run))).join("; "),
+  inSight().map(({ run, readout }) => readout.sentence(tickOf(run))).join("; "),
 );
+let chosen = 0; // of a fleet, the robot that is looked at
+
+/** A fleet is one scene, seen with one robot's eyes; other runs stand side by side. */
+function inSight() {
+  return DATA.fleet ? [views[chosen]] : views;
+}
 
 function tickOf(run) {
   return indexAt(run.ticks.time, clock.time);
 }
 
 function show() {
-  for (const { run, scene, readout } of views) {
-    const { time } = run.ticks;
+  for (const { run, scene, readout } of inSight()) {
+    const { times } = scene;
     const k = tickOf(run);
-    const span = k + 1 < time.length ? time[k + 1] - time[k] : 0;
-    const part = span > 0 && !calm.matches ? (clock.time - time[k]) / span : 0;
-    scene.show(k, Math.max(0, Math.min(1, part)));
+    const now = indexAt(times, clock.time);
+    const span = now + 1 < times.length ? times[now + 1] - times[now] : 0;
+    const part = span > 0 && !calm.matches ? (clock.time - times[now]) / span : 0;
+    scene.show(k, now, Math.max(0, Math.min(1, part)));
     readout.show(k);
   }
   transport.show();
@@ -37,6 +44,29 @@ function card({ run, scene, readout }, number) {
     html("div", { class: "stage" }, scene.element),
     readout.element,
   );
+}
+
+/** Who of a fleet is looked at: by this list, or by pressing another robot in the scene. */
+function robotChoice() {
+  const select = html(
+    "select",
+    { id: "robot", "aria-label": "Robot" },
+    ...runs.map(({ name }, number) => html("option", { value: number }, name)),
+  );
+  const choose = (number) => {
+    chosen = number;
+    select.value = number;
+    document.querySelectorAll(".card").forEach((element, i) => {
+      element.hidden = i !== number;
+    });
+    charts.choose(number);
+    show();
+  };
+  select.addEventListener("change", () => choose(Number(select.value)));
+  for (const { scene } of views) {
+    scene.onPress((name) => choose(runs.findIndex((run) => run.name === name)));
+  }
+  return { element: html("label", {}, "Robot ", select), choose };
 }
 
 function legend() {
@@ -67,8 +97,9 @@ function legend() {
 function chartKey() {
   if (runs.length === 1) return [];
   const entries = runs.map((run, number) => {
-    const dashes = DATA.dashes[number].map((length) => 2 * length).join(" ") || "none";
-    const style = `stroke: var(--run-${number + 1}); stroke-width: 2; stroke-dasharray: ${dashes}`;
+    const [color, lengths] = DATA.looks[number];
+    const dashes = lengths.map((length) => 2 * length).join(" ") || "none";
+    const style = `stroke: var(--run-${color}); stroke-width: 2; stroke-dasharray: ${dashes}`;
     return entry(run.name, svg("path", { d: "M-6 8H28", style }));
   });
   return [html("ul", { class: "legend key", "aria-label": "Runs in the charts" }, ...entries)];
@@ -92,10 +123,11 @@ function themeButton() {
   return element;
 }
 
-const worlds = [...new Set(runs.map((run) => run.world.name))].join(", ");
+const choice = DATA.fleet ? robotChoice() : null;
 const about = [...new Set(runs.map((run) => run.world.description))].filter(Boolean).join("; ");
 document.getElementById("app").append(
-  html("header", { class: "top" }, html("div", {}, html("h1", {}, worlds), html("p", {}, about)), themeButton()),
+  html("header", { class: "top" }, html("div", {}, html("h1", {}, DATA.worlds), html("p", {}, about)),
+    html("div", { class: "choices" }, ...(choice ? [choice.element] : []), themeButton())),
   html(
     "main",
     {},
@@ -111,10 +143,12 @@ document.getElementById("app").append(
     html("p", { class: "keys" }, "Keys: space plays and pauses; ← → step, with shift by ten; Home and End; + and − change the speed."),
     html("p", {}, `mfba_planner ${DATA.version}`)),
 );
-root.dataset.count = runs.length;
-root.style.setProperty("--rows", runs.length);
+root.dataset.runs = runs.length;
+root.dataset.count = inSight().length;
+root.style.setProperty("--rows", Math.min(runs.length, 6));
 if (runs.length === 1) views[0].readout.element.append(legend());
 clock.listeners.push(show);
+if (choice) choice.choose(0);
 show();
 charts.fit();
 performance.mark("mfba-ready");

@@ -18,42 +18,57 @@ from mfba_planner.core.errors import InputError
 from mfba_planner.outputs import write_new
 from mfba_planner.report import words
 
-from .charts import DASHES, charts
-from .data import MOST_RUNS, MOST_TICKS, pages_data
+from .charts import charts, look
+from .data import MOST_ROBOTS, MOST_RUNS, MOST_TICKS, in_one_scene, pages_data, world_name
 
 # One script in the page; each file uses only what stands before it.
 _SCRIPTS = ("dom", "clock", "scene", "readout", "charts", "tables", "transport", "main")
 
 
-def write_page(runs: Sequence[tuple[str, Episode]], path: Path) -> None:
+def write_page(
+    runs: Sequence[tuple[str, Episode]], path: Path, roster: Sequence[str] = ()
+) -> None:
     """Write the page of some named runs; the same runs give the same bytes.
 
+    roster names the robots of the fleet that the runs are of, if they are: all are one scene.
     Raises InputError for too many runs or ticks, OutputError when path exists already or cannot
     be written.
     """
-    write_new(path, page(runs).encode())
+    write_new(path, page(runs, roster).encode())
 
 
-def page(runs: Sequence[tuple[str, Episode]]) -> str:
+def page(runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = ()) -> str:
     """The text of the page. Raises InputError for too many runs or ticks."""
     episodes = [episode for _, episode in runs]
-    check_size(len(runs), sum(len(episode.ticks) for episode in episodes))
-    names = ", ".join(dict.fromkeys(episode.scenario.name for episode in episodes))
+    is_fleet = in_one_scene(runs, roster)
+    check_size(len(runs), sum(len(episode.ticks) for episode in episodes), is_fleet=is_fleet)
+    worlds = (world_name(name, episode, roster) for name, episode in runs)
+    names = ", ".join(dict.fromkeys(worlds))
     script = "\n".join(_own(f"{name}.js") for name in _SCRIPTS)
     return Template(_own("page.html")).substitute(
         title=escape(words.one_line(names, 80)),
         policy=_policy(script),
         style=_own("page.css"),
         data=as_json(
-            {**pages_data(runs, __version__), "charts": charts(episodes), "dashes": DASHES}
+            {
+                **pages_data(runs, __version__, roster),
+                "worlds": names,
+                "charts": charts(episodes),
+                "looks": [look(number) for number in range(len(runs))],
+            }
         ),
         script=script,
     )
 
 
-def check_size(runs: int, ticks: int = 0) -> None:
+def check_size(runs: int, ticks: int = 0, *, is_fleet: bool = False) -> None:
     """Raise InputError for more than a page can show."""
-    if runs > MOST_RUNS:
+    if is_fleet and runs > MOST_ROBOTS:
+        raise InputError(
+            f"{runs} robots: too many for one scene, where {MOST_ROBOTS} fit; name up to "
+            f"{MOST_RUNS} with --robot"
+        )
+    if runs > MOST_RUNS and not is_fleet:
         raise InputError(f"{runs} runs: too many to stand side by side; give {MOST_RUNS} at most")
     if ticks > MOST_TICKS:
         raise InputError(

@@ -53,9 +53,18 @@ class Readout {
       waypoint: point(ticks.waypoint_x[k], ticks.waypoint_y[k], 3),
       speed: figure(ticks.speed[k], 3, "m/s"),
       clearance: figure(ticks.clearance[k], 3, "m"),
-      near: ticks.near[k].length ? `obstacle ${ticks.near[k].join(", ")}` : "nothing",
+      near: this.named(ticks.near[k]),
     };
     for (const [key, text] of Object.entries(told)) say(this.fields[key], text);
+  }
+
+  /** Who is near, obstacles by number and robots by name. */
+  named(numbers) {
+    const names = numbers.map((number) => this.run.world.obstacles[number - 1].name);
+    const isNumber = (name) => /^\d+$/.test(name);
+    const obstacles = names.filter(isNumber).join(", ");
+    const robots = names.filter((name) => !isNumber(name));
+    return [...(obstacles ? [`obstacle ${obstacles}`] : []), ...robots].join(", ") || "nothing";
   }
 
   /** The same in one sentence, for those who hear the page. */

@@ -9,6 +9,7 @@ class Scene {
   constructor(run) {
     this.run = run;
     const { world } = run;
+    this.times = world.times ?? run.ticks.time; // of what is around
     const [left, bottom, right, top] = world.view;
     this.width = right - left;
     this.element = svg("svg", {
@@ -74,19 +75,30 @@ class Scene {
 
   drawObstacles(world) {
     this.wakes = world.obstacles.map(() => this.add("path", { class: "wake" }));
-    this.obstacles = world.obstacles.map((obstacle, i) => {
+    const robots = new Set(DATA.runs.map(({ name }) => name));
+    this.obstacles = world.obstacles.map((obstacle) => {
+      const { name } = obstacle;
+      const isOther = DATA.fleet && robots.has(name);
       const group = this.add(
         "g",
-        { class: "obstacle" },
+        { class: isOther ? "obstacle other" : "obstacle", "data-name": name },
         svg("circle", { class: "enlarged", r: obstacle.radius + world.robot_radius }),
         svg("circle", { class: "body", r: obstacle.radius }),
         svg("path", { class: "motion" }),
       );
-      const number = svg("text", { class: "number" }, String(i + 1));
+      const number = svg("text", { class: "number" }, name);
       const sized = svg("g", {}, number);
       group.append(sized);
       this.fixed.push([sized, 0, 0]);
       return { group, motion: group.querySelector(".motion") };
+    });
+  }
+
+  /** Call back with the name of another robot of the fleet when it is pressed. */
+  onPress(act) {
+    this.element.addEventListener("click", ({ target }) => {
+      const other = target.closest(".other");
+      if (other) act(other.dataset.name);
     });
   }
 
@@ -152,20 +164,21 @@ class Scene {
     if (this.shown) this.show(...this.shown);
   }
 
-  /** Show tick k, and where things are a part (0 to 1) of the way to tick k + 1. */
-  show(k, part) {
+  /** Show tick k of the robot, and where things are a part (0 to 1) on from what is now. */
+  show(k, now, part) {
     const { ticks, world } = this.run;
-    const isNew = !this.shown || this.shown[0] !== k || this.shown[2] !== this.pixel;
-    this.shown = [k, part, this.pixel];
-    const next = Math.min(k + 1, ticks.x.length - 1);
-    const at = (values) => between(values[k], values[next], part);
-    const x = at(ticks.x);
-    const y = at(ticks.y);
+    const isNew = !this.shown || this.shown[0] !== k || this.drawn !== this.pixel;
+    this.shown = [k, now, part];
+    this.drawn = this.pixel;
+    const at = (values, from) =>
+      between(values[from], values[Math.min(from + 1, values.length - 1)], part);
+    const x = at(ticks.x, k);
+    const y = at(ticks.y, k);
     this.place(this.robot, x, y);
     // What was sensed and decided belongs to the tick, not to the way to the next.
     if (isNew) this.showDecision(k);
     this.place(this.sensors, x, y);
-    world.obstacles.forEach((obstacle, i) => this.showObstacle(i, obstacle, k, at));
+    world.obstacles.forEach((obstacle, i) => this.showObstacle(i, obstacle, k, now, at));
     for (const { first, end, element } of this.stretches) {
       const until = Math.min(k, end);
       const tip = until === k && k < end && x !== null ? `L${x} ${-y}` : "";
@@ -181,16 +194,15 @@ class Scene {
     });
   }
 
-  showObstacle(i, obstacle, k, at) {
+  showObstacle(i, obstacle, k, now, at) {
     const { group, motion } = this.obstacles[i];
-    const x = at(obstacle.x);
-    const y = at(obstacle.y);
+    const x = at(obstacle.x, now);
+    const y = at(obstacle.y, now);
     this.place(group, x, y);
-    const { time } = this.run.ticks;
-    const first = indexAt(time, time[k] - BEHIND);
-    const wake = line(obstacle.x, obstacle.y, this.keptOf[i], first, k);
+    const first = indexAt(this.times, this.times[now] - BEHIND);
+    const wake = line(obstacle.x, obstacle.y, this.keptOf[i], first, now);
     set(this.wakes[i], { d: `${wake}L${x} ${-y}` });
-    const [vx, vy] = [obstacle.vx[k], obstacle.vy[k]];
+    const [vx, vy] = [obstacle.vx[now], obstacle.vy[now]];
     const edge = obstacle.radius / (Math.hypot(vx, vy) || 1);
     set(motion, { d: this.arrow(edge * vx, edge * vy, AHEAD * vx, AHEAD * vy) });
     group.classList.toggle("near", this.run.ticks.near[k].includes(i + 1));

@@ -80,5 +80,6 @@ function table(caption, runs, body) {
 
 /** The name of a run in its colour. */
 function runName(run, number) {
-  return html("span", { class: "run", "data-run": number + 1 }, run.name);
+  const [color] = DATA.looks[number];
+  return html("span", { class: "run", "data-run": number + 1, style: `--c: var(--run-${color})` }, run.name);
 }
