@@ -22,7 +22,7 @@ from mfba_planner.scenarios import load_scenario
 
 
 def record(directory: Path, scenario: str, seed: int) -> Path:
-    """Record a run of a shipped scenario in a domain of its own; return the bag."""
+    """Record a run of a scenario (name or text) in a domain of its own; return the bag."""
     domain, lock = claim_domain()
     told = RunConfig(scenario=load_scenario(scenario), driver=Driver.IN_PROCESS, seed=seed)
     with lock:
@@ -31,6 +31,13 @@ def record(directory: Path, scenario: str, seed: int) -> Path:
 
 
 KINDS = {f"/{topic.name.lstrip('/')}": topic.type for topic in topics.GRAPH}
+
+
+def kind_of(topic: str) -> Any:
+    """The message class of a topic, of a fleet's robot too."""
+    return KINDS.get(topic) or KINDS["/" + topic.split("/", 2)[2]]
+
+
 Edit = Callable[[list[RawMessage]], Iterable[RawMessage]]
 
 
@@ -48,7 +55,7 @@ def rewrite(
         for message in edit(list(reader.messages())):
             if message.topic not in known:
                 known.add(message.topic)
-                kind = type_name(KINDS[message.topic])
+                kind = type_name(kind_of(message.topic))
                 writer.add_topic(message.topic, kind, offered(topics.VIEW_QOS))
             writer.write(message.topic, message.data, message.log_time_ns, message.publish_time_ns)
     return out
@@ -56,7 +63,7 @@ def rewrite(
 
 def changed(message: RawMessage, change: Callable[[Any], None]) -> RawMessage:
     """The message with something changed in it."""
-    decoded = deserialize_message(message.data, KINDS[message.topic])
+    decoded = deserialize_message(message.data, kind_of(message.topic))
     change(decoded)
     return message._replace(data=serialize_message(decoded))
 
@@ -77,7 +84,7 @@ def each_changed(change: Callable[[str, Any], Any]) -> Edit:
 
     def edit(messages: list[RawMessage]) -> Iterable[RawMessage]:
         for raw in messages:
-            message = change(raw.topic, deserialize_message(raw.data, KINDS[raw.topic]))
+            message = change(raw.topic, deserialize_message(raw.data, kind_of(raw.topic)))
             if message is not None:
                 yield raw._replace(data=bytes(serialize_message(message)))
 

@@ -19,13 +19,15 @@ from selenium.webdriver.common.keys import Keys
 from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Episode, run
 from mfba_planner.core.errors import InputError, OutputError
+from mfba_planner.core.fleet import run_fleet
 from mfba_planner.core.gaps import gap_heading
 from mfba_planner.core.metrics import evaluate, tick_clearances
 from mfba_planner.core.planner import Mode, PlannerParams
 from mfba_planner.core.robot import Noise
 from mfba_planner.recording.episode import read_episode
 from mfba_planner.report import words
-from mfba_planner.report.html.data import MOST_RUNS, clearances
+from mfba_planner.report.html.charts import look
+from mfba_planner.report.html.data import MOST_ROBOTS, MOST_RUNS, clearances
 from mfba_planner.report.html.page import as_json, page, write_page
 from mfba_planner.report.moments import closest_passes
 from mfba_planner.report.table import result_rows
@@ -431,6 +433,91 @@ def test_two_runs_stand_side_by_side_on_one_clock(
     for column, episode in enumerate(runs):
         rows = result_rows(episode, evaluate(episode))
         assert [cells[column] for cells in columns] == [figure for _, figure, _ in rows]
+
+
+def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
+    browser: Browser, tmp_path: Path
+) -> None:
+    whole = load_scenario("swap")
+    names = [member.name for member in whole.robots[:8]]
+    runs = list(zip(names, run_fleet(replace(whole, robots=whole.robots[:8]), seed=1)))
+    write_page(runs, tmp_path / "fleet.html", names)
+    browser.open(tmp_path / "fleet.html")
+    assert browser.said() == []
+    heading = browser.run("return document.querySelector('h1').textContent")
+    assert heading == "swap"
+    assert in_sight(browser) == ["1"]
+    assert browser.run("return document.getElementById('robot').value") == "0"
+    first = min(range(8), key=lambda number: len(runs[number][1].ticks))
+    longest = max((episode for _, episode in runs), key=lambda episode: len(episode.ticks))
+    assert len(longest.ticks) > len(runs[first][1].ticks) + 2
+    browser.run(
+        "const list = document.getElementById('robot'); list.value = arguments[0];"
+        "list.dispatchEvent(new Event('change'))",
+        first,
+    )
+    assert in_sight(browser) == [str(first + 1)]
+    assert lit_lines(browser) == {f"line-{first + 1}"}
+    # It has arrived, and the last of the others has not: each is where it is at that time.
+    scrub(browser, len(longest.ticks) - 2)
+    assert tick(browser, first + 1) == len(runs[first][1].ticks) - 1
+    place = f'.card[data-run="{first + 1}"] .other[data-name="{{}}"]'
+    for name, episode in runs:
+        if name != names[first]:
+            moved = browser.run(
+                "return document.querySelector(arguments[0]).getAttribute('transform')",
+                place.format(name),
+            )
+            x, y = map(float, re.findall(r"-?[\d.]+(?:e-?\d+)?", moved))
+            at = episode.ticks[min(len(longest.ticks) - 2, len(episode.ticks) - 1)].pose
+            assert (x, -y) == pytest.approx(at.position, abs=1e-3)
+    # A press on another robot looks with its eyes.
+    other = (first + 3) % 8
+    browser.run(
+        "document.querySelector(arguments[0]).querySelector('.body').dispatchEvent("
+        "new MouseEvent('click', {bubbles: true}))",
+        place.format(names[other]),
+    )
+    assert in_sight(browser) == [str(other + 1)]
+    assert browser.run("return document.getElementById('robot').value") == str(other)
+    last = runs[other][1].ticks[min(len(longest.ticks) - 2, len(runs[other][1].ticks) - 1)]
+    assert field(browser, "reason", other + 1) == last.reason
+    press(browser, Keys.HOME)
+    assert tick(browser, other + 1) == 0
+    assert field(browser, "near", other + 1) == "nothing"
+    columns = browser.run(
+        "return document.querySelectorAll('[aria-label=\"Result\"] thead th').length"
+    )
+    assert columns == 8
+    assert browser.said() == []
+
+
+def in_sight(browser: Browser) -> list[str]:
+    """The numbers of the cards that are shown."""
+    return list(
+        browser.run(
+            "return [...document.querySelectorAll('.card')].filter((card) => !card.hidden)"
+            ".map((card) => card.dataset.run)"
+        )
+    )
+
+
+def lit_lines(browser: Browser) -> set[str]:
+    """The lines of the charts that stand out."""
+    return set(
+        browser.run(
+            "return [...document.querySelectorAll('#charts [id^=line-]:not(.aside)')]"
+            ".map((line) => line.id)"
+        )
+    )
+
+
+def test_thirty_six_lines_can_be_told_apart(tmp_path: Path) -> None:
+    assert len({look(number) for number in range(MOST_ROBOTS)}) == MOST_ROBOTS
+    episode = run(load_scenario("empty"))
+    names = [f"r{number}" for number in range(MOST_ROBOTS + 1)]
+    with pytest.raises(InputError, match=r"37 robots: too many .* name up to 6 with --robot"):
+        write_page([(name, episode) for name in names], tmp_path / "no.html", names)
 
 
 def test_names_are_text_and_never_markup(browser: Browser, tmp_path: Path) -> None:

@@ -74,14 +74,6 @@ def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
     return read_recording(path, salvage=salvage).episodes[ALONE]
 
 
-def read_fleet(path: str | Path, *, salvage: bool = False) -> tuple[Episode, ...]:
-    """read_recording() of a bag of several robots, in the scenario's order; BagError for one."""
-    episodes = read_recording(path, salvage=salvage).episodes
-    if ALONE in episodes:
-        raise BagError(f"{path}: holds one robot's run; read it with read_episode")
-    return tuple(episodes.values())
-
-
 class Summary(NamedTuple):
     """A run in short: episode has its last tick only where the bag was streamed."""
 

@@ -99,7 +99,7 @@ def read_setup(reader: BagReader) -> Setup:
     if ALONE not in found:
         raise BagError(
             f"{reader.path}: holds {len(found)} robots, and a bag of one is read here; use "
-            "mfba_planner.recording.episode.read_fleet"
+            "mfba_planner.recording.episode.read_recording"
         )
     return found[ALONE]
 
