@@ -2,6 +2,7 @@
 """The doors: one function per program, and the one place where errors become exit codes."""
 
 import errno
+import gc
 import os
 import signal
 import sys
@@ -118,7 +119,10 @@ def _command(name: str, module: str) -> int:
         signal.signal(signal.SIGTERM, _unwind)
         return int(main(sys.argv[1:]))
 
-    return guarded_main(run, name)
+    code = guarded_main(run, name)
+    # The process ends: a last search for garbage would cost each command 0.02 s for nothing.
+    gc.freeze()
+    return code
 
 
 def _unwind(_signum: int, _frame: FrameType | None) -> None:
