@@ -33,9 +33,16 @@ def test_a_pause_keeps_the_answer_for_later() -> None:
     world.answered()
     assert not world.may_move_on()
     assert world.cannot_step() == ""
-    world.paused = False
-    assert world.may_move_on()
+    assert world.resume()
     assert world.cannot_step() == "refused: not paused; pause first"
+    assert not world.resume(), "it was not paused"
+
+
+def test_after_a_pause_an_open_tick_still_waits() -> None:
+    world = pace(start_paused=True)
+    world.published(0.0)
+    assert not world.resume()
+    assert world.answered()
 
 
 def test_a_tick_is_repeated_after_each_timeout_and_then_given_up() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What world_sim hears of the planner: every Twist, or the one that answers a stamp."""
+"""What a robot is told by its planner: by every Twist, or by the one that answers a stamp."""
 
 from __future__ import annotations
 
@@ -9,31 +9,38 @@ from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 
+from ..core.episode import World
+from ..core.errors import InputError
 from ..core.geometry import Point
-from ..messages import stamp_ns
+from ..messages import stamp_ns, told
 from ..node_settings import WorldSimSettings
 from . import topics
 from .answers import Answers
 from .deadman import Deadman
 from .letterboxes import Letter, Letterboxes
 from .namespaced import Namespaced
-from .runtime import GraphNode
+from .runtime import GraphNode, Refusals
 from .serialized import header_stamp_ns
+
+REST: Point = (0.0, 0.0)
 
 
 class AnswerTopics:
-    """The subscriptions of world_sim to cmd_vel and goal_step."""
+    """The subscriptions of world_sim to cmd_vel and goal_step, and what they have told last."""
 
     def __init__(
         self,
         node: GraphNode | Namespaced,
         settings: WorldSimSettings,
-        on_twist: Callable[[Any], None],
+        world: Callable[[], World],
+        refusals: Refusals,
         on_heard: Callable[[], None],
     ) -> None:
-        """Subscribe; on_twist takes every Twist, in lockstep on_heard says that one has come."""
+        """Subscribe for the robot of a world; in lockstep on_heard says that a Twist has come."""
+        self.told: Point = REST  # as World.step takes it
         self._settings = settings
-        self._on_twist = on_twist
+        self._world = world
+        self._refusals = refusals
         self._on_heard = on_heard
         self._answers = Answers()
         self._deadman = Deadman(settings)
@@ -44,20 +51,37 @@ class AnswerTopics:
         step = topics.GOAL_STEP
         node.open_boxes(self._goal_steps, step.type, step.name, self._on_goal_step, [step.qos])
 
-    def take(self, stamp: int) -> Any:
-        """The Twist that answers this stamp, once; None while there is none."""
+    def take(self, stamp: int) -> bool:
+        """Lockstep: whether the Twist that answers this stamp has come, once; it is obeyed."""
         if not self._settings.enable_stamped_cmd_vel:
             self._goal_steps.empty()
-        return self._answers.take(stamp)
+        message = self._answers.take(stamp)
+        if message is not None:
+            self._obey(message)
+        return message is not None
 
-    def still_holds(self, velocity: Point) -> Point:
-        """Real time: the velocity that was commanded, or rest where that was too long ago."""
-        return (0.0, 0.0) if self._deadman.lets_go(time.monotonic()) else velocity
+    def rest(self) -> None:
+        """Forget what was told."""
+        self.told = REST
+
+    def rest_if_silent(self) -> None:
+        """Real time: forget what was told too long ago."""
+        if self._deadman.lets_go(time.monotonic()):
+            self.rest()
+
+    def _obey(self, message: Any) -> None:
+        """Do what a Twist says, and rest where it cannot be meant."""
+        self.rest()
+        world = self._world()
+        try:
+            self.told = told(message, world.scenario.robot, world.pose.yaw)
+        except InputError as error:
+            self._refusals.add(error)
 
     def _on_cmd_vel(self, message: Any, info: Any) -> None:
         if not self._settings.lockstep:
             self._deadman.heard(time.monotonic())
-            self._on_twist(message)
+            self._obey(message)
             return
         sent_ns = info["source_timestamp"]
         if self._settings.enable_stamped_cmd_vel:

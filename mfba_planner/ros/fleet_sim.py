@@ -7,10 +7,9 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from ..core.errors import ConfigError, InputError
+from ..core.errors import ConfigError
 from ..core.fleet import Fleet, Place
 from ..core.geometry import Point
-from ..messages import told
 from ..node_settings import WorldSimSettings, names
 from . import convert, params, topics
 from .answer_topics import AnswerTopics
@@ -49,10 +48,8 @@ class FleetSim(GraphNode):
 
     def resume(self) -> None:
         """Go on from a pause; nothing when not paused."""
-        if self.pace.paused:
-            self.pace.paused = False
-            if self.pace.may_move_on():
-                self._move_on()
+        if self.pace.resume():
+            self._move_on()
 
     def look_for_answers(self) -> None:
         """Take what the robots' planners have answered; the last answer moves the world on."""
@@ -60,10 +57,8 @@ class FleetSim(GraphNode):
             return
         for seat in self._asked:
             seat.take(self.stamp_ns)
-        if all(seat.answered for seat in self._asked):
-            self.pace.answered()
-            if self.pace.may_move_on():
-                self._move_on()
+        if all(seat.answered for seat in self._asked) and self.pace.answered():
+            self._move_on()
 
     def _move_on(self) -> None:
         """Do what was told last and publish the next tick, unless the run is over."""
@@ -115,28 +110,21 @@ class _Seat:
         self, sim: FleetSim, settings: WorldSimSettings, place: Place, refusals: Refusals
     ) -> None:
         self.place, self.name = place, place.name
-        self.told: Point = (0.0, 0.0)
         self.answered = False
-        self._refusals = refusals
         frames = {
             name: f"{self.name}/{getattr(settings, name)}" for name in ("base_frame", "scan_frame")
         }
         here = Namespaced(sim, self.name)
         robot = place.scenario.robot
         self.out = WorldTopics(here, replace(settings, **frames), robot, clock=False)  # type: ignore[arg-type]
-        self._answers = AnswerTopics(here, settings, self._obey, sim.look_for_answers)
+        self._answers = AnswerTopics(here, settings, lambda: place, refusals, sim.look_for_answers)
         self.out.begin(place.scenario.goal_m, settings.tick_ns)
+
+    @property
+    def told(self) -> Point:
+        """What the planner has told last, as World.step takes it."""
+        return self._answers.told
 
     def take(self, stamp_ns: int) -> None:
         """Take the answer to this stamp, if it has come."""
-        message = None if self.answered else self._answers.take(stamp_ns)
-        if message is not None:
-            self.answered = True
-            self._obey(message)
-
-    def _obey(self, message: Any) -> None:
-        self.told = (0.0, 0.0)
-        try:
-            self.told = told(message, self.place.scenario.robot, self.place.pose.yaw)
-        except InputError as error:
-            self._refusals.add(error)
+        self.answered = self.answered or self._answers.take(stamp_ns)

@@ -24,9 +24,15 @@ class Pace:
         self._published_s = now_s
         self._repetitions = 0
 
-    def answered(self) -> None:
-        """The answer to the open tick came; or a reset has swept that tick away."""
+    def answered(self) -> bool:
+        """The answer to the open tick came, or a reset has swept it away; may_move_on() then."""
         self.is_open = False
+        return self.may_move_on()
+
+    def resume(self) -> bool:
+        """Go on from a pause; whether the world may move on that could not before."""
+        was_paused, self.paused = self.paused, False
+        return was_paused and self.may_move_on()
 
     def may_move_on(self) -> bool:
         """Lockstep: the tick is answered and nobody holds the world."""

@@ -12,7 +12,7 @@ from std_srvs.srv import SetBool, Trigger
 from ..core.episode import World
 from ..core.errors import InputError
 from ..core.planner import NANO
-from ..messages import pose2d, told
+from ..messages import pose2d
 from ..node_settings import WorldSimSettings, names
 from . import params, topics
 from .answer_topics import AnswerTopics
@@ -34,7 +34,9 @@ class WorldSim(GraphNode):
         self.pace = Pace(s)
         self._refusals = Refusals(self)
         self._out = WorldTopics(self, s, self.scenario.robot)
-        self._answers = AnswerTopics(self, s, self._obey, self._look_for_answer)
+        self._answers = AnswerTopics(
+            self, s, lambda: self.world, self._refusals, self._look_for_answer
+        )
         self.listen(topics.INITIALPOSE, self._on_initialpose)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
@@ -53,16 +55,14 @@ class WorldSim(GraphNode):
 
     def resume(self) -> None:
         """Go on from a pause; nothing when not paused."""
-        if self.pace.paused:
-            self.pace.paused = False
-            if self.pace.may_move_on():
-                self._move_on()
+        if self.pace.resume():
+            self._move_on()
 
     def _begin(self) -> None:
         s = self.settings
         self.world = World(self.scenario, s.tick_ns, s.goal_tolerance_m, s.seed)
         self.over, self._published = False, False
-        self._told = (0.0, 0.0)
+        self._answers.rest()
         self._out.begin(self.scenario.goal_m, self.stamp_ns)
 
     def _move_on(self) -> None:
@@ -71,7 +71,7 @@ class WorldSim(GraphNode):
         if not self._published:
             self._publish_tick()
         elif outcome is None:
-            self.world.step(self._told)
+            self.world.step(self._answers.told)
             self._publish_tick()
         else:
             self.over = True
@@ -81,12 +81,12 @@ class WorldSim(GraphNode):
     def _publish_tick(self) -> None:
         self._published = True
         self.pace.published(time.monotonic())
-        self._out.tick(self.world, self._told, self.stamp_ns)
+        self._out.tick(self.world, self._answers.told, self.stamp_ns)
 
     def _on_timer(self) -> None:
         """Real time: one more tick; the first when everybody of wait_for is there."""
         if not self.pace.paused and not self.over and (self._published or not self.missing()):
-            self._told = self._answers.still_holds(self._told)
+            self._answers.rest_if_silent()
             self._move_on()
 
     def _watch(self) -> None:
@@ -97,22 +97,12 @@ class WorldSim(GraphNode):
                 self._publish_tick()
         elif self.pace.must_repeat(time.monotonic(), self.world.tick):
             self.get_logger().warning(f"tick {self.world.tick} unanswered: published again")
-            self._out.tick(self.world, self._told, self.stamp_ns)
+            self._out.tick(self.world, self._answers.told, self.stamp_ns)
 
     def _look_for_answer(self) -> None:
-        message = self._answers.take(self.stamp_ns) if self.pace.is_open else None
-        if message is not None:
-            self.pace.answered()
-            self._obey(message)
-            if self.pace.may_move_on():
-                self._move_on()
-
-    def _obey(self, message: Any) -> None:
-        self._told = (0.0, 0.0)
-        try:
-            self._told = told(message, self.scenario.robot, self.world.pose.yaw)
-        except InputError as error:
-            self._refusals.add(error)
+        has_come = self.pace.is_open and self._answers.take(self.stamp_ns)
+        if has_come and self.pace.answered():
+            self._move_on()
 
     def _on_initialpose(self, message: PoseWithCovarianceStamped) -> None:
         try:
@@ -137,9 +127,8 @@ class WorldSim(GraphNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._ticks_before_reset += self.world.tick + 1
-        self.pace.answered()
         self._begin()
-        if self.pace.may_move_on():
+        if self.pace.answered():
             self._publish_tick()
         response.success, response.message = True, f"tick 0 at stamp {self.stamp_ns} ns"
         return response
