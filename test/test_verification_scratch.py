@@ -2,6 +2,7 @@
 """mfba verify of recordings that are not ours: decisions from scratch."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,15 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 from recording_bags import FOREIGN, SECOND
+from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, MfbaError
 from mfba_planner.core.planner import Mode
+from mfba_planner.recording.reader import BagReader
 from mfba_planner.recording.writer import BagWriter
+from mfba_planner.ros.serialized import type_name
 from mfba_planner.verification.scratch import Robot, decide_from_scratch
 
 ROBOT = Robot(robot_radius_m=0.3)
@@ -157,10 +161,122 @@ def test_two_scans_must_be_chosen_from(tmp_path: Path) -> None:
     assert (any(front.vs), any(rear.vs)) == (False, True)
 
 
+STORE = get_typestore(Stores.ROS2_JAZZY)
+UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0)
+QUARTER = math.sqrt(0.5)
+
+
+def transforms(*told: tuple[str, str, tuple[float, ...], tuple[float, float]]) -> bytes:
+    """A TFMessage of (frame, frame in it, quaternion, position); its package is not installed."""
+    make = {name.rpartition("/")[2]: kind for name, kind in STORE.types.items()}
+    message = make["TFMessage"](
+        [
+            make["TransformStamped"](
+                make["Header"](make["Time"](0, 0), above),
+                frame,
+                make["Transform"](make["Vector3"](*at, 0.0), make["Quaternion"](*q)),
+            )
+            for above, frame, q, at in told
+        ]
+    )
+    return bytes(STORE.serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
+
+
+def mounted_bag(
+    path: Path, *told: tuple[str, str, tuple[float, ...], tuple[float, float]]
+) -> Path:
+    """A scan in frame laser with something 0.9 m along its beam 0, odometry of base_link."""
+    with BagReader(FOREIGN) as reader:
+        definition = reader.definitions["tf2_msgs/msg/TFMessage"]
+    with BagWriter(path) as writer:
+        writer.add_topic("/tf_static", "tf2_msgs/msg/TFMessage", definition=definition)
+        writer.write("/tf_static", transforms(*told), 0, 0)
+        for name, message, time_ns in (goal(0, 9.0, 0.0), odom(TICK_NS), scan(TICK_NS, 0.9)):
+            kind = type_name(type(message))
+            if kind.endswith("LaserScan"):
+                message.header.frame_id = "laser"
+            if kind.endswith("Odometry"):
+                message.child_frame_id = "base_link"
+            writer.add_topic(name, kind)
+            writer.write(name, serialize_message(message), time_ns, time_ns)
+    return path
+
+
+LEFT = (0.0, 0.0, QUARTER, QUARTER)  # a quarter counter-clockwise
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+HERE = (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("told", "yaw"),
+    [
+        ([("base_link", "laser", LEVEL, HERE)], 0.0),
+        ([("base_link", "laser", LEFT, HERE)], 0.5),
+        ([("base_link", "laser", tuple(3.0 * x for x in LEFT), HERE)], 0.5),
+        ([("base_link", "mast", LEFT, (0.2, 0.0)), ("mast", "laser", LEFT, (0.0, 0.1))], 1.0),
+        ([("footprint", "laser", LEFT, HERE), ("footprint", "base_link", LEVEL, HERE)],
+         0.5),
+        ([("laser", "base_link", LEFT, HERE)], -0.5),
+        ([("base_link", "laser", LEVEL, HERE), ("base_link", "laser", LEFT, HERE)],
+         0.5),
+        # Two lidars one above the other, both upside down: the upper one is level.
+        ([("base_link", "low", UPSIDE_DOWN, HERE), ("low", "laser", UPSIDE_DOWN, HERE)], 0.0),
+    ],
+)  # fmt: skip
+def test_how_the_lidar_is_mounted_tf_static_says(
+    told: list[Any], yaw: float, tmp_path: Path
+) -> None:
+    """Beam 0 sees something 0.9 m away: in the middle of that sector, once the lidar is turned."""
+    path = mounted_bag(tmp_path / "bag", *told)
+    (decided,) = decide_from_scratch(path, ROBOT).decided
+    given = replace(ROBOT, scan_yaw_rad=yaw * math.pi)
+    (expected,) = decide_from_scratch(path, given).decided
+    assert any(decided.vs)
+    assert decided.vs == expected.vs
+    assert decided.ranges_m == pytest.approx(expected.ranges_m, abs=1e-6)
+    (unturned,) = decide_from_scratch(path, replace(ROBOT, scan_yaw_rad=0.0)).decided
+    assert (decided.vs == unturned.vs) == (yaw == 0.0)
+
+
+def test_how_far_the_lidar_is_from_the_middle_is_noted(tmp_path: Path) -> None:
+    told = ("base_link", "mast", LEFT, (0.2, 0.0)), ("mast", "laser", LEFT, (0.15, 0.0))
+    found = decide_from_scratch(mounted_bag(tmp_path / "bag", *told), ROBOT)
+    # 0.2 ahead, then 0.15 along what is ahead of the mast: to the left.
+    assert found.notes == (
+        "/tf_static: laser is turned by 3.142 rad in base_link, 0.25 m off its middle: "
+        "--robot-radius must allow for that",
+    )
+    level = mounted_bag(tmp_path / "level", ("base_link", "laser", LEVEL, HERE))
+    assert decide_from_scratch(level, ROBOT).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("told", "what"),
+    [
+        ([("base_link", "camera", LEVEL, HERE)],
+         "frame 'laser': no /tf_static says how it stands in 'base_link'; give --scan-yaw"),
+        ([("a", "laser", LEVEL, HERE), ("b", "base_link", LEVEL, HERE)], "no /tf_static"),
+        ([("laser", "a", LEVEL, HERE), ("a", "laser", LEVEL, HERE)], "no /tf_static"),
+        ([("base_link", "laser", UPSIDE_DOWN, HERE)], "tilted against 'base_link'"),
+        ([("base_link", "laser", (0.0, 0.1, 0.0, 0.9), HERE)], "tilted against 'base_link'"),
+        ([("base_link", "laser", (0.0, 0.0, 0.0, 0.0), HERE)], "tilted against 'base_link'"),
+    ],
+)  # fmt: skip
+def test_a_lidar_that_nobody_knows_the_mounting_of_is_refused(
+    told: list[Any], what: str, tmp_path: Path
+) -> None:
+    path = mounted_bag(tmp_path / "bag", *told)
+    with pytest.raises(BagError, match=re.escape(what)):
+        decide_from_scratch(path, ROBOT)
+    assert cli.main(["verify", str(path), "--scan-yaw", "0.3"]) == 0
+
+
 def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["verify", str(FOREIGN)]) == 0
     expected = decide_from_scratch(FOREIGN, ROBOT)
     assert capsys.readouterr().out == (
+        "note: /tf_static: laser is turned by 0 rad in base_link, 0.1 m off its middle: "
+        "--robot-radius must allow for that\n"
         f"modes: obstacle_avoidance 67, path_generation 66\n"
         f"from scratch, 133 decisions, digest {expected.digest}\n"
     )

@@ -33,7 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--seed", type=int, help="of all randomness (default: 0)")
     group.add_argument("--robot-radius", type=float, metavar="M", help="added to every return")
-    group.add_argument("--scan-yaw", type=float, metavar="RAD", help="of the scan's frame")
+    group.add_argument(
+        "--scan-yaw",
+        type=float,
+        metavar="RAD",
+        help="of the scan's frame in the robot's (default: as /tf_static has it)",
+    )
     group.add_argument("--scan", metavar="TOPIC", help="where there are several")
     group.add_argument("--odom", metavar="TOPIC", help="where there are several")
 
@@ -76,7 +81,7 @@ def _robot(found: argparse.Namespace) -> Robot:
     given = VirtualSensorSettings(**{k: v for k, v in told.items() if v is not None})
     return Robot(
         robot_radius_m=given.robot_radius_m,
-        scan_yaw_rad=given.scan_yaw,
+        scan_yaw_rad=found.scan_yaw,
         goal=_goal(found.goal),
         scan=found.scan or "",
         odom=found.odom or "",

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.digest import digest
-from ..core.errors import BagError, InputError
+from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner import Decision, PlannerParams, Refused, observe
 from ..core.sensing import Ranges, SensorParams, aligned, sense_scan
@@ -21,6 +21,7 @@ from ..recording.decisions import DECISION, SECTORS, deciders
 from ..recording.integrity import check_data
 from ..recording.reader import BagReader, DecodedMessage
 from ..recording.robots import ALONE
+from .mounting import StaticFrames
 
 ODOMETRY, SCAN, GOAL = (
     "nav_msgs/msg/Odometry",
@@ -32,10 +33,10 @@ GOAL_TOPIC = "goal_pose"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:
-    """What a recording does not say; goal None: the one that was recorded."""
+    """What a recording does not say; goal and scan_yaw_rad None: as recorded."""
 
     robot_radius_m: float
-    scan_yaw_rad: float = 0.0
+    scan_yaw_rad: float | None = None
     goal: Point | None = None
     scan: str = ""
     odom: str = ""
@@ -68,8 +69,9 @@ def is_foreign(reader: BagReader) -> bool:
 def decide_from_scratch(path: str | Path, robot: Robot) -> FromScratch:
     """Decide on every scan with the odometry of its stamp, or the newest recorded before it.
 
-    As virtual_sensor (source: scan) and planner do when the bag is replayed. Raises BagError for
-    a bag that cannot be read, without goal, or where topics must be named.
+    As virtual_sensor (source: scan) and planner do when the bag is replayed, with the lidar as
+    /tf_static has it. Raises BagError for a bag that cannot be read, without goal, where topics
+    must be named, and where nobody says how the lidar is mounted.
     """
     with BagReader(path) as reader:
         for file in reader.file_paths:
@@ -79,7 +81,8 @@ def decide_from_scratch(path: str | Path, robot: Robot) -> FromScratch:
         faults: list[str] = []
         poses = _Poses(reader, odom, faults)
         goals = _goals(reader, robot)
-        return _Decider(robot, poses, goals, faults).on(reader, scan)
+        mounted = _Mounted(reader, robot, odom)
+        return _Decider(robot, poses, goals, faults, mounted).on(reader, scan)
 
 
 def _topic(reader: BagReader, kind: str, wanted: str, option: str) -> str:
@@ -145,13 +148,48 @@ class _Poses:
         return self._all[place - 1] if place else None
 
 
+class _Mounted:
+    """How the lidar of each scan is turned against the robot."""
+
+    def __init__(self, reader: BagReader, robot: Robot, odom: str) -> None:
+        self.notes: list[str] = []
+        self._told = robot.scan_yaw_rad
+        self._path, self._frames = reader.path, StaticFrames(reader)
+        self._base = next((m.message.child_frame_id for m in reader.decoded([odom])), "")
+        self._yaws: dict[str, float] = {}
+
+    def yaw_rad(self, scan: Any) -> float:
+        """Raises BagError where nothing says it."""
+        if self._told is not None:
+            return self._told
+        frame = scan.header.frame_id
+        if frame not in self._yaws:
+            try:
+                yaw, offset_m = self._frames.mounting(frame, self._base)
+            except FrameError as error:
+                raise BagError(f"{self._path}: {error}") from None
+            self._yaws[frame] = yaw
+            if yaw or offset_m:
+                self.notes.append(
+                    f"/tf_static: {frame} is turned by {yaw:.4g} rad in {self._base}, "
+                    f"{offset_m:.4g} m off its middle: --robot-radius must allow for that"
+                )
+        return self._yaws[frame]
+
+
 class _Decider:
     """Takes the scans one by one."""
 
     def __init__(
-        self, robot: Robot, poses: _Poses, goals: list[tuple[int, Point]], faults: list[str]
+        self,
+        robot: Robot,
+        poses: _Poses,
+        goals: list[tuple[int, Point]],
+        faults: list[str],
+        mounted: _Mounted,
     ) -> None:
         self._robot = robot
+        self._mounted = mounted
         self._poses = poses
         self._goals = goals
         self._faults = faults
@@ -168,7 +206,10 @@ class _Decider:
         return FromScratch(
             decided=tuple(decided),
             faults=tuple(self._faults),
-            notes=tuple(f"{count} scans {what}" for what, count in self._counts.items()),
+            notes=(
+                *self._mounted.notes,
+                *(f"{count} scans {what}" for what, count in self._counts.items()),
+            ),
         )
 
     def _decide(self, stamp: int, log_time_ns: int, scan: Any) -> Decision | None:
@@ -187,7 +228,7 @@ class _Decider:
         seen = observe(stamp, pose, ranges, goal, self._pose, max(stamp - posed_ns, 0))
         self._pose = seen.pose
         if self._robot.planner.tracks_scan and not seen.refused:
-            yaw = seen.pose.yaw + self._robot.scan_yaw_rad
+            yaw = seen.pose.yaw + self._mounted.yaw_rad(scan)
             seen = replace(seen, scan=aligned(laser_scan(scan), yaw))
         return self._brain.plan(seen)
 
@@ -195,7 +236,7 @@ class _Decider:
         if isinstance(pose, str):
             return pose
         robot = self._robot
-        yaw = pose.yaw + robot.scan_yaw_rad
+        yaw = pose.yaw + self._mounted.yaw_rad(scan)
         return or_refused(
             lambda x: sense_scan(laser_scan(x), yaw, robot.robot_radius_m, robot.sensor), scan
         )
