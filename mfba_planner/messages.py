@@ -58,12 +58,12 @@ def pose2d(pose: Any, what: str) -> Pose2D:
     return Pose2D(p.x, p.y, yaw_of(q.x, q.y, q.z, q.w))
 
 
-def require_frame(message: Any, frame: str, what: str) -> None:
+def require_frame(message: Any, frame: str, what: str, parameter: str = "odom_frame") -> None:
     """Raise FrameError for a message in another frame; an empty frame asks for none."""
     given = message.header.frame_id
     if frame and given != frame:
         raise FrameError(
-            f"{what} is in frame {given!r}, not {frame!r}; transform it, or set odom_frame"
+            f"{what} is in frame {given!r}, not {frame!r}; transform it, or set {parameter}"
         )
 
 
@@ -124,8 +124,12 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
     return ranges
 
 
-def laser_scan(message: Any) -> Scan:
-    """sensor_msgs/LaserScan to a Scan; core.sensing.sense_scan judges it."""
+def laser_scan(message: Any, frame: str = "") -> Scan:
+    """sensor_msgs/LaserScan to a Scan, which core.sensing.sense_scan judges.
+
+    Raises FrameError for another frame.
+    """
+    require_frame(message, frame, "scan", "scan_frame")
     return Scan(
         ranges_m=np.asarray(message.ranges, dtype=np.float64),
         angle_min_rad=message.angle_min,

@@ -96,6 +96,7 @@ class VirtualSensorSettings:
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )
+    scan_frame: str = option("", "frame that scans must be in, that of scan_yaw; empty: any")
     lockstep: bool = option(False, "pair odom with scan by stamp; false: newest odom")
     odom_frame: str = option("odom", "frame the sectors are aligned with")
     wait_for: str = option("", _WAIT_FOR)

@@ -43,7 +43,7 @@ class Wired:
             graph.probe.create_subscription(topic.type, topic.name, deliver, topic.qos)
         self.sensor = graph.start(
             VirtualSensor,
-            {"source": "scan"},
+            {"source": "scan", "scan_frame": "base_link"},
             cli_args=_remapped("odom", "scan"),
         )
         self.planner = graph.start(

@@ -64,6 +64,12 @@ FAULTS = {
     "stale odom": ("odom", lost, STALE, "odom stale for"),
     "odom with one stamp": ("odom", repeated(), STALE, "odom stale for"),
     "stale sectors": ("sectors", lost, STALE, "sectors stale for"),
+    "frame of scan": (  # whose names its log holds: test_nodes_virtual_sensor
+        "scan",
+        changed("header.frame_id", "rear"),
+        ERROR,
+        "refused: sector 1 holds nan",
+    ),
     "NaN scan": ("scan", changed("ranges", [NAN] * 360), ERROR, "refused: sector 1 holds nan"),
     "NaN sectors": ("sectors", changed("ranges", BLIND), ERROR, "refused: sector 1 holds nan"),
     "NaN odom": (

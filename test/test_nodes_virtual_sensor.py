@@ -206,6 +206,18 @@ def test_the_sectors_stay_aligned_with_odom_when_the_robot_turns(graph: Graph) -
     assert [i for i, r in enumerate(answer.ranges, start=1) if r < INF] == [3, 4]
 
 
+def test_a_scan_in_another_frame_blinds_and_both_are_named(graph: Graph) -> None:
+    sensor = Sensor(graph, {**LOCKSTEP_SCAN, "scan_frame": "base_scan"})
+    other = scan(1)
+    other.header.frame_id = "rear"
+    assert all(map(math.isnan, sensor.answer(odom(1), other).ranges))
+    assert sensor.node._refusals.by_kind == {"input: frame": 1}
+    assert sensor.node._refusals.last == (
+        "scan is in frame 'rear', not 'base_scan'; transform it, or set scan_frame"
+    )
+    assert not any(map(math.isnan, sensor.answer(odom(2), scan(2)).ranges))
+
+
 def test_lockstep_joins_scan_and_odom_by_stamp(graph: Graph) -> None:
     sensor = Sensor(graph, LOCKSTEP_SCAN)
     assert not sensor.answers(odom(1, yaw=1.0), scan(2))

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots that turn, and lidars, in the real graph: the core's decisions, and what goes over it."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from edited_bags import rewrite
 from graph import Graph
 
 from mfba_planner.core.digest import digest
@@ -70,6 +72,25 @@ def test_the_graph_decides_as_the_core_and_verify_agrees(
     assert any(tick.vs and any(tick.vs) for tick in recorded.ticks), "nobody was met"
     report = verify(tmp_path / "bag")
     assert report.is_identical, report.faults
+
+
+def test_verify_knows_which_scans_the_sensor_would_refuse(tmp_path: Path, domain_id: int) -> None:
+    scenario = near(SCANNING)
+    run_in_process(told(scenario, PAPER), tmp_path / "bag", domain_id=domain_id)
+
+    def asking(frame: str) -> Callable[[Any], Any]:
+        def configure(content: Any) -> Any:
+            content["nodes"]["virtual_sensor"]["scan_frame"] = frame
+            return content
+
+        return configure
+
+    same = rewrite(tmp_path / "bag", tmp_path / "same", list, configure=asking("base_scan"))
+    assert verify(same).is_identical
+    other = rewrite(tmp_path / "bag", tmp_path / "other", list, configure=asking("rear"))
+    report = verify(other)
+    assert len(report.faults) == len(report.recorded)
+    assert all("/sectors is not what the sensor measures" in fault for fault in report.faults)
 
 
 def start(graph: Graph, config: RunConfig, **more: Any) -> WorldSim:

@@ -35,6 +35,7 @@ class Setup(NamedTuple):
     driver: str
     lockstep: bool
     odom_frame: str = ""  # that its inputs must be in; "": any
+    scan_frame: str = ""  # and its sensor's scans
 
     def episode(self, ticks: tuple[Decision, ...], truth: Mapping[int, Pose2D] = {}) -> Episode:
         """The Episode of these decisions, at least one; truth is where the robot was, by stamp."""
@@ -82,6 +83,7 @@ def read_setups(reader: BagReader) -> Setups:
                 driver=configuration["run"].get("driver", "by hand"),
                 lockstep=bool(planner["lockstep"]),
                 odom_frame=planner.get("odom_frame", ""),
+                scan_frame=sensor.get("scan_frame", ""),
             )
         alone = found.get(ALONE)
         return Setups(scenario, alone.seed if alone else world["seed"], found)

@@ -103,7 +103,7 @@ class VirtualSensor(GraphNode):
     def _measure(self, pose: Pose2D, message: Any) -> Ranges:
         s = self.settings
         if s.source is Source.SCAN:
-            scan: Scan = laser_scan(message)
+            scan: Scan = laser_scan(message, s.scan_frame)
             return sense_scan(scan, pose.yaw + s.scan_yaw, s.robot_radius_m, self.sensor)
         centers = obstacle_centers(message)
         circles = zip(centers, self._enlarged(centers))

@@ -205,7 +205,7 @@ def _is_sensed(setup: Setup, tick: Tick, was: Decision) -> bool:
     try:
         pose = robot_pose(tick.said[ODOM])
         if lidar.beams:
-            scan, yaw = laser_scan(tick.said[SCAN]), pose.yaw + lidar.yaw_rad
+            scan, yaw = laser_scan(tick.said[SCAN], setup.scan_frame), pose.yaw + lidar.yaw_rad
             return sense_scan(scan, yaw, scenario.robot_radius_m, setup.sensor) == was.ranges_m
         centers = obstacle_centers(tick.said[OBSTACLES])
     except InputError:
