@@ -61,6 +61,7 @@ PERCEPTIONS = (
     Entry("scan-360, 2 cm noise", "predictive", _seen("scan-360", 0.02)),
     Entry("scan-360, 1 tick late", "predictive", _seen("scan-360", 0.0, 1)),
     Entry("scan-360, both", "predictive", _seen("scan-360", 0.02, 1)),
+    Entry("the paper's sectors", "predictive", _seen("sectors")),
 )
 INGREDIENTS = (
     Entry("paper's bits, step 0.3 m", "paper", PAPER),

@@ -83,7 +83,7 @@ def test_paper_has_its_own_step_and_all_others_share_one(made: Path) -> None:
         for path in (made / "out").iterdir()
         if not path.name.endswith("optima")
     }
-    assert len(steps) == 7 + 5 + 8
+    assert len(steps) == 7 + 6 + 8
     assert {name for name, step in steps.items() if step != 0.08} == {"random-20-paper"}
     assert steps["random-20-paper"] == 0.3
 
@@ -93,7 +93,7 @@ def test_ingredients_and_perceptions_share_what_is_the_same_run(made: Path) -> N
     suite = lines(page, "### random-20")["predictive"]
     seen = lines(page, "## What predictive sees")
     bought = lines(page, "## What each ingredient buys")
-    assert len(seen) == 6
+    assert len(seen) == 7
     assert len(bought) == 10
     for same in (seen["random-20: known"], bought["random-20: all (predictive)"]):
         assert {**same, "planner": "predictive"} == suite

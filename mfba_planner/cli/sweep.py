@@ -17,10 +17,11 @@ from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
 from ..launcher.settings import add_set_argument, with_settings
 from ..outputs import new_run_directory, write_same
+from ..planners.perception import NAMES as PERCEPTIONS
 from ..planners.registry import PLANNERS
 from ..study.compute import check_workers
 from ..sweep.columns import COLUMNS, TIMINGS
-from ..sweep.order import PATIENCE_S, PERCEPTIONS, Order, Setting, own_preset
+from ..sweep.order import PATIENCE_S, Order, Setting, own_preset
 from ..sweep.parts import parts_of
 from ..sweep.run import Swept, dask_executor, open_store, sweep
 from ..sweep.table import write
@@ -80,7 +81,8 @@ def _parser() -> Parser:
         )
     parser.add_argument(
         "--perception", choices=PERCEPTIONS, default="known",
-        help="known: circles within SR with velocities; scan-N: N beams (default: known)",
+        help="sectors: the paper's bits alone; known: circles within SR with velocities; "
+        "scan-N: N beams (default: known)",
     )  # fmt: skip
     parser.add_argument(
         "--noise", type=float, default=0.0, metavar="M", help="its standard deviation, m"

@@ -44,7 +44,7 @@ class RiskParams:
         1.5, "ticks of an obstacle's own motion added to it", minimum=0.0, maximum=100.0
     )
     waiting: float = option(
-        0.2, "what a second of waiting counts, in seconds of driving", minimum=0.0, maximum=100.0
+        0.1, "what a second of waiting counts, in seconds of driving", minimum=0.0, maximum=100.0
     )
 
     def __post_init__(self) -> None:

@@ -33,7 +33,7 @@ class PredictiveParams:
     """What the predictive planner has beside the paper's options."""
 
     headings: int = option(72, "headings, one bit each", minimum=12, maximum=3600)
-    reach_m: float = option(1.5, "farthest waypoint", unit="m", minimum=0.01, maximum=100.0)
+    reach_m: float = option(2.5, "farthest waypoint", unit="m", minimum=0.01, maximum=100.0)
     search_m: float = option(
         0.3, "radius of the disc the bats search", unit="m", minimum=0.001, maximum=100.0
     )

@@ -15,12 +15,11 @@ from ..core.options import flatten
 from ..core.planner import PathPlanner, PlannerParams
 from ..core.sensing import SensorParams
 from ..core.world import Scenario
-from ..planners.perception import NAMES, Perception
+from ..planners.perception import Perception
 from ..planners.registry import Factory, known, preset_of
 from ..worlds import suite
 from ..worlds.suites import SPEED_MPS
 
-PERCEPTIONS = tuple(name for name in NAMES if name != "sectors")
 PATIENCE_S, LONGEST_S = 60.0, 86_400.0
 
 
