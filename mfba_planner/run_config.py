@@ -12,7 +12,7 @@ import numpy as np
 
 from . import __version__
 from .core.errors import ConfigError
-from .core.fleet import seed_of, seen_by
+from .core.fleet import seed_of, worlds_seen
 from .core.geometry import Pose2D
 from .core.options import Scalar, check, flatten, option
 from .core.planner import NANO, PlannerParams
@@ -122,12 +122,9 @@ def fleet_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     scenario = config.scenario
     wholes = {"world_sim": node_parameters(config, peers)["world_sim"]}
     starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
-    for number, member in enumerate(scenario.robots):
-        one = replace(
-            config,
-            scenario=seen_by(scenario, number, starts, config.planner.tick_ns),
-            seed=seed_of(config.seed, number),
-        )
+    worlds = worlds_seen(scenario, starts, config.planner.tick_ns)
+    for number, (member, world) in enumerate(zip(scenario.robots, worlds)):
+        one = replace(config, scenario=world, seed=seed_of(config.seed, number))
         told = node_parameters(one, peers)
         wholes |= {f"{member.name}/{name}": told[name] for name in ("virtual_sensor", "planner")}
     return wholes

@@ -129,16 +129,19 @@ class Fleet:
             self.outcomes[number] = self.places[number].outcome()
 
 
-def seen_by(
-    scenario: Scenario, number: int, poses: Sequence[Sequence[Pose2D]], tick_ns: int
-) -> Scenario:
-    """The scenario of one robot with all others as obstacles that went as they did.
+def worlds_seen(
+    scenario: Scenario, poses: Sequence[Sequence[Pose2D]], tick_ns: int
+) -> list[Scenario]:
+    """The scenario of each robot with all others as obstacles that went as they did.
 
     poses holds those of each robot, one per tick until it ended.
     """
-    own = alone(scenario, number)
-    ways = [way(p, tick_ns, scenario.robot_radius_m) for n, p in enumerate(poses) if n != number]
-    return replace(own, obstacles=(*own.obstacles, *ways))
+    ways = [way(went, tick_ns, scenario.robot_radius_m) for went in poses]
+    found = []
+    for number in range(len(ways)):
+        own, others = alone(scenario, number), ways[:number] + ways[number + 1 :]
+        found.append(replace(own, obstacles=(*own.obstacles, *others)))
+    return found
 
 
 def way(poses: Sequence[Pose2D], tick_ns: int, radius_m: float) -> Obstacle:
@@ -219,10 +222,10 @@ def episodes(
 ) -> tuple[Episode, ...]:
     """What came of a fleet: an Episode of each robot."""
     errs = fleet.scenario.robot.noise.of_odometry
-    poses = [place.poses for place in fleet.places]
+    worlds = worlds_seen(fleet.scenario, [place.poses for place in fleet.places], fleet.tick_ns)
     return tuple(
         Episode(
-            scenario=seen_by(fleet.scenario, number, poses, fleet.tick_ns),
+            scenario=worlds[number],
             sensor=sensor,
             planner=planner,
             seed=place.seed,

@@ -38,6 +38,10 @@ class Obstacle:
     heading_rad: float = 0.0
     turns: tuple[Turn, ...] = ()
 
+    def __hash__(self) -> int:
+        """Quick however many turns there are: motions are looked up by obstacle all the time."""
+        return hash((self.center_m, self.radius_m, self.speed_mps, self.heading_rad))
+
     @property
     def top_speed_mps(self) -> float:
         """The highest speed of the whole motion in m/s."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ..core.digest import Digest, digest
 from ..core.episode import Episode
 from ..core.errors import BagError, InputError
-from ..core.fleet import seen_by
+from ..core.fleet import worlds_seen
 from ..core.geometry import Pose2D
 from ..core.metrics import Result, Tally, evaluate
 from ..core.planner import Decision
@@ -57,13 +57,9 @@ def read_recording(
     }
     if scenario.robots:
         poses = [e.truth or tuple(tick.pose for tick in e.ticks) for e in episodes.values()]
-        episodes = {
-            name: replace(
-                episode, scenario=seen_by(scenario, number, poses, episode.planner.tick_ns)
-            )
-            for number, (name, episode) in enumerate(episodes.items())
-            if name in wanted
-        }
+        tick_ns = next(iter(setups.values())).planner.tick_ns
+        worlds = dict(zip(names, worlds_seen(scenario, poses, tick_ns)))
+        episodes = {name: replace(episodes[name], scenario=worlds[name]) for name in wanted}
     return Recording(scenario, seed, episodes)
 
 

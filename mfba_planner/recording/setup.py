@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from ..core.episode import Episode, Outcome, World
 from ..core.errors import BagError, ConfigError, InputError
-from ..core.fleet import seen_by
+from ..core.fleet import worlds_seen
 from ..core.geometry import Pose2D
 from ..core.options import flatten, override
 from ..core.planner import Decision, PlannerParams
@@ -70,15 +70,15 @@ def read_setups(reader: BagReader) -> Setups:
         scenario = load_scenario(world["scenario_json"])
         names = [member.name for member in scenario.robots]
         starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
+        worlds = worlds_seen(scenario, starts, world["tick_ns"]) if names else [scenario]
         found = {}
-        for number, name in enumerate(names or [ALONE]):
+        for name, seen in zip(names or [ALONE], worlds):
             above = f"{name}/" if name else ""
             planner, sensor = (nodes[above + node] for node in ("planner", "virtual_sensor"))
-            params = _only(PlannerParams(), planner)
             found[name] = Setup(
-                scenario=seen_by(scenario, number, starts, params.tick_ns) if name else scenario,
+                scenario=seen,
                 sensor=_only(SensorParams(), sensor),
-                planner=params,
+                planner=_only(PlannerParams(), planner),
                 seed=planner["seed"],
                 driver=configuration["run"].get("driver", "by hand"),
                 lockstep=bool(planner["lockstep"]),
