@@ -19,8 +19,8 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmark_costs import measure_costs
-from benchmark_page import render
+from benchmark_costs import measure_costs, measure_rates
+from benchmark_page import PER_MINUTE, render
 from benchmark_pictures import write_pictures
 from benchmark_runs import HEADLINE, Counts, Results, say
 
@@ -29,6 +29,7 @@ from mfba_planner.study.compute import belong_to_the_parent
 from mfba_planner.worlds import suite_names
 
 ROOT = Path(__file__).parents[1]
+RATE_WORLDS = 2000  # runs by which episodes per minute are measured
 BEGIN, END = "<!-- generated: begin -->\n", "<!-- generated: end -->\n"
 
 
@@ -95,11 +96,13 @@ def main(args: list[str] | None = None) -> None:
     with _pool(found.workers) as executor:
         results = Results(out, found.workers, executor, found.first)
         results.make_all(suites, counts)
+        worlds = min(counts.worlds, RATE_WORLDS)
+        rates = measure_rates(tuple(PER_MINUTE), worlds, found.workers, executor)
     costs = measure_costs(found.rounds)
     images = found.docs / "images"
     images.mkdir(exist_ok=True)
     examples = write_pictures(results, suites, counts, costs, images)
-    text = render(results, suites, counts, costs, examples, _command(found))
+    text = render(results, suites, counts, costs, rates, examples, _command(found))
     target.write_text(_between(target.read_text(encoding="utf-8"), text), encoding="utf-8")
     print(text)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one decision costs: ours, pyrvo's ORCA and a dynamic window, in turn, among ever more.
+"""What runs cost, and one decision: ours, pyrvo's ORCA, a dynamic window, among ever more.
 
 The dynamic window is this package's `dwa` (samples of velocities simulated on, as in the tutorial
 PythonRobotics, but all at once in numpy); the tutorial is no package that could be measured.
@@ -10,22 +10,26 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
-from benchmark_runs import FINE
+from benchmark_runs import FINE, Entry
 from planners import arrangement
 
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.planner import Observation
 from mfba_planner.planners.registry import make
 from mfba_planner.sweep.keeper import Lost, each
+from mfba_planner.sweep.order import Order
+from mfba_planner.sweep.run import sweep
 
 COUNTS = (1, 3, 10, 30, 100, 300, 1000)
 NAMES = ("predictive", "orca", "dwa")
 ARRANGEMENTS = 20
 FEWEST = 3 * ARRANGEMENTS  # rounds; in the first third every planner meets its arrangement
 PATIENCE_S = 3600.0
+RATE_SUITE, RATE_ROUNDS = "random-10", 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +49,23 @@ class Costs:
         far = [k for k, count in enumerate(self.counts) if count >= 10]
         x = np.log([self.counts[k] for k in far])
         return float(np.polyfit(x, np.log([self.median_us[name][k] for k in far]), 1)[0])
+
+
+def measure_rates(
+    entries: Sequence[Entry], worlds: int, workers: int, executor: Executor | None
+) -> Mapping[str, list[float]]:
+    """Episodes per minute of whole sweeps that nothing is kept of, by label; all in turn."""
+    found: dict[str, list[float]] = {entry.label: [] for entry in entries}
+    for _ in range(RATE_ROUNDS):
+        for entry in entries:
+            order = Order(
+                suite=RATE_SUITE, planners=(entry.planner,), worlds=worlds, oracle=False,
+                setting=entry.setting,
+            )  # fmt: skip
+            begun = time.perf_counter()
+            sweep(order, workers=workers, executor=executor)
+            found[entry.label].append(60.0 * worlds / (time.perf_counter() - begun))
+    return found
 
 
 def measure_costs(rounds: int) -> Costs:

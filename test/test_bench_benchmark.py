@@ -99,6 +99,17 @@ def test_ingredients_and_perceptions_share_what_is_the_same_run(made: Path) -> N
         assert {**same, "planner": "predictive"} == suite
 
 
+def test_episodes_per_minute_are_of_whole_sweeps(made: Path) -> None:
+    page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    targets = lines(page, "## Targets")
+    for name in ("paper", "predictive"):
+        told = targets[f"episodes per minute, {name}, random-10, workers: 1"]["found"]
+        found, low, high = map(float, re.findall(r"\d+", told)[:3])
+        # Two short runs, and half a second to start a process for them.
+        assert 10.0 < low <= found <= high < 2 * 60.0 / 0.01
+        assert "in 3 sweeps" in told
+
+
 def test_what_was_written_by_hand_stays_and_pictures_are_small(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     assert page.partition("<!-- generated")[0] == PAGE.partition("<!-- generated")[0]
