@@ -9,13 +9,16 @@ import pytest
 from mfba_planner.core.episode import World
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D, distance
+from mfba_planner.core.nearby import FEW
 from mfba_planner.core.sensing import SensorParams, sense_circles
 from mfba_planner.worlds import suite
 
 SR_M = 0.8
 
 
-@pytest.mark.parametrize("name", ["random-30", "adversarial", "dynabarn-like"])
+@pytest.mark.parametrize(
+    "name", ["random-3", "random-20", "random-30", "adversarial", "dynabarn-like"]
+)
 def test_nobody_within_reach_is_missing(name: str) -> None:
     scenario = suite(name).world(3)
     world, rng = World(scenario, 100_000_000, 0.02), np.random.default_rng(1)
@@ -34,7 +37,7 @@ def test_nobody_within_reach_is_missing(name: str) -> None:
         assert circles == [everyone[i] for i in which]
         fewest = min(fewest, len(which))
         world.step(velocity)
-    assert fewest < len(scenario.obstacles)
+    assert (fewest < len(scenario.obstacles)) == (len(scenario.obstacles) > FEW)
 
 
 def test_another_reach_is_another_question() -> None:

@@ -308,6 +308,18 @@ def test_the_last_step_is_cut_to_the_goal(kind: Swarm) -> None:
         assert bool(decision.candidates) is not exact
 
 
+NUMBERS = st.one_of(
+    st.integers(0, 2**72), st.sampled_from([0, 1, 2**32 - 1, 2**32, 2**64 - 1, 2**64])
+)
+
+
+@given(NUMBERS, NUMBERS)
+def test_the_words_a_stream_is_made_of_are_those_numpy_makes_itself(seed: int, stamp: int) -> None:
+    sequence = np.random.SeedSequence(seed, spawn_key=(1, stamp))
+    expected = np.random.Generator(np.random.PCG64(sequence))
+    assert stream(seed, stamp).random(8).tolist() == expected.random(8).tolist()
+
+
 def test_the_stream_of_a_decision_is_named_by_seed_purpose_and_stamp() -> None:
     expected = np.random.Generator(
         np.random.PCG64(np.random.SeedSequence(4, spawn_key=(1, 123456789012)))

@@ -74,7 +74,9 @@ class BatSwarm:
         self.params = params
         self.horizon = horizon or params.iterations
         self.region = region
-        self._flight = Law.of(params, region).flight(len(region.span()[0]))
+        low, high = region.span()
+        d = len(low)
+        self._flight = Law.of(params, region).flight(d)
         self.t = 0
         self.best_x: Vector = []
         self.best_value = math.inf
@@ -83,17 +85,12 @@ class BatSwarm:
         self._ahead = ahead
         self._asked = False
         n = params.population
-        low, high = region.span()
-        d = len(low)
         sign = 1.0 if params.initial is Initial.INSIDE else -1.0
-        u = rng.random(n * d).tolist()
+        sides = [(lo, sign * (hi - lo)) for lo, hi in zip(low, high)]
         self._x = self._bounded(
             [
-                [
-                    lo + sign * uj * (hi - lo)  # eq. 3
-                    for lo, hi, uj in zip(low, high, u[k : k + d])
-                ]
-                for k in range(0, n * d, d)
+                [lo + uj * side for uj, (lo, side) in zip(u, sides)]  # eq. 3
+                for u in rng.random((n, d)).tolist()
             ]
         )
         self._stride = draws_per_bat(params, d)
@@ -148,8 +145,10 @@ class BatSwarm:
             self._values = [math.inf if v != v else v for v in values]
         else:
             self._accept(values)
-        if not finite or min(values) < self.best_value:
+        if not finite:
             self._keep_best(self.candidates, values)
+        elif (least := min(values)) < self.best_value:
+            self.best_x, self.best_value = self.candidates[values.index(least)], least
 
     def resettle(self, region: Region, objective: Callable[[Vector], float]) -> None:
         """Draw bats and best into another region and value them again, between tell and ask.
@@ -194,14 +193,13 @@ class BatSwarm:
         """
         n, d, stride = self.params.population, len(self.best_x), self._stride
         count = max(1, min(self._ahead - self.t + 1, DRAWN_AHEAD // (n * stride)))
-        u = self._rng.random(count * n * stride).tolist()
+        u = self._rng.random((count * n, stride)).T.tolist()
         # An epsilon for each coordinate, or the first one for all of them.
-        epsilons = [u[3 + (j if self._each else 0) :: stride] for j in range(d)]
-        sorts = [self._decays(u[::stride]), u[1::stride], *epsilons]
-        self._readers = [iter(values) for values in sorts]
+        epsilons = u[3 : 3 + d] if self._each else u[3:4] * d
+        self._readers = list(map(iter, (self._decays(u[0]), u[1], *epsilons)))
         if self._paired:
-            self._picks = [iter(u[3 + d :: stride]), iter(u[4 + d :: stride])]
-        self._gates = u[2::stride]
+            self._picks = [iter(u[3 + d]), iter(u[4 + d])]
+        self._gates = u[2]
         self._gate = 0
 
     def _fly(self) -> list[Vector]:
@@ -229,6 +227,7 @@ class BatSwarm:
             limit = self.best_value if self._limit is Acceptance.BEST else math.inf
             limits = [limit] * len(own)
         always = changed = self._always
+        rate = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
         for i, value in enumerate(values):
             if value <= limits[i] and gates[gate + i] < a[i]:
                 self._x[i] = self.candidates[i]
@@ -237,7 +236,7 @@ class BatSwarm:
                 continue
             changed = True
             a[i] *= p.alpha  # eq. 8
-            self._r[i] = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
+            self._r[i] = rate
         if changed:
             self._scale = p.sigma * math.fsum(a) / p.population
 
@@ -276,7 +275,8 @@ def minimize(
         values: list[Any] = []
         points = ask()
         try:
-            values.extend(map(objective, points))  # keeps what came before an exception
+            for x in points:
+                values.append(objective(x))  # keeps what came before an exception
         except Exception as error:
             values.append(error)  # named and counted by tell
             values += [_value(objective, x) for x in points[len(values) :]]

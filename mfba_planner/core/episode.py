@@ -180,23 +180,27 @@ def sense(world: World, params: SensorParams) -> Ranges:
 
     Raises InputError for a scan that cannot be used.
     """
-    seen, robot = world.read(), world.scenario.robot
+    return _sensed(world, world.read(), params)
+
+
+def _sensed(world: World, seen: Reading, params: SensorParams) -> Ranges:
     if seen.scan is None:
         position = seen.received.position
         _, circles = world.near(params.sensing_range_m, position)
         return sense_circles(position, circles, params)
-    yaw = seen.received.yaw + robot.lidar.yaw_rad
+    yaw = seen.received.yaw + world.scenario.robot.lidar.yaw_rad
     return sense_scan(seen.scan, yaw, world.scenario.robot_radius_m, params)
 
 
 def look(world: World, sensor: SensorParams) -> Observation:
     """What the paper's planner gets to know at the present tick: pose, sectors, goal."""
+    seen = world.read()
     ranges: Ranges | Refused
     try:
-        ranges = sense(world, sensor)
+        ranges = _sensed(world, seen, sensor)
     except InputError:
         ranges = blind(1, math.nan)  # the sensor says so by sectors of NaN
-    pose = world.read().received
+    pose = seen.received
     return observe(world.stamp_ns, pose, ranges, world.scenario.goal_m, pose)
 
 
@@ -234,7 +238,7 @@ def run(
     brain = brain or algorithm_1(planner, seed)
     ticks, truth = [brain.plan(look(world, sensor))], [world.pose]
     while (outcome := world.outcome()) is None and go_on(world):
-        world.step(command(ticks[-1], scenario.robot, planner.tick_ns))
+        world.step(command(ticks[-1], scenario.robot, world.tick_ns))
         ticks.append(brain.plan(look(world, sensor)))
         truth.append(world.pose)
     return Episode(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from enum import Enum
-from functools import cache
+from functools import cache, lru_cache
 
 from .geometry import wrap_angle
 from .sensing import Bits
@@ -20,6 +20,7 @@ class GapHeading(Enum):
     MIDDLE = "middle"
 
 
+@lru_cache(maxsize=64)  # most of the time nothing is near
 def gap_vector(vs: Bits) -> Bits:
     """Vg of Table 1: b(i) = a(i) or a(i+1); the ring wraps (Fig. 5 closes gap 12 by sector 1)."""
     return tuple([a | b for a, b in zip(vs, vs[1:] + vs[:1])])

@@ -33,11 +33,11 @@ class JumpWatch:
         if obs.refused or not all(map(math.isfinite, obs.pose)):
             return ""
         last, self._last = self._last, (obs.stamp_ns, obs.pose)
-        if last is None or obs.stamp_ns <= last[0] or mode.value == "arrived":
+        if last is None or obs.stamp_ns <= last[0]:
             return ""
         took_s = (obs.stamp_ns - last[0]) * NANO
         moved_m = distance(last[1].position, obs.pose.position)
-        if not moved_m > params.speed_mps * took_s + params.jump_m:
+        if not moved_m > params.speed_mps * took_s + params.jump_m or mode.value == "arrived":
             return ""
         return f"{CARRIED_OFF} {moved_m:.3g} m in {took_s:.3g} s, beginning anew"
 

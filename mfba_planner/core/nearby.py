@@ -8,11 +8,12 @@ import math
 import numpy as np
 
 from .geometry import Point, distance
-from .motion import Motion
+from .motion import Array, Motion
 from .planner import NANO
 
 AHEAD_TICKS = 64  # whose centres are worked out at once; the paper's trip of 17 m is 57
 PICKED_TICKS = 24  # of these, for which the near ones are picked at once
+FEW = 16  # obstacles: so few are all taken for near, which costs less than to find out
 ROAM_M = 2.0  # how far the robot may at least go before they are picked again
 
 Found = tuple[list[int], list[tuple[Point, float]]]
@@ -49,22 +50,30 @@ class Nearby:
         return self._picked[k]
 
     def _pick(self, tick: int, position: Point, reach_m: float) -> None:
-        # As far as it went last time, so that those with long steps are not picked all the time.
-        per_tick = distance(self._picked_at, position) / max(1, abs(tick - self._picked_from))
-        roam_m = 1.1 * PICKED_TICKS * per_tick
-        self._roam_m = roam_m if ROAM_M < roam_m < math.inf else ROAM_M
         k = tick - self._centers_from
         if not 0 <= k < self._centers.shape[1]:
             times_s = np.arange(tick, tick + AHEAD_TICKS) * self._tick_ns * NANO
             self._centers, self._centers_from, k = self._motion.centers(times_s), tick, 0
-        centers, radius_m = self._centers[:, k : k + PICKED_TICKS], self._motion.radius_m
+        count = len(self._motion.radius_m)
+        if count <= FEW:
+            centers, which, self._roam_m = self._centers[:, k:], np.arange(count), math.inf
+        else:
+            centers = self._centers[:, k : k + PICKED_TICKS]
+            which = self._near(centers, tick, position, reach_m)
+        x, y = centers[:, :, which].tolist()
+        names, radii = which.tolist(), self._motion.radius_m[which].tolist()
+        self._picked = [(names, list(zip(zip(xs, ys), radii))) for xs, ys in zip(x, y)]
+        self._picked_from, self._picked_at, self._reach_m = tick, position, reach_m
+
+    def _near(self, centers: Array, tick: int, position: Point, reach_m: float) -> Array:
+        """Indices of those near to wherever the robot may roam, while their centres are these."""
+        # As far as it went last time, so that those with long steps are not picked all the time.
+        per_tick = distance(self._picked_at, position) / max(1, abs(tick - self._picked_from))
+        roam_m = 1.1 * PICKED_TICKS * per_tick
+        self._roam_m = roam_m if ROAM_M < roam_m < math.inf else ROAM_M
         with np.errstate(invalid="ignore", over="ignore"):
             dx, dy = centers[0] - position[0], centers[1] - position[1]
             square = (dx * dx + dy * dy).min(axis=0)
-            far = radius_m + (reach_m + self._roam_m + 1e-6)
+            far = self._motion.radius_m + (reach_m + self._roam_m + 1e-6)
             away = np.isfinite(square) & (square > far * far)
-        which = np.flatnonzero(~away)
-        x, y = centers[:, :, which].tolist()
-        names, radii = which.tolist(), radius_m[which].tolist()
-        self._picked = [(names, list(zip(zip(xs, ys), radii))) for xs, ys in zip(x, y)]
-        self._picked_from, self._picked_at, self._reach_m = tick, position, reach_m
+        return np.flatnonzero(~away)

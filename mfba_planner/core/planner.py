@@ -24,6 +24,7 @@ from .sensing import Bits, Ranges, Scan, sensory_vector
 
 NANO = 1e-9
 PLANNER_STREAM = 1  # spawn key of the planner's SeedSequence child; one number per purpose
+_WORD = 2**32  # what fits into a word of SeedSequence is below
 
 
 class Mode(Enum):
@@ -156,11 +157,15 @@ def observe(
     age_ns: int = 0,
 ) -> Observation:
     """Join what was read into an Observation; last_pose stands in for a pose that was refused."""
-    refused = next((x for x in (pose, ranges_m) if isinstance(x, str)), "")
+    refused = ""
+    if isinstance(ranges_m, str):
+        refused, ranges_m = ranges_m, ()
+    if isinstance(pose, str):
+        refused, pose = pose, last_pose
     return Observation(
         stamp_ns=stamp_ns,
-        pose=last_pose if isinstance(pose, str) else pose,
-        ranges_m=() if isinstance(ranges_m, str) else ranges_m,
+        pose=pose,
+        ranges_m=ranges_m,
         goal=goal,
         now_ns=stamp_ns + age_ns,
         refused=refused,
@@ -360,8 +365,17 @@ class Planner:
 
 
 def stream(seed: int, stamp_ns: int) -> np.random.Generator:
-    """The random stream of one decision: a child of the seed named by purpose and stamp."""
-    sequence = np.random.SeedSequence(seed, spawn_key=(PLANNER_STREAM, stamp_ns))
+    """The random stream of one decision: a child of the seed named by purpose and stamp.
+
+    It is that of SeedSequence(seed, spawn_key=(PLANNER_STREAM, stamp_ns)), given the 32-bit words
+    that SeedSequence makes of these, in half the time.
+    """
+    high, low = divmod(stamp_ns, _WORD)
+    if 0 <= seed < _WORD and 0 < high < _WORD:
+        words = np.array((seed, 0, 0, 0, PLANNER_STREAM, low, high), dtype=np.uint32)
+        sequence = np.random.SeedSequence(words)
+    else:
+        sequence = np.random.SeedSequence(seed, spawn_key=(PLANNER_STREAM, stamp_ns))
     return np.random.Generator(np.random.PCG64(sequence))
 
 
@@ -387,4 +401,4 @@ def fresh_step(
     if params.bat.bounds is Bounds.NONE:
         best = reach.clamp(best)  # bats may leave the disc, the robot cannot
     bx, by = best
-    return (px + bx, py + by), tuple((px + x, py + y) for x, y in swarm.candidates)
+    return (px + bx, py + by), tuple([(px + x, py + y) for x, y in swarm.candidates])

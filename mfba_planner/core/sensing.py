@@ -86,6 +86,8 @@ def sense_circles(
 
 def single_precision(ranges: Sequence[float]) -> Ranges:
     """Round to float32 and back, as a message does."""
+    if ranges.count(math.inf) == len(ranges):
+        return tuple(ranges)  # most of the time: nothing to round
     return tuple(np.asarray(ranges, dtype=np.float32).tolist())
 
 

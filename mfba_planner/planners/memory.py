@@ -59,25 +59,21 @@ class Memory:
             dt = (stamp_ns - last) * NANO
             edges = [distance(c.center_m, position) - c.radius_m for c in seen]
             range_m = max(range_m, *edges) if edges else range_m
-            hidden = (self._later(circle, age, dt) for circle, age in self._circles)
-            for circle, age in list(filter(None, hidden)):
-                here, same = circle.center_m, _SAME * circle.radius_m
-                beyond = distance(here, position) - circle.radius_m - range_m
+            for circle, age in self._circles:
+                (x, y), (vx, vy), r = circle.center_m, circle.velocity_mps, circle.radius_m
+                here, age, same = (x + vx * dt, y + vy * dt), age + dt, _SAME * r
+                beyond = distance(here, position) - r - range_m
                 # Who is farther beyond cannot be one of those in sight.
-                if beyond > same or (
+                hidden = beyond > same or (
                     beyond > 0.0 and all(distance(here, c.center_m) > same for c in seen)
-                ):
-                    found.append((circle, age))
+                )
+                if hidden and not self._given_up(circle, age):
+                    later = Circle(center_m=here, radius_m=r, velocity_mps=(vx, vy))
+                    found.append((later, age))
         self._circles = found
         return [circle for circle, _ in found]
 
-    def _later(self, circle: Circle, age_s: float, dt: float) -> tuple[Circle, float] | None:
-        """The circle and its age dt seconds on; None once it is given up."""
-        (x, y), (vx, vy) = circle.center_m, circle.velocity_mps
-        age_s += dt
-        p = self.params
-        if age_s > p.longest_s or age_s * math.sqrt(vx * vx + vy * vy) > p.way_m:
-            return None
-        center = (x + vx * dt, y + vy * dt)
-        later = Circle(center_m=center, radius_m=circle.radius_m, velocity_mps=(vx, vy))
-        return later, age_s
+    def _given_up(self, circle: Circle, age_s: float) -> bool:
+        """Whether a circle has been out of sight for too long."""
+        p, (vx, vy) = self.params, circle.velocity_mps
+        return age_s > p.longest_s or age_s * math.sqrt(vx * vx + vy * vy) > p.way_m

@@ -17,7 +17,7 @@ from ..core.sensing import Ranges
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12
-_Row = tuple[float, float, float, float, float, float, float, float]
+_Row = tuple[float, float, float, float, float, float, float, float, float]
 _nearness = itemgetter(0)
 
 
@@ -73,6 +73,7 @@ class Prediction:
         px, py = position
         tau, per_mps = params.horizon_s, params.margin_ticks * tick_s
         self._rows: list[_Row] = []
+        self._tau, self._waiting = tau, params.waiting
         self._weights = tau, params.close_m, params.contact_m, params.urgent_m
         for circle in circles:
             (x, y), (vx, vy), r = circle.center_m, circle.velocity_mps, circle.radius_m
@@ -82,7 +83,7 @@ class Prediction:
             meets = outer + (speed_mps + own) * tau
             away, outer = x * x + y * y, outer * outer
             if away <= meets * meets:
-                self._rows.append((away - outer, x, y, vx, vy, r, margin, outer))
+                self._rows.append((away - outer, x, y, vx, vy, r, margin, outer, away))
         # The nearest first: it refuses most. Of equally near ones the first told.
         self._rows.sort(key=_nearness)
         self._weighed = self._rows
@@ -91,7 +92,7 @@ class Prediction:
         """Bits (m,): 1 where a robot with velocity (ux, uy) comes too close within tau."""
         if not self._rows:
             return np.zeros(ux.shape, dtype=int)
-        _, x, y, vx, vy, _, _, outer = np.array(self._rows).T[:, :, None]
+        _, x, y, vx, vy, _, _, outer, away = np.array(self._rows).T[:, :, None]
         wx, wy = vx - ux, vy - uy
         b = x * wx
         b += y * wy
@@ -104,7 +105,6 @@ class Prediction:
         t /= a
         np.maximum(t, 0.0, out=t)
         np.minimum(t, self.params.horizon_s, out=t)
-        away = x * x + y * y
         # (a t + 2 b) t + away, in place: this is done for 72 headings and every circle
         a *= t
         b *= 2.0
@@ -123,7 +123,7 @@ class Prediction:
         """
         (gx, gy), tau, kept = to_goal, self.params.horizon_s, []
         for row in self._weighed:
-            _, x, y, vx, vy, r, margin, _ = row
+            _, x, y, vx, vy, r, margin, _, _ = row
             hx, hy = x - gx, y - gy
             near = math.sqrt(x * x + y * y) or _TINY
             far = math.sqrt(hx * hx + hy * hy) or _TINY
@@ -147,18 +147,40 @@ class Prediction:
         (qx, qy), (gx, gy) = way, to_goal
         rx, ry = gx - qx, gy - qy
         first, second = math.sqrt(qx * qx + qy * qy), math.sqrt(rx * rx + ry * ry)
-        total = first + second + self.params.waiting * (speed * t1 - first)
+        total = first + second + self._waiting * (speed * t1 - first)
         if total >= bound:
             return total
-        left, tau = bound - total, self.params.horizon_s
-        lasts = t1 if t1 < tau else tau
-        risk = self._leg(0.0, 0.0, 0.0, 0.0, qx / t1, qy / t1, lasts, left)
+        left, tau = bound - total, self._tau
+        risk = self._first_leg(qx / t1, qy / t1, t1 if t1 < tau else tau, left)
         driven = first / speed  # what is put off by waiting is no less of a risk
         if risk < left and driven < tau and second > 0.0:
             ux, uy = rx * speed / second, ry * speed / second
             lasts = min(second / speed, tau - driven)
             risk = max(risk, self._leg(qx, qy, t1, driven, ux, uy, lasts, left))
         return total + risk
+
+    def _first_leg(self, ux: float, uy: float, lasts: float, bound: float) -> float:
+        """_leg() from here and now, which is asked for most and is the quicker for it."""
+        worst = 0.0
+        for _, x, y, vx, vy, r, margin, outer, away in self._weighed:
+            wx = vx - ux
+            wy = vy - uy
+            b = x * wx + y * wy
+            if b >= 0.0:
+                continue
+            a = wx * wx + wy * wy
+            t = -b / a
+            if t > lasts:
+                t = lasts
+            c = (a * t + 2.0 * b) * t + away
+            if c >= outer or c >= away * _ROUNDING:
+                continue
+            risk = self._risk(a, c, r, margin, t, 0.0)
+            if risk > worst:
+                worst = risk
+                if worst >= bound:
+                    break
+        return worst
 
     def _leg(
         self,
@@ -173,12 +195,10 @@ class Prediction:
     ) -> float:
         """The worst risk of a leg from (qx, qy) at t0, s0 of it driven; or one not below bound.
 
-        With x = 1 - s/tau, a contact after s of driving costs contact_m x^2 + urgent_m x^8, a
-        closest approach costs close_m x times the share of the margin that is missing. Who is
-        within a margin already may leave it in any direction, but not go deeper.
+        Who is within a margin already may leave it in any direction, but not go deeper.
         """
-        worst, (tau, close, contact, urgent) = 0.0, self._weights
-        for _, x, y, vx, vy, r, margin, outer in self._weighed:
+        worst = 0.0
+        for _, x, y, vx, vy, r, margin, outer, _ in self._weighed:
             dx = x + vx * t0 - qx
             dy = y + vy * t0 - qy
             wx = vx - ux
@@ -194,20 +214,30 @@ class Prediction:
             c = (a * t + 2.0 * b) * t + away
             if c >= outer or c >= away * _ROUNDING:
                 continue
-            missing = 1.0 - (math.sqrt(c) - r) / margin if c > 0.0 else 1.0
-            if missing > 1.0:
-                missing = 1.0
-            risk = missing * close * (1.0 - (s0 + t) / tau)
-            if c < r * r:
-                t -= math.sqrt((r * r - c) / a)
-                late = 1.0 - (s0 + t) / tau if t > 0.0 else 1.0 - s0 / tau
-                late *= late
-                risk += late * (contact + urgent * late * late * late)
+            risk = self._risk(a, c, r, margin, t, s0)
             if risk > worst:
                 worst = risk
                 if worst >= bound:
                     break
         return worst
+
+    def _risk(self, a: float, c: float, r: float, margin: float, t: float, s0: float) -> float:
+        """What the closest approach, sqrt(c) after t of a leg at a relative speed sqrt(a), costs.
+
+        With x = 1 - s/tau, a contact after s of driving costs contact_m x^2 + urgent_m x^8, a
+        closest approach costs close_m x times the share of the margin that is missing.
+        """
+        tau, close, contact, urgent = self._weights
+        missing = 1.0 - (math.sqrt(c) - r) / margin if c > 0.0 else 1.0
+        if missing > 1.0:
+            missing = 1.0
+        risk = missing * close * (1.0 - (s0 + t) / tau)
+        if c < r * r:
+            t -= math.sqrt((r * r - c) / a)
+            late = 1.0 - (s0 + t) / tau if t > 0.0 else 1.0 - s0 / tau
+            late *= late
+            risk += late * (contact + urgent * late * late * late)
+        return risk
 
 
 def moved(circles: Sequence[Circle], dt: float) -> Sequence[Circle]:

@@ -6,11 +6,13 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
+from ..core.conduct import Conduct
 from ..core.episode import Outcome
 from ..core.geometry import distance
-from ..core.metrics import assess
+from ..core.metrics import Result, assess
 from ..core.scores import barn_score, optimality_gap, spl, time_to_goal_s
 from .order import Run
 from .play import Played
@@ -61,6 +63,8 @@ _JUDGED: dict[str, tuple[type, str]] = {
     "spl": (float, "success weighted by path length, against the optimum"),
     "barn": (float, "BARN score, against the optimum at full speed"),
 }
+_OF_CONDUCT = [field.name for field in fields(Conduct) if field.name in _MADE]
+_OF_RESULT = [field.name for field in fields(Result) if field.name in _MADE]
 COLUMNS = {**_KEY, **_MADE, **_JUDGED}
 # Clocks differ from run to run: these stand in a table of their own.
 TIMINGS: dict[str, tuple[type, str]] = {
@@ -78,8 +82,8 @@ def made_row(run: Run, played: Played) -> Row:
     row = {
         **dict.fromkeys(_MADE),
         **run._asdict(),
-        **{name: getattr(conduct, name) for name in _MADE if hasattr(conduct, name)},
-        **{name: getattr(result, name) for name in _MADE if hasattr(result, name)},
+        **{name: getattr(conduct, name) for name in _OF_CONDUCT},
+        **{name: getattr(result, name) for name in _OF_RESULT},
         "outcome": FAILED if played.fault else result.outcome.value,
         "failure": played.fault_at,
         "time_to_goal_s": time_to_goal_s(result),
