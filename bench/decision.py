@@ -20,7 +20,8 @@ import numpy as np
 from mfba_planner.core.bat import BatParams
 from mfba_planner.core.episode import run
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner import Mode, Observation, Planner, PlannerParams, stream
+from mfba_planner.core.planner import Mode, Observation, Planner, PlannerParams
+from mfba_planner.core.streams import stream
 from mfba_planner.scenarios import load_scenario
 
 BUDGET_US = 200.0

@@ -25,10 +25,10 @@ from mfba_planner.core.planner import (
     Swarm,
     decide,
     fresh_step,
-    stream,
     transition,
 )
 from mfba_planner.core.sensing import SensorParams
+from mfba_planner.core.streams import stream
 from mfba_planner.core.world import Scenario
 from mfba_planner.paper import readings
 from mfba_planner.scenarios import load_scenario

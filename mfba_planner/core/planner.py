@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
-import numpy as np
+from numpy.random import Generator
 
 from .bat import BatParams, BatSwarm, Bounds, Disc, Vector, minimize
 from .caution import CautionParams
@@ -21,10 +21,9 @@ from .options import check, option
 from .recovery import RecoveryParams
 from .seen import Method, SeenParams
 from .sensing import Bits, Ranges, Scan, sensory_vector
+from .streams import stream
 
 NANO = 1e-9
-PLANNER_STREAM = 1  # spawn key of the planner's SeedSequence child; one number per purpose
-_WORD = 2**32  # what fits into a word of SeedSequence is below
 
 
 class Mode(Enum):
@@ -364,23 +363,8 @@ class Planner:
         return (x, y), tuple((px, py) for px, py in self._swarm.candidates)
 
 
-def stream(seed: int, stamp_ns: int) -> np.random.Generator:
-    """The random stream of one decision: a child of the seed named by purpose and stamp.
-
-    It is that of SeedSequence(seed, spawn_key=(PLANNER_STREAM, stamp_ns)), given the 32-bit words
-    that SeedSequence makes of these, in half the time.
-    """
-    high, low = divmod(stamp_ns, _WORD)
-    if 0 <= seed < _WORD and 0 < high < _WORD:
-        words = np.array((seed, 0, 0, 0, PLANNER_STREAM, low, high), dtype=np.uint32)
-        sequence = np.random.SeedSequence(words)
-    else:
-        sequence = np.random.SeedSequence(seed, spawn_key=(PLANNER_STREAM, stamp_ns))
-    return np.random.Generator(np.random.PCG64(sequence))
-
-
 def fresh_step(
-    position: Point, goal: Point, params: PlannerParams, rng: np.random.Generator
+    position: Point, goal: Point, params: PlannerParams, rng: Generator
 ) -> tuple[Point, tuple[Point, ...]]:
     """Next point by a fresh swarm in the disc of one step; the last step is cut to the goal.
 

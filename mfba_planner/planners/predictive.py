@@ -12,9 +12,10 @@ import numpy as np
 from ..core.bat import BatSwarm
 from ..core.geometry import Point, distance
 from ..core.options import check, option
-from ..core.planner import NANO, Circle, Event, Observation, PlannerParams, stream
+from ..core.planner import NANO, Circle, Event, Observation, PlannerParams
 from ..core.region import Disc
 from ..core.sensing import Bits, SensorParams
+from ..core.streams import stream
 from .memory import Memory, MemoryParams
 from .prediction import Prediction, RiskParams, from_sectors, moved
 from .steering import Move, Steering

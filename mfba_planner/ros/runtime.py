@@ -52,9 +52,9 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
     stop = StopFlag()
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node: GraphNode | None = None
+    executor = make_executor()
     try:
         node = make_node()
-        executor = make_executor()
         executor.add_node(node)
         while not stop.is_set and not node.finished:
             node.turn(executor)
@@ -65,6 +65,8 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
             if node is not None:
                 node.close()
         finally:
+            # Left to the garbage collector, it may find its own guard condition gone, and says so.
+            executor.shutdown()
             if node is not None:
                 node.destroy_node()
             rclpy.try_shutdown()
