@@ -7,6 +7,7 @@ import subprocess
 import sys
 import uuid
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from helpers import wait_until
@@ -34,6 +35,7 @@ class Program:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
+            start_new_session=True,  # a process group of its own, as a shell gives it
         )
         self.stdout = self.stderr = ""
 
@@ -42,8 +44,13 @@ class Program:
 
     def __exit__(self, *_: object) -> None:
         for pid in self.family():
-            os.kill(pid, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # it has ended by itself in between
+                os.kill(pid, signal.SIGKILL)
         self.process.communicate()
+
+    def send_group(self, sent: signal.Signals) -> None:
+        """Signal the whole process group, as a terminal does at Ctrl-C."""
+        os.killpg(self.process.pid, sent)
 
     def end(self, timeout_s: float = 60.0) -> int:
         """Wait for the end; keep what was said."""

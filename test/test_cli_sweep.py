@@ -194,8 +194,7 @@ def interrupted(out: Path, tmp_path: Path, send: signal.Signals, *, group: bool)
         chunks = out / "chunks"
         wait_until(lambda: chunks.is_dir() and len(list(chunks.glob("*.json"))) >= 2, 120.0)
         if group:  # as a terminal does: workers and their children get it too
-            for pid in program.family():
-                os.kill(pid, send)
+            program.send_group(send)
         else:
             program.process.send_signal(send)
         program.end()
