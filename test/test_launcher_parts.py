@@ -8,13 +8,14 @@ import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
 from helpers import wait_until
 from hypothesis import given
 from hypothesis import strategies as st
+from rclpy.context import Context
+from rclpy.node import Node
 
 from mfba_planner.core.bat import Algorithm
 from mfba_planner.core.errors import GraphError, OutputError
@@ -177,14 +178,35 @@ def test_domain_is_free_again_after_kill_9() -> None:
     done = subprocess.run(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, check=False
     )
-    killed = int(done.stdout)
-    claimed: list[tuple[int, Any]] = []
+    assert int(done.stdout) in offered()
+
+
+def offered() -> set[int]:
+    """All domains that are given out at present, none of them held for long."""
+    found = set()
+    for _ in DOMAINS:
+        domain, lock = claim_domain()
+        lock.close()
+        found.add(domain)
+    return found
+
+
+def test_a_domain_that_a_strange_program_talks_in_is_passed_over() -> None:
+    """A robot's own graph, say: whoever holds no lock of ours."""
+    domain, lock = claim_domain()
+    context = Context()
+    context.init(domain_id=domain)
+    node = Node("strange", context=context)
+    lock.close()
     try:
-        while killed not in [domain for domain, _ in claimed]:
-            claimed.append(claim_domain())  # GraphError when all but this one are held
+        found = offered()
+        assert domain not in found
+        assert len(found) > len(DOMAINS) / 2
     finally:
-        for _, lock in claimed:
-            lock.close()
+        node.destroy_node()
+        context.try_shutdown()
+        context.destroy()
+    assert domain in offered()
 
 
 PROGRAMS = {
