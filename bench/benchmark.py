@@ -61,8 +61,11 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("--others", type=int, metavar="N", help="in other suites (default: all)")
     parser.add_argument(
         "--few", type=int, metavar="N",
-        help="of other planners, perceptions and ingredients (default: a tenth of --worlds)",
+        help="of other planners and of ingredients (default: a tenth of --worlds)",
     )  # fmt: skip
+    parser.add_argument(
+        "--seen", type=int, metavar="N", help="of other perceptions (default: as --few)"
+    )
     parser.add_argument(
         "--suite", action="append", choices=suite_names(), help="only this; may be repeated"
     )
@@ -79,14 +82,16 @@ def arguments() -> argparse.ArgumentParser:
 def main(args: list[str] | None = None) -> None:
     """Make all and write the page."""
     found = arguments().parse_args(args)
-    if min(found.worlds, found.others or 2, found.few or 2) < 2:
-        arguments().error("--worlds, --others, --few: give at least 2")
+    if min(found.worlds, found.others or 2, found.few or 2, found.seen or 2) < 2:
+        arguments().error("--worlds, --others, --few, --seen: give at least 2")
     if found.first < 0:
         arguments().error("--first: give at least 0")
+    few = found.few or max(2, found.worlds // 10)
     counts = Counts(
         worlds=found.worlds,
         others=found.others or found.worlds,
-        few=found.few or max(2, found.worlds // 10),
+        few=few,
+        seen=found.seen or few,
     )
     suites = [name for name in suite_names() if not found.suite or name in found.suite]
     out = found.out or new_run_directory(stem="benchmark")
@@ -109,7 +114,8 @@ def main(args: list[str] | None = None) -> None:
 
 def _command(found: argparse.Namespace) -> str:
     words = [f"--worlds {found.worlds}"]
-    words += [f"--{k} {v}" for k in ("first", "others", "few", "out") if (v := getattr(found, k))]
+    given = ("first", "others", "few", "seen", "out")
+    words += [f"--{k} {v}" for k in given if (v := getattr(found, k))]
     words += [f"--suite {name}" for name in found.suite or ()]
     words += [f"--rounds {found.rounds}", f"--workers {found.workers}"]
     return " ".join(["python bench/benchmark.py", *words])

@@ -74,12 +74,12 @@ def render(
             f"{one.words}:\n\n```sh\n{one.command}\n```",
             f"![{one.words}](images/{one.file})",
         ]
-    for title, entries, where in (
-        ("What predictive sees", PERCEPTIONS, CROWDS),
-        ("What each ingredient buys", INGREDIENTS, STRIPPED),
+    for title, entries, where, worlds in (
+        ("What predictive sees", PERCEPTIONS, CROWDS, counts.perceived),
+        ("What each ingredient buys", INGREDIENTS, STRIPPED, counts.rest),
     ):
         found = [
-            _named(suite, results.standing(suite, entry, counts.rest(suite)))
+            _named(suite, results.standing(suite, entry, worlds(suite)))
             for suite in suites
             if suite in where
             for entry in entries
@@ -168,7 +168,7 @@ def _targets(results: Results, suites: Sequence[str], counts: Counts) -> Lines:
     for suite, most in SCAN_GAP.items():
         if suite in suites:
             for entry in PERCEPTIONS[1:]:
-                one = results.standing(suite, entry, counts.rest(suite))
+                one = results.standing(suite, entry, counts.perceived(suite))
                 what = f"mean gap, {suite}, {entry.label}"
                 told = _line(what, one.gap, most, at_least=False, of=one.runs)
                 yield told if entry in PERCEPTIONS[1:3] else [told[0], "(told)", told[2], ""]

@@ -84,6 +84,7 @@ class Counts:
     worlds: int
     others: int
     few: int
+    seen: int
 
     def lead(self, suite: str) -> int:
         """Worlds of the planners that lead."""
@@ -94,6 +95,10 @@ class Counts:
     def rest(self, suite: str) -> int:
         """Worlds of everything else."""
         return min(self.few, self.lead(suite))
+
+    def perceived(self, suite: str) -> int:
+        """Worlds of what predictive sees by something else than known circles."""
+        return min(self.seen, self.lead(suite))
 
 
 class Results:
@@ -178,10 +183,12 @@ def _sweeps(suites: Sequence[str], counts: Counts) -> list[tuple[str, Entry, int
     found = [(suite, entry, counts.lead(suite)) for suite in suites for entry in LEAD]
     known = {(suite, entry.planner, entry.setting) for suite, entry, _ in found}
     for suite in suites:
-        for entry in (*PEERS, *of_suite(PERCEPTIONS, suite), *of_suite(INGREDIENTS, suite)):
-            key = (suite, entry.planner, entry.setting)
-            if key not in known:
-                found.append((suite, entry, counts.rest(suite)))
+        rest, perceived = counts.rest(suite), counts.perceived(suite)
+        wanted = [(entry, rest) for entry in (*PEERS, *of_suite(INGREDIENTS, suite))]
+        wanted += [(entry, perceived) for entry in of_suite(PERCEPTIONS, suite)]
+        for entry, worlds in wanted:
+            if (suite, entry.planner, entry.setting) not in known:
+                found.append((suite, entry, worlds))
     return found
 
 
