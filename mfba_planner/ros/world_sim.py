@@ -92,7 +92,7 @@ class WorldSim(GraphNode):
         """Lockstep: begin when everybody is there; publish an unanswered tick again."""
         self._look_for_answers()  # a goal_step may have come after its Twist
         if not self._published:
-            if self.pace.may_move_on() and self._all.are_heard:
+            if self.pace.may_move_on() and self._all.are_heard and not self.missing():
                 self._publish_tick()
         elif self.pace.must_repeat(time.monotonic(), self._all.tick):
             by = f" by {absent}" if (absent := self._all.absent()) else ""
