@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -15,7 +14,7 @@ from mfba_planner.launcher.crew import Crew
 from mfba_planner.launcher.domain import private_domain
 from mfba_planner.launcher.monitor import Monitor
 from mfba_planner.ros import topics
-from mfba_planner.run_config import NODES, RunConfig, node_parameters, run_facts
+from mfba_planner.run_config import NODES, RunConfig, node_parameters, recorder_parameters
 
 TIMEOUT_S = 180.0
 ALL = (topics.RECORDER, *NODES)
@@ -28,12 +27,7 @@ class ByHand:
         """Prepare; world holds further parameters of world_sim."""
         self.told = node_parameters(config, ALL)
         self.told[topics.WORLD_SIM] |= world
-        self.told[topics.RECORDER] = {
-            "output": str(bag),
-            "nodes": ",".join(NODES),
-            "sim_time": True,
-            "run": json.dumps(run_facts(config)),
-        }
+        self.told[topics.RECORDER] = recorder_parameters(config, str(bag), NODES)
         self._tick_ns = config.planner.tick_ns
         self._lines: list[str] = []
         self._stack = ExitStack()

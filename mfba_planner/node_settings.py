@@ -15,7 +15,7 @@ from .core.robot import Base, Robot
 from .core.world import Scenario
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
-_WORLD_WAITS_FOR = f"{_WAIT_FOR}; in real time tick 0 waits too"
+_WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause lets it go"
 
 
 class Source(Enum):

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import json
 import platform
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
@@ -23,6 +25,7 @@ from .scenarios import scenario_to_json
 Parameters = dict[str, dict[str, Any]]
 
 NODES = ("world_sim", "virtual_sensor", "planner")
+OF_ROBOT = NODES[1:]  # of a fleet, each robot has its own
 
 
 class Driver(Enum):
@@ -50,11 +53,6 @@ class RunConfig:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range, or a planner that would stop every tick."""
         check(self)
-        if self.scenario.robots and (self.real_time or self.driver is Driver.MULTI_PROCESS):
-            raise ConfigError(
-                f"scenario {self.scenario.name!r}: names {len(self.scenario.robots)} robots, "
-                "which run in lockstep in one process only; give --driver in-process"
-            )
         if self.planner.tracks_scan and not self.scenario.robot.lidar.beams:
             raise ConfigError(
                 f"planner.scan_radius_m={self.planner.scan_radius_m:g}: the robot has no lidar; "
@@ -117,14 +115,29 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     }
 
 
-def fleet_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
-    """node_parameters() of a scenario that names robots: NAME/planner, NAME/virtual_sensor."""
+def graph_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
+    """node_parameters(); of a scenario that names robots NAME/planner, NAME/virtual_sensor."""
     scenario = config.scenario
+    if not scenario.robots:
+        return node_parameters(config, peers)
     wholes = {"world_sim": node_parameters(config, peers)["world_sim"]}
     starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
     worlds = worlds_seen(scenario, starts, config.planner.tick_ns)
     for number, (member, world) in enumerate(zip(scenario.robots, worlds)):
         one = replace(config, scenario=world, seed=seed_of(config.seed, number))
         told = node_parameters(one, peers)
-        wholes |= {f"{member.name}/{name}": told[name] for name in ("virtual_sensor", "planner")}
+        wholes |= {f"{member.name}/{name}": told[name] for name in OF_ROBOT}
     return wholes
+
+
+def recorder_parameters(
+    config: RunConfig, output: str, nodes: Iterable[str] = ()
+) -> dict[str, Any]:
+    """What the recorder is told; nodes are those it asks for their parameters."""
+    return {
+        "output": output,
+        "nodes": ",".join(nodes),
+        "namespaces": ",".join(member.name for member in config.scenario.robots),
+        "sim_time": True,
+        "run": json.dumps(run_facts(config)),
+    }

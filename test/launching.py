@@ -62,8 +62,12 @@ class Program:
         return [pid for pid, environ in _environments() if f"{MARK}={self.mark}" in environ]
 
     def node(self, name: str) -> int:
-        """The process of a node."""
-        found = [pid for pid in self.family() if f"entry.{name}()" in _read(pid, "cmdline")]
+        """The process of a node, NAMESPACE/node in a fleet."""
+        namespace, _, program = name.rpartition("/")
+        told = [f"entry.{program}()", f"__ns:=/{namespace}\0" if namespace else ""]
+        found = [
+            pid for pid in self.family() if all(words in _read(pid, "cmdline") for words in told)
+        ]
         assert len(found) == 1, f"{name}: {found}"
         return found[0]
 

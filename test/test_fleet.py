@@ -342,8 +342,7 @@ def test_what_knows_one_robot_only_says_so(driven: Path) -> None:
     with pytest.raises(BagError, match="holds 4 robots, and a bag of one"):
         read_episode(driven / "bag")
     for args, what in (
-        (["--driver", "multi-process"], "give --driver in-process"),
-        (["--real-time"], "give --driver in-process"),
+        (["--real-time"], "--real-time: 10 robots run in lockstep here; leave it out"),
         (["--driver", "core"], "use `mfba sim`"),
     ):
         with pytest.raises(ConfigError, match=what):

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """world_sim of a fleet as others see it: one tick for all, over when the last has answered."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from geometry_msgs.msg import Twist, Vector3
 from graph import Graph
+from std_srvs.srv import SetBool, Trigger
 
 from mfba_planner.core.errors import ConfigError, GraphError
 from mfba_planner.core.planner import PlannerParams
@@ -13,8 +15,8 @@ from mfba_planner.core.world import Member, Obstacle, Scenario
 from mfba_planner.messages import obstacle_centers, robot_pose, stamp_ns
 from mfba_planner.ros import topics
 from mfba_planner.ros.convert import pose_stamped_msg
-from mfba_planner.ros.fleet_sim import FleetSim
 from mfba_planner.ros.namespaced import below
+from mfba_planner.ros.world_sim import WorldSim
 from mfba_planner.scenarios import scenario_to_json
 
 TICK_NS = PlannerParams().tick_ns
@@ -44,7 +46,7 @@ class Pair:
         self.steps = {name: graph.writer(below(name, topics.GOAL_STEP)) for name in "ab"}
         self.twists = {name: graph.writer(below(name, topics.CMD_VEL)) for name in "ab"}
         told = {"lockstep": True, "answer_timeout_s": 60.0, "scenario": scenario_to_json(PAIR)}
-        self.world = graph.start(FleetSim, {**told, **parameters})
+        self.world = graph.start(WorldSim, {**told, **parameters})
         graph.until(lambda: all(self.odom.values()))
 
     def answer(self, name: str, vx: float, vy: float = 0.0) -> None:
@@ -122,7 +124,48 @@ def test_a_twist_that_is_none_stops_its_robot_alone(graph: Graph) -> None:
 
 
 def test_what_a_fleet_cannot_be_told(graph: Graph) -> None:
-    with pytest.raises(ConfigError, match="no wall timer"):
-        graph.start(FleetSim, {"scenario": scenario_to_json(PAIR)})
-    with pytest.raises(ConfigError, match="names no robots"):
-        graph.start(FleetSim, {"scenario": "case1", "lockstep": True})
+    with pytest.raises(ConfigError, match="run_on=True: a fleet's run ends; give false"):
+        graph.start(WorldSim, {"scenario": scenario_to_json(PAIR), "run_on": True})
+
+
+def test_a_fleet_pauses_steps_and_begins_again_as_one_robot_does(graph: Graph) -> None:
+    pair = Pair(graph, start_paused=False)
+
+    def answer() -> None:
+        pair.answer("a", 0.5)
+        pair.answer("b", 0.1)
+
+    assert graph.call(SetBool, "world_sim/pause", SetBool.Request(data=True)).success
+    answer()
+    graph.settle()
+    assert pair.stamps("a") == pair.stamps("b") == [TICK_NS]
+    assert graph.call(Trigger, "world_sim/step").message == "tick 1"
+    pair.until_tick(2)
+    assert not graph.call(Trigger, "world_sim/step").success  # unanswered
+    answer()
+    graph.settle()
+    assert len(pair.odom["a"]) == 2
+    assert graph.call(Trigger, "world_sim/reset").message == f"tick 0 at stamp {3 * TICK_NS} ns"
+    assert graph.call(SetBool, "world_sim/pause", SetBool.Request(data=False)).success
+    pair.until_tick(3)
+    assert pair.stamps("b") == [TICK_NS, 2 * TICK_NS, 3 * TICK_NS]
+    assert robot_pose(pair.odom["b"][-1]).position == (0.0, 3.0)
+
+
+def test_in_real_time_ticks_are_everybody_s_until_the_last_has_arrived(graph: Graph) -> None:
+    a, b = PAIR.robots
+    near = replace(PAIR, goal_m=(1.0, 0.0), robots=(replace(a, goal_m=(1.0, 0.0)), b))
+    told = {"lockstep": False, "speed_factor": 4.0, "scenario": scenario_to_json(near)}
+    pair = Pair(graph, cmd_vel_timeout_s=0.0, **told)
+    pair.twists["b"].publish(Twist(linear=Vector3(x=0.29 / TICK_S)))
+    graph.until(lambda: pair.ends["b"][-1].message == "goal_reached")
+    ended = len(pair.odom["b"])
+    graph.until(lambda: len(pair.odom["b"]) > ended + 2)
+    assert robot_pose(pair.odom["b"][-1]).position == robot_pose(pair.odom["b"][ended]).position
+    assert pair.ends["a"][-1].message == "running"
+    pair.twists["a"].publish(Twist(linear=Vector3(x=0.33 / TICK_S)))
+    graph.until(lambda: pair.world.over)
+    graph.settle()
+    assert pair.ends["a"][-1].message == "goal_reached"
+    assert pair.stamps("a") == pair.stamps("b")
+    assert len(pair.clock) == len(pair.odom["a"])

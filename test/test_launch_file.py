@@ -25,7 +25,7 @@ from mfba_planner.node_settings import Source
 from mfba_planner.ros.planner import PlannerNode
 from mfba_planner.ros.replay_args import parse
 from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.run_config import NODES, RunConfig, node_parameters
+from mfba_planner.run_config import NODES, OF_ROBOT, RunConfig, node_parameters
 from mfba_planner.scenarios import load_scenario
 
 LAUNCH = Path(__file__).parents[1] / "launch"
@@ -63,6 +63,17 @@ def test_arguments_reach_the_nodes() -> None:
         True,
         True,
     )
+
+
+def test_a_fleet_s_nodes_are_told_in_their_namespaces() -> None:
+    told = told_by_launch(given(scenario="swap", record="true"))
+    robots = [f"robot{number}" for number in range(10)]
+    of_robots = [f"{robot}/{node}" for robot in robots for node in OF_ROBOT]
+    assert list(told) == ["recorder", "world_sim", *of_robots]
+    assert told["recorder"]["namespaces"] == ",".join(robots)
+    assert told["recorder"]["nodes"].split(",") == ["world_sim", *of_robots]
+    assert len({told[f"{robot}/planner"]["seed"] for robot in robots}) == len(robots)
+    assert not told["world_sim"]["lockstep"]
 
 
 @pytest.mark.parametrize(

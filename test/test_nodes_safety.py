@@ -163,6 +163,21 @@ def test_diagnostics_come_once_a_period_and_at_once_when_a_level_changes(graph: 
     assert len(wired.diagnostics) <= count + 3
 
 
+def test_as_long_as_inputs_are_stale_diagnostics_go_on_once_a_period(graph: Graph) -> None:
+    wired = Wired(graph, FAR, diagnostics_period_s=1.0)
+    wired.drive()
+    wired.tamper["sectors"] = lost
+    graph.until(lambda: wired.told("inputs").level == STALE)
+    count = len(wired.diagnostics)
+
+    def ages() -> list[float]:
+        inputs = [message.status[0] for message in wired.diagnostics[count:]]
+        return [float(values(status)["sectors: age [s]"]) for status in inputs]
+
+    graph.until(lambda: len(ages()) > 1 and ages()[-1] > ages()[0] + 3.0)
+    assert len(ages()) <= ages()[-1] - ages()[0] + 4
+
+
 def test_when_every_gap_is_closed_it_rests_and_says_so(graph: Graph) -> None:
     wired = Wired(graph, FAR)
     since_ns = wired.drive()

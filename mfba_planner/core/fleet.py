@@ -120,9 +120,11 @@ class Fleet:
     def step(self, told: dict[int, Point]) -> None:
         """Move everybody who is under way and time on by one tick; told as for World.step()."""
         going = self.under_way
-        for number in going:
-            self.places[number].step(told[number])
-        for place in self.places:
+        for number, place in enumerate(self.places):
+            if number in going:
+                place.step(told[number])
+            else:
+                place.tick += 1  # the obstacles around it go on
             place.poses.append(place.pose)
         self.tick += 1
         for number in going:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 from ..core.errors import ConfigError
 from ..core.options import override
 from ..paper import readings
-from ..run_config import NODES, Parameters, RunConfig, node_parameters, run_facts
+from ..run_config import NODES, Parameters, RunConfig, graph_parameters, recorder_parameters
 from ..scenarios import load_scenario
 from .options import RECORDER
 
@@ -54,14 +53,9 @@ def told_by_launch(given: Mapping[str, str]) -> Parameters:
         speed_factor=_number("speed_factor", given["speed_factor"], float),
     )
     recorders = (RECORDER,) if given["record"] == "true" else ()
-    told = node_parameters(config, (*NODES, *recorders))
+    told = graph_parameters(config, (*NODES, *recorders))
     told["world_sim"]["start_paused"] = False  # nobody is there to let it go
-    recorder = {
-        "output": given["bag"],
-        "nodes": ",".join(NODES),
-        "sim_time": True,
-        "run": json.dumps(run_facts(config)),
-    }
+    recorder = recorder_parameters(config, given["bag"], told)
     return {**dict.fromkeys(recorders, recorder), **told}
 
 

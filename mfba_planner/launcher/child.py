@@ -27,6 +27,8 @@ _LOGGING = {
     "RCUTILS_CONSOLE_OUTPUT_FORMAT": "{severity}: {message}",
     "RCUTILS_COLORIZED_OUTPUT": "0",
     "RCUTILS_LOGGING_BUFFERED_STREAM": "1",  # by lines, or the last ones die with the node
+    # While nodes still find each other answers get lost; we ask again until one comes.
+    "PYTHONWARNINGS": "ignore:failed to send response:RuntimeWarning",
 }
 
 
@@ -34,11 +36,14 @@ class Child:
     """A running node; its output goes to sink(name, line), line by line."""
 
     def __init__(self, name: str, args: list[str], sink: Callable[[str, str], None]) -> None:
-        """Start the program called name (a function of entry.py) with args."""
+        """Start a program (a function of entry.py) with args; name is its own, or NAMESPACE/it."""
+        namespace, _, program = name.rpartition("/")
+        if namespace:
+            args = [*args, "-r", f"__ns:=/{namespace}"]
         self.name = name
         self.last_lines: deque[str] = deque(maxlen=LAST_LINES)
         path = [entry or os.getcwd() for entry in sys.path]
-        boot = _BOOT.format(path=path, parent=os.getpid(), program=name)
+        boot = _BOOT.format(path=path, parent=os.getpid(), program=program)
         self.process = subprocess.Popen(
             [sys.executable, "-c", boot, *args],
             stdin=subprocess.DEVNULL,

@@ -18,6 +18,7 @@ from .child import Child
 
 RECORDER_GRACE_S = 20.0  # it still writes what it has received
 GRACE_S = 10.0  # on a machine with far too much to do; a killed node counts as a failure
+MORE_EACH_S = 1.0  # they end all at once, and each hears of each
 
 
 class Crew:
@@ -41,12 +42,16 @@ class Crew:
             raise GraphError(_obituary(failed[0]))
 
     def start(self, told: Parameters, more: Mapping[str, list[str]]) -> None:
-        """Start a node per entry of told, in that order; more holds further --ros-args."""
+        """Start a node per entry of told, in that order; more holds further --ros-args.
+
+        NAMESPACE/planner is a planner in a namespace; what planner is told further, it is told.
+        """
         for name, parameters in told.items():
-            path = Path(self._files.name) / f"{name}.yaml"
+            path = Path(self._files.name) / f"{name.replace('/', '.')}.yaml"
             path.write_text(parameters_yaml(parameters), encoding="utf-8")
             args = ["--ros-args", "--disable-external-lib-logs", "--params-file", str(path)]
-            self.children.append(Child(name, args + more.get(name, []), self._sink))
+            args += more.get(name.rpartition("/")[2], [])
+            self.children.append(Child(name, args, self._sink))
 
     def forget_parameters(self) -> None:
         """Remove the parameter files: every node has read its own."""
@@ -68,7 +73,8 @@ class Crew:
         children, self.children = self.children, []
         recorders = [child for child in children if child.name == "recorder"]
         self._end(recorders, RECORDER_GRACE_S)
-        self._end([child for child in children if child not in recorders], GRACE_S)
+        others = [child for child in children if child not in recorders]
+        self._end(others, GRACE_S + MORE_EACH_S * len(others))
         self._files.cleanup()
 
     def _end(self, children: list[Child], grace_s: float) -> None:

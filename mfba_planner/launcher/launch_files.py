@@ -40,11 +40,12 @@ def describe(
 
 
 def _node(start: Start, namespace: str) -> Node:
+    above, _, program = start.name.rpartition("/")
     return Node(
         package="mfba_planner",
-        executable=start.name,
-        name=start.name,
-        namespace=namespace,
+        executable=program,
+        name=program,
+        namespace="/".join(part for part in (namespace, above) if part),
         output="screen",
         parameters=[_literally(start.parameters), *start.files],
         remappings=list(start.remaps),

@@ -5,20 +5,25 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from std_srvs.srv import SetBool, Trigger
 
 from ..messages import points, stamp_ns
+from ..recording.robots import ALONE
 from ..ros import topics
+from ..ros.letterboxes import Letterboxes
+from ..ros.namespaced import below
+from ..ros.runtime import GraphNode
+from ..ros.serialized import header_stamp_ns
+from ..ros.topics import Topic
 
 ASK_AGAIN_S = 0.5  # an answer can get lost while client and server still find each other
 PROGRESS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -60,11 +65,11 @@ class Question:
 class Monitor:
     """A node beside the graph, which the graph does not wait for."""
 
-    def __init__(self, domain_id: int) -> None:
-        """Join the domain."""
+    def __init__(self, domain_id: int, robots: Sequence[str] = (ALONE,)) -> None:
+        """Join the domain; robots are the namespaces of those that are watched."""
         self._context = Context()
         self._context.init(domain_id=domain_id)
-        self._node = Node(
+        self._node = GraphNode(
             "launcher",
             context=self._context,
             enable_rosout=False,
@@ -73,8 +78,10 @@ class Monitor:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._pause = self._node.create_client(SetBool, f"{topics.WORLD_SIM}/pause")
-        self._decision: DiagnosticArray | None = None
-        self._outcome: DiagnosticStatus | None = None
+        self._robots = robots
+        self._letterboxes = Letterboxes()  # nothing wakes us up for every message of the run
+        self._decisions: dict[str, bytes] = {}
+        self._ticks: dict[str, int] = {}
 
     def __enter__(self) -> Monitor:
         return self
@@ -86,13 +93,13 @@ class Monitor:
         self._context.destroy()
 
     def spin(self, timeout_s: float) -> None:
-        """Take in one thing that happens within timeout_s."""
+        """Take in one answer that comes within timeout_s, and the newest of everything."""
         self._executor.spin_once(timeout_sec=timeout_s)
+        self.take_in()
 
     def take_in(self) -> None:
         """Take in the newest of everything, now: the run must not be waited upon."""
-        for _ in range(4):  # two topics and their late neighbours
-            self._executor.spin_once(timeout_sec=0.0)
+        self._letterboxes.empty()
 
     def ask_ready(self, nodes: Iterable[str]) -> dict[str, Question]:
         """A question to ~/ready of each node."""
@@ -107,31 +114,51 @@ class Monitor:
 
     def listen(self) -> None:
         """Begin to hear the run: only now, or readiness would count these subscriptions."""
-        node, decision, outcome = self._node, topics.DECISION, topics.OUTCOME
-        node.create_subscription(decision.type, decision.name, self._on_decision, PROGRESS_QOS)
-        node.create_subscription(outcome.type, outcome.name, self._on_outcome, outcome.qos)
+        for robot in self._robots:
+            self._open(robot, topics.DECISION, PROGRESS_QOS, self._on_decision)
+            self._open(robot, topics.OUTCOME, topics.OUTCOME.qos, self._on_outcome)
 
-    def _on_decision(self, message: DiagnosticArray) -> None:
-        self._decision = message
+    def _open(
+        self, robot: str, topic: Topic, qos: QoSProfile, deliver: Callable[[str, bytes], None]
+    ) -> None:
+        self._node.open_boxes(
+            self._letterboxes,
+            topic.type,
+            below(robot, topic).name,
+            lambda letter: deliver(robot, letter.data),
+            [qos],
+        )
 
-    def _on_outcome(self, message: DiagnosticStatus) -> None:
-        self._outcome = message
+    def _on_decision(self, robot: str, data: bytes) -> None:
+        self._decisions[robot] = data
 
-    def ticks_at_end(self) -> int | None:
-        """How many ticks the run had; None while it runs."""
-        if self._outcome is None or self._outcome.message == "running":
-            return None
-        return int(self._outcome.values[0].value)
+    def _on_outcome(self, robot: str, data: bytes) -> None:
+        status = deserialize_message(data, topics.OUTCOME.type)
+        if status.message != "running":
+            self._ticks[robot] = int(status.values[0].value)
+
+    def ticks_at_end(self) -> dict[str, int] | None:
+        """How many ticks each robot had; None while one is under way."""
+        return self._ticks if len(self._ticks) == len(self._robots) else None
+
+    def stamps_ns(self) -> dict[str, int]:
+        """What each robot has decided on last, by its stamp."""
+        return {robot: header_stamp_ns(data) for robot, data in self._decisions.items()}
 
     def progress(self) -> Progress | None:
-        """How far the run is; None before the first decision."""
-        if self._decision is None:
-            return None
-        fields = {item.key: item.value for item in self._decision.status[0].values}
-        x, y, _ = map(float, fields["pose"].split(","))
-        goal = points(fields["goal"])
-        return Progress(
-            stamp_ns=stamp_ns(self._decision.header.stamp),
-            mode=fields["mode"],
-            distance_m=math.dist((x, y), goal[0]) if goal else math.nan,
+        """How far the run is, by the robot that has farthest to go; None before any decision."""
+        return max(
+            map(_progress, self._decisions.values()), key=lambda p: p.distance_m, default=None
         )
+
+
+def _progress(decision: bytes) -> Progress:
+    message = deserialize_message(decision, topics.DECISION.type)
+    fields = {item.key: item.value for item in message.status[0].values}
+    x, y, _ = map(float, fields["pose"].split(","))
+    goal = points(fields["goal"])
+    return Progress(
+        stamp_ns=stamp_ns(message.header.stamp),
+        mode=fields["mode"],
+        distance_m=math.dist((x, y), goal[0]) if goal else math.nan,
+    )

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
-import json
+import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..core.errors import BagError, GraphError
 from ..recording.reader import BagReader
+from ..recording.robots import ALONE, below
 from ..ros import topics
-from ..run_config import NODES, Parameters, node_parameters, run_facts
+from ..run_config import NODES, RunConfig, graph_parameters, recorder_parameters
 from .attempt import Attempt
 from .crew import Crew
 from .directory import RunDirectory
@@ -21,6 +22,7 @@ from .options import RECORDER
 from .stop import StoppedError
 
 READY_TIMEOUT_S = 15.0
+MORE_PER_ROBOT_S = 5.0
 ANSWER_TIMEOUT_S = 5.0
 FREEZE_TIMEOUT_S = 1.0
 LAST_DECISION_TIMEOUT_S = 2.0
@@ -35,40 +37,43 @@ def run_multi_process(attempt: Attempt) -> None:
     the recorder missed something.
     """
     attempt.screen.log_to(attempt.directory.log)
+    config = attempt.order.config
+    told = graph_parameters(config, (*NODES, RECORDER))
+    bag = str(attempt.directory.bag.absolute())
+    # First, as what it hears first it must not miss.
+    told = {RECORDER: recorder_parameters(config, bag, told)} | told
     with (
         private_domain() as domain,
-        Monitor(domain) as monitor,
+        Monitor(domain, robots_of(config)) as monitor,
         Crew(attempt.screen.line, attempt.stop.is_urgent) as crew,
     ):
         attempt.screen.say(f"starting the nodes; look on with ROS_DOMAIN_ID={domain}")
-        crew.start(_told(attempt), attempt.order.node_args)
-        ticks = _Conductor(attempt, monitor, crew).conduct()
-    if not attempt.order.config.real_time:
+        crew.start(told, attempt.order.node_args)
+        ticks = _Conductor(attempt, monitor, crew, list(told)).conduct()
+    if not config.real_time:
         require_complete(attempt.directory, ticks)
 
 
-def _told(attempt: Attempt) -> Parameters:
-    """Every node's parameters, the recorder's first: what it hears first it must not miss."""
-    config = attempt.order.config
-    recorder = {
-        "output": str(attempt.directory.bag.absolute()),
-        "nodes": ",".join(NODES),
-        "sim_time": True,
-        "run": json.dumps(run_facts(config)),
-    }
-    return {RECORDER: recorder, **node_parameters(config, (*NODES, RECORDER))}
+def robots_of(config: RunConfig) -> list[str]:
+    """What the robots of a run are called."""
+    return [member.name for member in config.scenario.robots] or [ALONE]
 
 
 class _Conductor:
     """Lets the nodes get ready, play and stop together."""
 
-    def __init__(self, attempt: Attempt, monitor: Monitor, crew: Crew) -> None:
+    def __init__(
+        self, attempt: Attempt, monitor: Monitor, crew: Crew, nodes: Sequence[str]
+    ) -> None:
         self._attempt = attempt
         self._monitor = monitor
         self._crew = crew
+        self._nodes = nodes
+        robots = len(attempt.order.config.scenario.robots)
+        self._patience_s = READY_TIMEOUT_S + MORE_PER_ROBOT_S * robots
 
-    def conduct(self) -> int:
-        """Run from start to end; return the number of ticks."""
+    def conduct(self) -> dict[str, int]:
+        """Run from start to end; return each robot's number of ticks."""
         self._get_ready()
         self._monitor.listen()
         self._attempt.begin()
@@ -97,7 +102,7 @@ class _Conductor:
 
     def _get_ready(self) -> None:
         """Wait until no node misses anything, so that no first message is lost."""
-        questions = self._monitor.ask_ready([RECORDER, *NODES])
+        questions = self._monitor.ask_ready(self._nodes)
         missing = dict.fromkeys(questions, "no answer yet")
 
         def all_ready() -> bool:
@@ -111,7 +116,7 @@ class _Conductor:
 
         self._wait(
             all_ready,
-            READY_TIMEOUT_S,
+            self._patience_s,
             lambda: "not ready: " + "; ".join(f"{name}: {what}" for name, what in missing.items()),
         )
         self._crew.forget_parameters()
@@ -120,7 +125,7 @@ class _Conductor:
         question = self._monitor.ask_pause(False)
         self._wait(question.answer, ANSWER_TIMEOUT_S, lambda: "world_sim does not answer ~/pause")
 
-    def _watch(self) -> int:
+    def _watch(self) -> dict[str, int]:
         """Until the world says that it is over; without waking up for every message."""
         tick_ns = self._attempt.order.config.planner.tick_ns
         while (ticks := self._monitor.ticks_at_end()) is None:
@@ -131,12 +136,13 @@ class _Conductor:
                 self._attempt.show(now.stamp_ns // tick_ns - 1, now.distance_m, now.mode)
         return ticks
 
-    def _hear_the_last_decision(self, ticks: int) -> None:
+    def _hear_the_last_decision(self, ticks: Mapping[str, int]) -> None:
         """In real time the world does not wait for the planner: give it a moment to finish."""
-        stamp_ns = ticks * self._attempt.order.config.planner.tick_ns
+        tick_ns = self._attempt.order.config.planner.tick_ns
         deadline = time.monotonic() + LAST_DECISION_TIMEOUT_S
         while time.monotonic() < deadline:
-            if (now := self._monitor.progress()) and now.stamp_ns >= stamp_ns:
+            heard = self._monitor.stamps_ns()
+            if all(heard.get(robot, 0) >= count * tick_ns for robot, count in ticks.items()):
                 return
             self._check()
             self._monitor.spin(TURN_S)
@@ -151,14 +157,15 @@ class _Conductor:
             self._monitor.spin(TURN_S)
 
 
-def require_complete(directory: RunDirectory, ticks: int) -> None:
-    """Raise BagError unless every topic of the loop has a message for each of the ticks."""
+def require_complete(directory: RunDirectory, ticks: Mapping[str, int]) -> None:
+    """Raise BagError unless every topic of a robot's loop has a message for each of its ticks."""
     with BagReader(directory.bag) as reader:
         counts = {name: topic.message_count for name, topic in reader.topics.items()}
-    for topic in topics.GRAPH:
-        found = counts.get(f"/{topic.name.lstrip('/')}", 0)
-        if topic.every_tick and found < ticks:
+    every_tick = [topic for topic in topics.GRAPH if topic.every_tick]
+    for robot, topic in itertools.product(ticks, every_tick):
+        name = topic.name if topic.name.startswith("/") else below(robot, f"/{topic.name}")
+        if (found := counts.get(name, 0)) < ticks[robot]:
             raise BagError(
-                f"{directory.bag}: incomplete, {found} of {ticks} messages on {topic.name}; "
+                f"{directory.bag}: incomplete, {found} of {ticks[robot]} messages on {name}; "
                 "run again on a machine with less to do"
             )

@@ -22,6 +22,10 @@ from ..scenarios import load_scenario
 from .settings import add_set_argument, with_robot_settings, with_settings
 
 RECORDER = "recorder"
+# Where discovery stays on this machine, 32 processes find each other and later ones may not (as
+# measured with Fast DDS). A robot is two; recorder, world_sim, launcher and one onlooker are four.
+MOST_ROBOTS = 14
+PROCESS_GB = 0.05  # without what they share
 TIMEOUT_S = 600.0
 
 _DESCRIPTION = """\
@@ -160,10 +164,22 @@ def _order(found: argparse.Namespace) -> Order:
         raise ConfigError("--real-time: the core driver has no clock; choose another --driver")
     speed = {} if found.speed is None else {"speed_factor": found.speed}
     config = read_config(found, driver=driver, real_time=real_time, **speed)
-    if config.scenario.robots and driver is Driver.CORE:
+    robots = len(config.scenario.robots)
+    if robots and driver is Driver.CORE:
         raise ConfigError(
-            f"--driver core: of {len(config.scenario.robots)} robots it leaves no directory; "
-            "use `mfba sim`, or --driver in-process"
+            f"--driver core: of {robots} robots it leaves no directory; use `mfba sim`, or "
+            "another --driver"
+        )
+    if robots > MOST_ROBOTS and driver is Driver.MULTI_PROCESS:
+        raise ConfigError(
+            f"--driver multi-process: {robots} robots would be {2 * robots + 2} processes of "
+            f"{PROCESS_GB:g} GB, more than find each other; give --driver in-process, or "
+            f"{MOST_ROBOTS} robots at most"
+        )
+    if robots and real_time:
+        raise ConfigError(
+            f"--real-time: {robots} robots run in lockstep here; leave it out, or use "
+            "`ros2 launch mfba_planner simulate.launch.py` to watch them"
         )
     node_args = {
         node: _split(f"--{node.replace('_', '-')}-args", getattr(found, f"{node}_args"))

@@ -18,7 +18,10 @@ ENABLED = {"true": True, "false": False}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """How one node is started; of parameters and files, the later has the last word."""
+    """How one node is started; of parameters and files, the later has the last word.
+
+    name is a program's, or NAMESPACE/it.
+    """
 
     name: str
     parameters: dict[str, Any] = field(default_factory=dict)

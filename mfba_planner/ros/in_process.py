@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -14,9 +13,8 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from ..core.errors import GraphError
-from ..run_config import NODES, RunConfig, fleet_parameters, node_parameters, run_facts
+from ..run_config import NODES, RunConfig, graph_parameters, recorder_parameters
 from . import params, topics
-from .fleet_sim import FleetSim
 from .planner import PlannerNode
 from .recorder import Recorder
 from .runtime import GraphNode, make_executor
@@ -56,18 +54,16 @@ def run_in_process(
         stack.callback(context.destroy)
         stack.callback(context.try_shutdown)
         peers = (*NODES, topics.RECORDER) if bag else NODES
-        robots = config.scenario.robots
-        told = (fleet_parameters if robots else node_parameters)(config, peers)
+        told = graph_parameters(config, peers)
         wanted = list(told)
         if bag:
-            told = {topics.RECORDER: _for_recorder(config, bag)} | told
+            told = {topics.RECORDER: recorder_parameters(config, str(bag))} | told
         executor = make_executor(context)
         stack.callback(executor.shutdown)
         nodes: dict[str, Any] = {}
-        kinds = KINDS | {topics.WORLD_SIM: FleetSim} if robots else KINDS
         for name, values in told.items():
             namespace, _, which = name.rpartition("/")
-            node = kinds[which](
+            node = KINDS[which](
                 context=context,
                 namespace=namespace,
                 parameter_overrides=_overrides(values | _UNATTENDED),
@@ -77,14 +73,14 @@ def run_in_process(
             stack.callback(node.close)
             executor.add_node(node)
             nodes[name] = node
-        world: WorldSim | FleetSim = nodes[topics.WORLD_SIM]
+        world: WorldSim = nodes[topics.WORLD_SIM]
         if bag:
             recorder: Recorder = nodes[topics.RECORDER]
             recorder.explain({name: params.values(nodes[name]) for name in wanted})
         _spin(
             executor,
             lambda: not _missing(nodes),
-            READY_TIMEOUT_S + len(robots),
+            READY_TIMEOUT_S + len(config.scenario.robots),
             lambda: _missing(nodes),
         )
         started = time.perf_counter()
@@ -100,15 +96,6 @@ def run_in_process(
         for _ in range(DRAIN_TURNS):
             executor.spin_once(timeout_sec=0.0)
         return took_s
-
-
-def _for_recorder(config: RunConfig, bag: Path) -> dict[str, Any]:
-    return {
-        "output": str(bag),
-        "sim_time": True,
-        "run": json.dumps(run_facts(config)),
-        "namespaces": ",".join(member.name for member in config.scenario.robots),
-    }
 
 
 def _spin(

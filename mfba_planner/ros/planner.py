@@ -122,10 +122,10 @@ class PlannerNode(ManagedNode):
 
     def _watch(self) -> None:
         """Say stop, again and again, while sectors or odom are stale; and how things are."""
-        now_s = time.monotonic()
         if isinstance(self._inputs, Newest):
-            self._answer(self._inputs.stale(now_s, self.brain.params.input_timeout_s))
-        self._health.report(self._last, self.brain, self.goals.errands, self.state, now_s)
+            timeout_s = self.brain.params.input_timeout_s
+            self._answer(self._inputs.stale(time.monotonic(), timeout_s))
+        self._health.report(self._last, self.brain, self.goals.errands, self.state)
 
     def _answer(self, ready: Ready | None) -> None:
         if ready is None or not self.is_active:

@@ -34,11 +34,12 @@ class PlannerHealth:
 
     def decided(self, decision: Decision, brain: Guarded, errands: Errands, state: str) -> None:
         """Report at once where something has changed; everything else can wait."""
-        self._stamp_ns, self._stamp_s = decision.stamp_ns, time.monotonic()
+        if decision.stamp_ns != self._stamp_ns:  # on old inputs again: time goes on all the same
+            self._stamp_ns, self._stamp_s = decision.stamp_ns, time.monotonic()
         seen = (decision.mode, brain.phase, errands.number, *self._faults.values())
         news, self._seen = seen != self._seen, seen
-        if news or self._topic.is_due(decision.stamp_ns):
-            self.report(decision, brain, errands, state, self._stamp_s, news=news)
+        if news or self._topic.is_due(self._time_ns(time.monotonic())):
+            self.report(decision, brain, errands, state, news=news)
 
     def report(
         self,
@@ -46,11 +47,11 @@ class PlannerHealth:
         brain: Guarded,
         errands: Errands,
         state: str,
-        now_s: float,
         *,
         news: bool = False,
     ) -> None:
         """Publish, if it is time to, or if a level has changed."""
+        now_s = time.monotonic()
         fault = next(filter(None, self._faults.values()), "")
         timeout_s = brain.params.input_timeout_s
         values = {
@@ -64,5 +65,8 @@ class PlannerHealth:
             self._health.inputs(now_s, timeout_s, self._refusals.by_kind, fault),
             driving(decision, brain.phase, state, values),
         ]
-        passed_ns = round((now_s - self._stamp_s) / NANO)
-        self._topic.publish(statuses, self._stamp_ns + passed_ns, news=news)
+        self._topic.publish(statuses, self._time_ns(now_s), news=news)
+
+    def _time_ns(self, now_s: float) -> int:
+        """The newest stamp, and what has passed since it came."""
+        return self._stamp_ns + round((now_s - self._stamp_s) / NANO)

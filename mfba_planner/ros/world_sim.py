@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""world_sim: publishes the world tick by tick, in lockstep with cmd_vel or on a wall timer."""
+"""world_sim: publishes the world tick by tick, in lockstep with cmd_vel or on a wall timer.
+
+A fleet's robots have their topics in their namespaces; one tick is everybody's.
+"""
 
 from __future__ import annotations
 
@@ -9,35 +12,33 @@ from typing import Any
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from std_srvs.srv import SetBool, Trigger
 
-from ..core.episode import World
-from ..core.errors import InputError
+from ..core.episode import stamp_of
+from ..core.errors import ConfigError, InputError
 from ..core.planner import NANO
 from ..messages import pose2d
 from ..node_settings import WorldSimSettings, names
 from . import params, topics
-from .answer_topics import AnswerTopics
+from .company import Company
 from .pace import Pace
 from .runtime import GraphNode, Refusals, spin_node
 from .world_params import declare_scenario
-from .world_topics import WorldTopics
 
 
 class WorldSim(GraphNode):
-    """The simulated world of one scenario."""
+    """The simulated world of one scenario; a tick ends when all who are asked have answered."""
 
     def __init__(self, **kwargs: Any) -> None:
         """Raise ConfigError for a scenario or parameter that cannot be accepted."""
         super().__init__(topics.WORLD_SIM, **kwargs)
         self.settings = s = params.declare(self, WorldSimSettings(), read_only=True)
         self.scenario = declare_scenario(self, s.scenario)
-        self.over, self._ticks_before_reset = False, 0
+        if s.run_on and self.scenario.robots:
+            raise ConfigError("parameter run_on=True: a fleet's run ends; give false")
         self.pace = Pace(s)
         self._refusals = Refusals(self)
-        self._out = WorldTopics(self, s, self.scenario.robot)
-        self._answers = AnswerTopics(
-            self, s, lambda: self.world, self._refusals, self._look_for_answer
-        )
-        self.listen(topics.INITIALPOSE, self._on_initialpose)
+        self._all = Company(self, s, self.scenario, self._refusals, self._look_for_answers)
+        if not self.scenario.robots:
+            self.listen(topics.INITIALPOSE, self._on_initialpose)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
         self.create_service(Trigger, "~/reset", self._on_reset)
@@ -46,67 +47,66 @@ class WorldSim(GraphNode):
         if s.lockstep:
             period_s, on_timer = min(s.answer_timeout_s / 4, 0.25), self._watch
         self.every(period_s, on_timer)
-        self._begin()
+        self._begin(ticks_before=0)
+
+    @property
+    def world(self) -> Any:
+        """The World as it is now; of several robots their Fleet."""
+        return self._all.world
 
     @property
     def stamp_ns(self) -> int:
         """Stamp of the present tick; it never goes back, not even on ~/reset."""
-        return self.world.stamp_ns + self._ticks_before_reset * self.settings.tick_ns
+        return stamp_of(self._ticks_before + self._all.tick, self.settings.tick_ns)
 
     def resume(self) -> None:
         """Go on from a pause; nothing when not paused."""
         if self.pace.resume():
             self._move_on()
 
-    def _begin(self) -> None:
-        s = self.settings
-        self.world = World(self.scenario, s.tick_ns, s.goal_tolerance_m, s.seed)
+    def _begin(self, ticks_before: int) -> None:
+        self._ticks_before = ticks_before
         self.over, self._published = False, False
-        self._answers.rest()
-        self._out.begin(self.scenario.goal_m, self.stamp_ns)
+        self._all.begin(stamp_of(ticks_before, self.settings.tick_ns))
 
     def _move_on(self) -> None:
         """Do what was told last and publish the next tick, unless the run is over."""
-        outcome = None if self.settings.run_on else self.world.outcome()
-        if not self._published:
-            self._publish_tick()
-        elif outcome is None:
-            self.world.step(self._answers.told)
+        if not self._published or self._all.step():
             self._publish_tick()
         else:
             self.over = True
-            self._out.end(outcome, self.world.tick + 1)
-            self.get_logger().info(f"run over: {outcome.value} at tick {self.world.tick}")
+            self.get_logger().info(f"run over: {self._all.ends()} at tick {self._all.tick}")
 
     def _publish_tick(self) -> None:
         self._published = True
         self.pace.published(time.monotonic())
-        self._out.tick(self.world, self._answers.told, self.stamp_ns)
+        self._all.publish(self.stamp_ns)
 
     def _on_timer(self) -> None:
         """Real time: one more tick; the first when everybody of wait_for is there."""
         if not self.pace.paused and not self.over and (self._published or not self.missing()):
-            self._answers.rest_if_silent()
+            self._all.rest_if_silent()
             self._move_on()
 
     def _watch(self) -> None:
-        """Lockstep: begin when somebody is there; publish an unanswered tick again."""
-        self._look_for_answer()  # its goal_step may have come after its Twist
+        """Lockstep: begin when everybody is there; publish an unanswered tick again."""
+        self._look_for_answers()  # a goal_step may have come after its Twist
         if not self._published:
-            if self.pace.may_move_on() and self._out.are_heard:
+            if self.pace.may_move_on() and self._all.are_heard and not self.missing():
                 self._publish_tick()
-        elif self.pace.must_repeat(time.monotonic(), self.world.tick):
-            self.get_logger().warning(f"tick {self.world.tick} unanswered: published again")
-            self._out.tick(self.world, self._answers.told, self.stamp_ns)
+        elif self.pace.must_repeat(time.monotonic(), self._all.tick):
+            by = f" by {absent}" if (absent := self._all.absent()) else ""
+            self.get_logger().warning(f"tick {self._all.tick} unanswered{by}: published again")
+            self._all.publish_again(self.stamp_ns)
 
-    def _look_for_answer(self) -> None:
-        has_come = self.pace.is_open and self._answers.take(self.stamp_ns)
+    def _look_for_answers(self) -> None:
+        has_come = self.pace.is_open and self._all.have_answered(self.stamp_ns)
         if has_come and self.pace.answered():
             self._move_on()
 
     def _on_initialpose(self, message: PoseWithCovarianceStamped) -> None:
         try:
-            self.world.put(pose2d(message.pose.pose, "initialpose"))
+            self._all.seats[0].place.put(pose2d(message.pose.pose, "initialpose"))
         except InputError as error:
             self._refusals.add(error)
 
@@ -122,12 +122,11 @@ class WorldSim(GraphNode):
         refusal = "refused: the run is over; reset first" if self.over else self.pace.cannot_step()
         if not refusal:
             self._move_on()
-        response.success, response.message = not refusal, refusal or f"tick {self.world.tick}"
+        response.success, response.message = not refusal, refusal or f"tick {self._all.tick}"
         return response
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._ticks_before_reset += self.world.tick + 1
-        self._begin()
+        self._begin(self._ticks_before + self._all.tick + 1)
         if self.pace.answered():
             self._publish_tick()
         response.success, response.message = True, f"tick 0 at stamp {self.stamp_ns} ns"

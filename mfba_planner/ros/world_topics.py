@@ -18,19 +18,13 @@ TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is 
 
 
 class WorldTopics:
-    """The publishers of world_sim."""
+    """The publishers of world_sim for one robot; the time is everybody's."""
 
     def __init__(
-        self,
-        node: GraphNode | Namespaced,
-        settings: WorldSimSettings,
-        robot: Robot,
-        *,
-        clock: bool = True,
+        self, node: GraphNode | Namespaced, settings: WorldSimSettings, robot: Robot
     ) -> None:
-        """Advertise them all; clock=False leaves the time to somebody else."""
+        """Advertise them all."""
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
-        self._clock = node.advertise(topics.CLOCK) if clock else None
         self._odom = node.advertise(topics.ODOM)
         errs = robot.noise.of_odometry
         self._truth = node.advertise(topics.GROUND_TRUTH) if errs else None
@@ -75,8 +69,6 @@ class WorldTopics:
         odom = convert.odometry_msg(
             reading.pose, velocity, stamp_ns, frame, self._base_frame, turn
         )
-        if self._clock:
-            self._clock.publish(convert.clock_msg(stamp_ns))
         self._obstacles.publish(convert.obstacles_msg(centers, stamp_ns, frame))
         if self._tf:
             self._tf.publish(markers.tf_msg(odom))

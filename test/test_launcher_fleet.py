@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A fleet as real processes: the core's decisions, whoever starts first, nobody left behind."""
+
+import json
+import os
+import random
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from helpers import wait_until
+from launching import Program, complete
+
+from mfba_planner.core.digest import digest
+from mfba_planner.core.episode import Outcome
+from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.fleet import run_fleet
+from mfba_planner.core.world import Member, Obstacle, Scenario
+from mfba_planner.launcher import crew
+from mfba_planner.launcher.options import MOST_ROBOTS, read_order
+from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.episode import read_recording
+from mfba_planner.recording.reader import BagReader
+from mfba_planner.run_config import OF_ROBOT, Parameters
+from mfba_planner.scenarios import scenario_to_json
+
+PROCESSES = ["--driver", "multi-process", "--no-picture", "--out", "run"]
+LONG = [*PROCESSES, "--set", "planner.step_length_m=0.002"]
+PAIR = Scenario(
+    name="pair",
+    start_m=(0.0, 0.0),
+    goal_m=(4.0, 0.0),
+    obstacles=(Obstacle(center_m=(2.0, 3.0), radius_m=0.3, speed_mps=0.1),),
+    robots=(
+        Member(name="east", start_m=(0.0, 0.0), goal_m=(4.0, 0.0)),
+        Member(name="west", start_m=(3.5, 0.1), goal_m=(0.0, 0.0)),
+    ),
+)
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Path:
+    """A directory with the pair's scenario."""
+    (tmp_path / "pair.json").write_text(scenario_to_json(PAIR), encoding="utf-8")
+    return tmp_path
+
+
+def test_two_robots_as_six_processes_decide_as_in_one(here: Path) -> None:
+    told = "--planner-args=-p view_period_s:=7.5"
+    done = complete("launcher", "pair.json", "--seed", "3", *PROCESSES, told, cwd=here)
+    assert (done.process.returncode, done.stderr) == (0, "")
+    recorded = read_recording(here / "run/bag").episodes
+    core = run_fleet(PAIR, seed=3)
+    assert list(recorded) == ["east", "west"]
+    assert [digest(e.ticks) for e in recorded.values()] == [digest(e.ticks) for e in core]
+    assert tuple(replace(e, driver="core") for e in recorded.values()) == core
+    assert len(core[0].ticks) != len(core[1].ticks)  # one is there first, and asked no more
+    assert "[west/planner] INFO: goal_pose: on to (0.0, 0.0)" in done.stdout
+    assert "2 of 2 robots at the goal without collision" in done.stdout
+    found = sorted(path.name for path in (here / "run").iterdir())
+    assert found == ["bag", "east.json", "log.txt", "west.json"]
+    assert json.loads((here / "run/west.json").read_text())["driver"] == "multi-process"
+    with BagReader(here / "run/bag") as reader:
+        counts = {name: topic.message_count for name, topic in reader.topics.items()}
+        nodes = read_configuration(reader)["nodes"]
+    of_robots = {f"{robot}/{node}" for robot in recorded for node in OF_ROBOT}
+    assert set(nodes) == {"world_sim", *of_robots}
+    assert [nodes[f"{robot}/planner"]["view_period_s"] for robot in recorded] == [7.5, 7.5]
+    for episode, name in zip(core, recorded):
+        for topic in ("odom", "obstacles", "sectors", "goal_step", "cmd_vel", "plan"):
+            assert counts[f"/{name}/{topic}"] == len(episode.ticks)
+    assert counts["/clock"] == max(len(episode.ticks) for episode in core)
+
+
+def test_whoever_starts_first(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The launcher's own order is one of many; the recorder may come last, too."""
+    start = crew.Crew.start
+    told_in: list[list[str]] = []
+
+    def shuffled(self: crew.Crew, told: Parameters, more: dict[str, list[str]]) -> None:
+        names = list(told)
+        random.Random(len(told_in)).shuffle(names)
+        told_in.append(names)
+        start(self, {name: told[name] for name in names}, more)
+
+    monkeypatch.setattr(crew.Crew, "start", shuffled)
+    monkeypatch.chdir(here)
+    from mfba_planner import launcher
+
+    core = run_fleet(PAIR, seed=1)
+    for place in ("one", "two"):
+        args = ["pair.json", "--seed", "1", *PROCESSES[:-1], place]
+        assert launcher.main(args) == 0, capsys.readouterr().out
+        recorded = read_recording(here / place / "bag").episodes
+        assert [e.ticks for e in recorded.values()] == [e.ticks for e in core]
+    assert told_in[0] != told_in[1]
+
+
+@pytest.mark.parametrize("node", ["west/planner", "east/virtual_sensor"])
+def test_a_node_that_dies_is_named_with_its_robot(here: Path, node: str) -> None:
+    with Program("launcher", "pair.json", *LONG, cwd=here) as program:
+        program.wait_for_data(here / "run")
+        os.kill(program.node(node), signal.SIGKILL)
+        assert program.end() == 1
+        assert program.family() == []
+    assert program.stderr.count("\n") == 1
+    assert program.stderr.startswith(f"launcher: {node} ended (killed by SIGKILL)")
+    assert program.stderr.endswith("; what was recorded is in run\n")
+    for name, episode in read_recording(here / "run/bag").episodes.items():
+        assert episode.outcome is Outcome.INTERRUPTED
+        assert len(episode.ticks) > 10
+        told = json.loads((here / f"run/{name}.json").read_text())
+        assert told["extra"]["failure"].startswith(f"{node} ended")
+
+
+def test_ctrl_c_leaves_a_whole_bag_and_nobody(here: Path) -> None:
+    with Program("launcher", "pair.json", *LONG, cwd=here) as program:
+        program.wait_for_data(here / "run")
+        program.send_group(signal.SIGINT)
+        assert program.end() == 130
+        assert program.family() == []
+    assert program.stderr == "interrupted by SIGINT; what was recorded is in run\n"
+    east, west = read_recording(here / "run/bag").episodes.values()
+    assert len(east.ticks) == len(west.ticks) > 10
+
+
+def test_nodes_do_not_outlive_a_killed_launcher(here: Path) -> None:
+    with Program("launcher", "pair.json", *LONG, cwd=here) as program:
+        program.wait_for_data(here / "run")
+        program.process.kill()
+        wait_until(lambda: program.family() == [], timeout_s=30.0)
+
+
+def test_more_than_find_each_other_are_refused(tmp_path: Path) -> None:
+    robots = tuple(
+        Member(name=f"r{n}", start_m=(0.0, float(n)), goal_m=(9.0, float(n)))
+        for n in range(MOST_ROBOTS + 1)
+    )
+    file = tmp_path / "many.json"
+    first = robots[0]
+    many = Scenario(name="many", start_m=first.start_m, goal_m=first.goal_m, robots=robots)
+    file.write_text(scenario_to_json(many), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"15 robots would be 32 processes of .*; give --dr"):
+        read_order([str(file), "--driver", "multi-process"], "launcher")
+    file.write_text(scenario_to_json(replace(many, robots=robots[:-1])), encoding="utf-8")
+    read_order([str(file), "--driver", "multi-process"], "launcher")
