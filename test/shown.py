@@ -9,6 +9,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 MFBA = Path(sys.executable).parent / "mfba"
+# README and docs, but for what the build writes (docs/reference).
+PAGES = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md")))
+    if path.parent.name != "reference"
+}
 # Whole lines of a page that name the file a block of YAML goes into.
 _SAVED = re.compile(r"^[^`\n]*\b[Ss]aved? (?:this )?as `([\w.]+)`", re.MULTILINE)
 
