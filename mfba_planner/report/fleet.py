@@ -45,7 +45,7 @@ def _fleet_figure(scenario: Scenario, seed: int, runs: Mapping[str, Episode]) ->
     page = Page(*fitted(view.grown(first.robot_radius_m, first.robot_radius_m)))
     for name, episode in zip(names, episodes):
         draw_path(page.ax, episode)
-        draw_ends(page.ax, episode)
+        draw_ends(page.ax, episode, style.SMALL_START)
         x, y = episode.scenario.start_m
         page.ax.text(x, y + 1.2 * first.robot_radius_m, name, **style.NUMBER)
     good = sum(result.success for result in results)

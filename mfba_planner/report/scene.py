@@ -174,9 +174,10 @@ def draw_path(ax: Axes, episode: Episode) -> None:
             line(ax, places, f"standing:{mode.value}", **looks, **style.STANDING[mode])
 
 
-def draw_ends(ax: Axes, episode: Episode) -> None:
+def draw_ends(ax: Axes, episode: Episode, start: style.Looks = style.START) -> None:
     """Mark start, goal, and where the run ended if that is elsewhere."""
-    line(ax, [episode.scenario.start_m], "start", zorder=Z_MARK, **style.START)
+    # A start that is another robot's goal, too, lies on it and leaves the star's tips to be seen.
+    line(ax, [episode.scenario.start_m], "start", zorder=Z_MARK + 0.05, **start)
     line(ax, [episode.scenario.goal_m], "goal", zorder=Z_MARK, **style.GOAL)
     if episode.outcome is not Outcome.GOAL_REACHED:
         last = episode.ticks[-1].pose.position

@@ -86,6 +86,7 @@ STANDING: dict[Mode, Looks] = {
 }
 _POINT: Looks = {"linestyle": "none", "markeredgecolor": PAPER}
 START: Looks = {**_POINT, "marker": "o", "markersize": 10.5, "color": INK}
+SMALL_START: Looks = {**START, "markersize": 5.0, "markeredgewidth": 0.0}
 GOAL: Looks = {**_POINT, "marker": "*", "markersize": 17.0, "color": GREEN}
 PARTICLE: Looks = {**_POINT, "marker": "o", "markersize": 7.5, "color": BLUE}
 END: Looks = {**_POINT, "marker": "D", "markersize": 5.5, "color": INK}

@@ -52,7 +52,8 @@ class Scene {
     for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
       lines.push(`M${left} ${-y}H${right}`);
       const unit = y + step > top ? " m" : "";
-      this.label(`${round(y)}${unit}`, left, y, { class: "axis", dx: 3, dy: -4 });
+      const dy = y + 0.03 * this.width < top ? -4 : 13; // below its line where it would be cut
+      this.label(`${round(y)}${unit}`, left, y, { class: "axis", dx: 3, dy });
     }
     this.element.prepend(svg("path", { class: "grid", d: lines.join("") }));
     if (!world.walls) return;
