@@ -10,7 +10,6 @@ from typing import Any
 
 import yaml
 from graph import Graph
-from helpers import wait_until
 from launch_standin import Node, launched
 from launching import INSTALLED, Program
 from lifecycle_msgs.msg import Transition
@@ -19,8 +18,10 @@ from rcl_interfaces.srv import DescribeParameters
 from rclpy.context import Context
 from talk import INF, goal, odom
 
+from mfba_planner.core.errors import MfbaError
 from mfba_planner.messages import decision
 from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.recover import recover
 from mfba_planner.ros import topics
 
 PACKAGE = "mfba_planner"
@@ -304,13 +305,11 @@ def _place(message: Any) -> tuple[float, float]:
     return (message.pose.pose.position.x, message.pose.pose.position.y)
 
 
-def bags_below(folder: Path) -> list[Path]:
-    """The bags that were recorded there, complete ones."""
-    found: list[Path] = []
-
-    def some() -> bool:
-        found[:] = [path.parent for path in folder.rglob("metadata.yaml")]
-        return bool(found)
-
-    wait_until(some)
-    return found
+def holds(bag: Path, topic: str, scratch: Path) -> bool:
+    """Whether a bag that is still being recorded holds messages of a topic yet."""
+    try:
+        recover(bag, scratch)
+    except MfbaError:  # nothing at all so far
+        return False
+    with BagReader(scratch) as reader:
+        return topic in reader.topics and reader.topics[topic].message_count > 0
