@@ -16,6 +16,8 @@ from .core.world import Scenario
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
 _WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause lets it go"
+_DIAGNOSTICS = "/diagnostics: time between two"
+_HARDWARE = "hardware_id of /diagnostics, to tell robots apart"
 
 
 class Source(Enum):
@@ -99,6 +101,15 @@ class VirtualSensorSettings:
     scan_frame: str = option("", "frame that scans must be in, that of scan_yaw; empty: any")
     lockstep: bool = option(False, "pair odom with scan by stamp; false: newest odom")
     odom_frame: str = option("odom", "frame the sectors are aligned with")
+    input_timeout_s: float = option(
+        1.0,
+        "age at which /diagnostics calls odometry and scan stale",
+        unit="s",
+        minimum=0.001,
+        maximum=3600.0,
+    )
+    diagnostics_period_s: float = option(1.0, _DIAGNOSTICS, unit="s", minimum=0.01, maximum=3600.0)
+    hardware_id: str = option("none", _HARDWARE)
     wait_for: str = option("", _WAIT_FOR)
 
     def __post_init__(self) -> None:
@@ -121,10 +132,8 @@ class PlannerSettings(Base):
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )
-    diagnostics_period_s: float = option(
-        1.0, "/diagnostics: time between two", unit="s", minimum=0.01, maximum=3600.0
-    )
-    hardware_id: str = option("none", "hardware_id of /diagnostics, to tell robots apart")
+    diagnostics_period_s: float = option(1.0, _DIAGNOSTICS, unit="s", minimum=0.01, maximum=3600.0)
+    hardware_id: str = option("none", _HARDWARE)
     autostart: bool = option(
         True, "configure and activate at once; false: wait for ~/change_state"
     )

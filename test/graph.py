@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import rclpy
 from helpers import spin_until
 from rclpy.context import Context
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
@@ -90,6 +90,14 @@ class Graph:
         self.until(future.done)
         self.probe.destroy_client(client)
         return future.result()
+
+    def parameters(self, node: str, names: list[str]) -> list[Any]:
+        """Values of a node's parameters, asked of its service."""
+        client = AsyncParameterClient(self.probe, node)
+        self.until(client.services_are_ready)
+        future = client.get_parameters(names)
+        self.until(future.done)
+        return [parameter_value_to_python(value) for value in future.result().values]
 
     def set_parameter(self, node: str, name: str, value: Any) -> str:
         """Set one parameter of a node over its service; why it was refused, or empty."""

@@ -14,6 +14,7 @@ from helpers import wait_until
 
 ROOT = Path(__file__).parents[1]
 MARK = "MFBA_TEST_MARK"
+INSTALLED = Path(sys.executable).parent
 PROGRAM = "import sys; from mfba_planner import entry; sys.exit(entry.{}())"
 # Thousands of ticks: long enough to be caught in the middle of it.
 LONG = ["case1", "--seed", "1", "--set", "planner.step_length_m=0.002", "--no-picture"]
@@ -23,12 +24,18 @@ class Program:
     """One of our commands as a process, and all that descend from it."""
 
     def __init__(
-        self, name: str, *args: str, cwd: Path, more_env: Mapping[str, str] | None = None
+        self,
+        name: str,
+        *args: str,
+        cwd: Path,
+        more_env: Mapping[str, str] | None = None,
+        installed: bool = False,
     ) -> None:
+        """With `installed` it is the executable that pip and colcon make, as `ros2 run` does."""
         self.mark = uuid.uuid4().hex
         env = {**os.environ, MARK: self.mark, "PYTHONPATH": str(ROOT), **(more_env or {})}
         self.process = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM.format(name), *args],
+            [*([INSTALLED / name] if installed else _by_entry(name)), *args],
             cwd=cwd,
             env=env,
             stdin=subprocess.DEVNULL,
@@ -75,6 +82,10 @@ class Program:
         """Wait until the run goes on and a first chunk of it is in the bag."""
         bag = run / "bag" / "bag_0.mcap"
         wait_until(lambda: bag.exists() and bag.stat().st_size > 30_000, timeout_s=60.0)
+
+
+def _by_entry(name: str) -> list[str]:
+    return [sys.executable, "-c", PROGRAM.format(name)]
 
 
 def _environments() -> list[tuple[int, list[str]]]:

@@ -31,7 +31,7 @@ class Wired:
         self.beams = [float("inf")] * 360
         self.odom = graph.hear(topics.ODOM)
         self.decisions = graph.hear(topics.DECISION)
-        self.diagnostics = graph.hear(topics.DIAGNOSTICS)
+        self._diagnostics = graph.hear(topics.DIAGNOSTICS)
         self.cmd_vel = graph.hear(topics.CMD_VEL)
         self._wires = {
             topic.name: graph.probe.create_publisher(
@@ -43,7 +43,11 @@ class Wired:
             graph.probe.create_subscription(topic.type, topic.name, deliver, topic.qos)
         self.sensor = graph.start(
             VirtualSensor,
-            {"source": "scan", "scan_frame": "base_link"},
+            {
+                "source": "scan",
+                "scan_frame": "base_link",
+                "input_timeout_s": TIMEOUT_S / SPEED_FACTOR,
+            },
             cli_args=_remapped("odom", "scan"),
         )
         self.planner = graph.start(
@@ -93,9 +97,14 @@ class Wired:
                 return stamp_ns(after[k].header.stamp) - since_ns
         return None
 
-    def told(self, name: str) -> Any:
-        """The newest status of /diagnostics of this name."""
-        return next(s for s in self.diagnostics[-1].status if s.name == f"planner: {name}")
+    def diagnostics(self, node: str = "planner") -> list[Any]:
+        """What a node has said on /diagnostics."""
+        return [m for m in self._diagnostics if m.status[0].name.startswith(f"{node}: ")]
+
+    def told(self, name: str, node: str = "planner") -> Any:
+        """A node's newest status of this name."""
+        newest = self.diagnostics(node)[-1].status
+        return next(status for status in newest if status.name == f"{node}: {name}")
 
 
 def _remapped(*names: str) -> list[str]:

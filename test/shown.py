@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands and code that the README and the docs show, as their readers would try them."""
 
+import os
 import re
 import shlex
 import subprocess
@@ -9,6 +10,34 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 MFBA = Path(sys.executable).parent / "mfba"
+# README and docs, but for what the build writes (docs/reference).
+PAGES = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md")))
+    if path.parent.name != "reference"
+}
+_BENCH = "python bench/benchmark.py"
+_SMALL = "--others 2 --few 2 --rounds 1 --workers 1 --docs docs"
+# What takes too long for a test, as shown, and what is run instead: the same with less of it.
+REDUCED = {
+    ".venv/bin/mfba sim case2 --seeds 100": ".venv/bin/mfba sim case2 --seeds 3",
+    "mfba sim walled --planner predictive --seeds 100": (
+        "mfba sim walled --planner predictive --seeds 3"
+    ),
+    "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 100": (
+        "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 4 --workers 1"
+    ),
+    f"{_BENCH} --worlds 10000 --first 10000 --others 200 --few 150": (
+        f"{_BENCH} --worlds 2 --first 10000 {_SMALL}"
+    ),
+    f"{_BENCH} --worlds 10000 --first 10000 --others 200 --few 150 --out runs/benchmark "
+    "--rounds 200 --workers 2": (
+        f"{_BENCH} --worlds 2 --first 10184 {_SMALL} --out runs/benchmark --suite random-20"
+    ),
+    "python bench/robots.py": "python bench/robots.py --worlds 1 --only sectors",
+    "python bench/kidnapped.py --graph 5": "python bench/kidnapped.py --graph 1 --count 1",
+    "python bench/fleet.py": "python bench/fleet.py --seeds 1 --robots 3 --radius 3",
+}
 # Whole lines of a page that name the file a block of YAML goes into.
 _SAVED = re.compile(r"^[^`\n]*\b[Ss]aved? (?:this )?as `([\w.]+)`", re.MULTILINE)
 
@@ -33,6 +62,32 @@ def _split_at_and(words: list[str]) -> list[list[str]]:
         else:
             parts[-1].append(word)
     return parts
+
+
+def inline(text: str) -> list[list[str]]:
+    """The commands within the text of a page that are more than a name, in words."""
+    prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    return [shlex.split(line) for line in re.findall(r"`((?:python|make) [^`]+)`", prose)]
+
+
+def reduced(command: list[str]) -> list[str]:
+    """What a test runs of a command: the whole, or what REDUCED says."""
+    return shlex.split(REDUCED.get(" ".join(command), " ".join(map(shlex.quote, command))))
+
+
+def script(command: list[str], cwd: Path, *, code: int = 0) -> str:
+    """Run `python bench/...` there; return what it printed."""
+    done = subprocess.run(
+        [sys.executable, ROOT / command[1], *command[2:]],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert done.returncode == code, f"{command}\n{done.stderr}"
+    return done.stdout
 
 
 def ours(command: list[str]) -> list[str] | None:
@@ -75,7 +130,7 @@ def follow(text: str, cwd: Path) -> None:
     for name, content in files.items():
         (cwd / name).write_text(content, encoding="utf-8")
     for command in commands(text):
-        arguments = ours(command)
+        arguments = ours(reduced(command))
         if arguments is not None:
             mfba(arguments, cwd)
     for shown in blocks(text, "console"):

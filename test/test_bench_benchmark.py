@@ -5,25 +5,27 @@ import json
 import os
 import re
 import runpy
-import shlex
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+import shown
 
 from mfba_planner.report.sweep import HEAD
 from mfba_planner.statistics import Interval
 from mfba_planner.sweep.read import read_sweep
+from mfba_planner.worlds import suite_names
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "bench" / "benchmark.py"
 PAGE = (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")
-SMALL = [
-    "--suite", "random-20", "--worlds", "2", "--first", "30", "--rounds", "1", "--workers", "1",
-    "--out", "out", "--docs", "docs",
-]  # fmt: skip
+SHOWN = shown.commands(PAGE)
+WHOLE, MADE_BY = (words for words in SHOWN if words[0] == "python")
+SMALL = shown.reduced(MADE_BY)[2:]
+SEVEN = ["paper", "predictive", "orca", "dwa", "vfh", "apf", "straight"]
+OUT = Path("runs/benchmark")
 
 
 def bench(words: list[str], directory: Path) -> subprocess.CompletedProcess[str]:
@@ -58,16 +60,16 @@ def lines(page: str, title: str) -> dict[str, dict[str, str]]:
 def test_the_tables_say_what_the_rows_say(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     found = lines(page, "### random-20")
-    assert list(found) == ["paper", "predictive", "orca", "dwa", "vfh", "apf", "straight"]
+    assert list(found) == SEVEN
     (optima,) = (
         json.loads(path.read_text())["columns"]
-        for path in (made / "out" / "random-20-optima" / "chunks").glob("*.json")
+        for path in (made / OUT / "random-20-optima" / "chunks").glob("*.json")
     )
     optimum_m = dict(zip(optima["world"], optima["optimum_m"]))
     for name, line in found.items():
         assert list(line) == list(HEAD)
-        rows = read_sweep(made / "out" / f"random-20-{name}").rows
-        assert [row["world"] for row in rows] == [30, 31]
+        rows = read_sweep(made / OUT / f"random-20-{name}").rows
+        assert [row["world"] for row in rows] == [10184, 10185]
         good = [row for row in rows if row["success"]]
         assert line["success"].startswith(f"{50.0 * len(good):.2f} % ["), name
         assert line["collided"] == str(sum(row["collisions"] > 0 for row in rows))
@@ -80,7 +82,7 @@ def test_the_tables_say_what_the_rows_say(made: Path) -> None:
 def test_paper_has_its_own_step_and_all_others_share_one(made: Path) -> None:
     steps = {
         path.name: read_sweep(path).order.setting.params.step_length_m
-        for path in (made / "out").iterdir()
+        for path in (made / OUT).iterdir()
         if not path.name.endswith("optima")
     }
     assert len(steps) == 7 + 6 + 8
@@ -113,7 +115,7 @@ def test_episodes_per_minute_are_of_whole_sweeps(made: Path) -> None:
 def test_what_was_written_by_hand_stays_and_pictures_are_small(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     assert page.partition("<!-- generated")[0] == PAGE.partition("<!-- generated")[0]
-    assert "python bench/benchmark.py --worlds 2 --first 30 --out out --suite random-20" in page
+    assert " --worlds 2 --first 10184 --others 2 --few 2 --out runs/benchmark " in page
     named = re.findall(r"!\[.*?\]\((.*?)\)", page.partition("<!-- generated")[2])
     assert len(named) >= 3
     for name in named:
@@ -121,9 +123,9 @@ def test_what_was_written_by_hand_stays_and_pictures_are_small(made: Path) -> No
 
 
 def test_it_goes_on_from_what_is_finished(made: Path) -> None:
-    chunks = sorted((made / "out").glob("*/chunks/*.json"))
+    chunks = sorted((made / OUT).glob("*/chunks/*.json"))
     before = {path: path.stat().st_mtime_ns for path in chunks}
-    gone = made / "out" / "random-20-orca" / "chunks"
+    gone = made / OUT / "random-20-orca" / "chunks"
     for path in gone.iterdir():
         del before[path]
         path.unlink()
@@ -153,23 +155,46 @@ def test_bad_scales_and_pages_are_refused_before_any_work(tmp_path: Path) -> Non
     marks = bench(SMALL, tmp_path)
     assert marks.returncode == 1
     assert "benchmark.md: lacks the lines" in marks.stderr
-    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / OUT).exists()
 
 
-def test_the_page_s_commands_have_only_options_that_exist(
+def test_all_suites_are_made_by_the_command_shown_but_for_its_numbers(tmp_path: Path) -> None:
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "benchmark.md").write_text(PAGE, encoding="utf-8")
+    assert shown.reduced(WHOLE) != WHOLE
+    shown.script(shown.reduced(WHOLE), tmp_path)
+    page = (tmp_path / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    for suite in suite_names():
+        labels = lines(page, f"### {suite}")  # where there are cases: "case 1: orca"
+        assert {label.rpartition(" ")[2] for label in labels} == set(SEVEN)
+    assert PAGE.count("\n### ") == page.count("\n### ")
+    assert PAGE.count("\n## ") == page.count("\n## ")
+
+
+@pytest.mark.parametrize("command", [w for w in SHOWN if w[0] != "python"], ids=lambda w: w[-1])
+def test_the_runs_shown_go_as_the_page_says(command: list[str], tmp_path: Path) -> None:
+    """Of their sweeps this one world."""
+    _, show, directory, run = command
+    suite, world, planner, _ = run.split("/")
+    (said,) = re.findall(rf"The first: (.*):\n\n```sh\n{' '.join(command)}\n", PAGE)
+    sweep = f"sweep {suite} --planner {planner} --first {world} --worlds 1 --workers 1"
+    step = "--set planner.step_length_m=0.08"  # which is predictive's own
+    shown.mfba([*sweep.split(), *step.split(), "--out", directory], tmp_path)
+    assert show == "show"
+    told = shown.mfba(command[1:], tmp_path)
+    assert told.splitlines()[:2] == [run, said]
+
+
+def test_every_command_of_the_page_is_run_here_and_options_in_its_text_exist(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    assert {words[0] for words in SHOWN} == {"python", "mfba"}
+    assert len(SHOWN) == 4
     monkeypatch.syspath_prepend(str(SCRIPT.parent))
     parser = runpy.run_path(str(SCRIPT))["arguments"]()
-    blocks = re.findall(r"^```sh\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-    assert blocks
-    for block in blocks:
-        words = shlex.split(block)
-        if words[:2] == ["python", "bench/benchmark.py"]:
-            parser.parse_args(words[2:])
-        else:
-            assert words[:2] == ["mfba", "show"]
-            assert re.fullmatch(r"[\w-]+/\d+/\w+/0", words[-1])
+    for words in (WHOLE, MADE_BY):
+        assert words[1] == "bench/benchmark.py"
+        parser.parse_args(words[2:])
     for part in re.findall(r"`(--.*?)`", PAGE):
         options = [word for word in part.split() if word.startswith("--")]
         assert all(word == "--help" or f"{word} " in parser.format_help() for word in options)

@@ -23,13 +23,15 @@ def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
 
 def test_inputs_are_sound_stale_or_refused() -> None:
     health = Health(("odom", "sectors"))
-    assert health.inputs(0.0, 1.0, {}, "").level is Level.STALE
-    for name, pulse in health.pulses.items():
-        pulse.beat(1, 0.0 if name == "odom" else 0.5)
-    assert health.inputs(1.0, 1.0, {}, "").level is Level.OK
-    stale = health.inputs(1.25, 1.0, {}, "")
+    assert health.inputs(0.0, 1.0, {}).level is Level.STALE
+    health.heard("odom", 1, 0.0)
+    health.heard("sectors", 1, 0.5)
+    sound = health.inputs(1.0, 1.0, {})
+    assert (sound.level, sound.message) == (Level.OK, "odom and sectors are sound")
+    stale = health.inputs(1.25, 1.0, {})
     assert stale.message == "odom stale for 1.25 s (input_timeout_s=1)"
-    refused = health.inputs(1.25, 1.0, {"odom: frame": 2, "odom: value": 3}, "odom is in frame")
+    health.judged("odom", "odom is in frame")
+    refused = health.inputs(1.25, 1.0, {"odom: frame": 2, "odom: value": 3})
     assert refused.level is Level.ERROR
     assert refused.message.startswith("refused: odom is in frame; odom stale for")
     assert refused.values["refused"] == "5"

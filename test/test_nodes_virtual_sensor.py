@@ -211,7 +211,7 @@ def test_a_scan_in_another_frame_blinds_and_both_are_named(graph: Graph) -> None
     other = scan(1)
     other.header.frame_id = "rear"
     assert all(map(math.isnan, sensor.answer(odom(1), other).ranges))
-    assert sensor.node._refusals.by_kind == {"input: frame": 1}
+    assert sensor.node._refusals.by_kind == {"scan: frame": 1}
     assert sensor.node._refusals.last == (
         "scan is in frame 'rear', not 'base_scan'; transform it, or set scan_frame"
     )

@@ -252,6 +252,25 @@ def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
         assert cost > length + 1e-6
 
 
+@pytest.mark.parametrize("bearing", np.linspace(-math.pi, math.pi, 25).tolist())
+def test_along_the_edge_of_who_is_within_a_margin_is_free_and_deeper_is_not(
+    bearing: float,
+) -> None:
+    """Right angles are none to the last bit; what that makes of them is no approach."""
+    post = Circle(
+        center_m=(0.605 * math.cos(bearing), 0.605 * math.sin(bearing)), radius_m=0.6
+    )  # a margin is 0.015 m
+    near = Prediction((0.0, 0.0), [post], RiskParams(), 0.1)
+    for side in (-1.0, 1.0):
+        for inward_rad, is_free in ((0.0, True), (1e-6, True), (1e-3, False)):
+            heading = bearing + side * (math.pi / 2.0 - inward_rad)
+            ux, uy = math.cos(heading), math.sin(heading)
+            cost = near.cost((0.4 * ux, 0.4 * uy), 0.5, (4.0 * ux, 4.0 * uy), 0.8)
+            assert (cost == pytest.approx(4.0, abs=1e-9)) == is_free
+            (closed,) = near.closed(np.array([0.8 * ux]), np.array([0.8 * uy]))
+            assert bool(closed) != is_free
+
+
 def test_the_preset_changes_step_and_swarm_only() -> None:
     changed = preset(PlannerParams(speed_mps=0.7))
     assert changed.tick_ns == round(0.08 / 0.7 * 1e9)

@@ -33,7 +33,7 @@ README = Path(__file__).resolve().parent.parent / "README.md"
 YAML = README.parent / "config/planner.yaml"
 # What a robot with a lidar is told, where the paper's robot would do something else.
 ROBOT: dict[str, dict[str, Any]] = {
-    "virtual_sensor": {"source": "scan"},
+    "virtual_sensor": {"source": "scan", "input_timeout_s": 0.25},
     "planner": {
         "speed_mps": 0.5,
         "step_length_m": 0.05,  # a decision is for 0.1 s

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the planner is, in the words of /diagnostics. No ROS here."""
+"""How a node is, in the words of /diagnostics. No ROS here."""
 
 from __future__ import annotations
 
@@ -69,11 +69,24 @@ class Health:
     def __init__(self, inputs: tuple[str, ...]) -> None:
         """Watch these inputs."""
         self.pulses = {name: Pulse() for name in inputs}
+        self._faults: dict[str, str] = {}
 
-    def inputs(
-        self, now_s: float, timeout_s: float, refused: Mapping[str, int], fault: str
-    ) -> Status:
-        """Rates, ages and refusals; fault is what is wrong with the newest input, "": nothing."""
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What is wrong with the newest of each input, "": nothing."""
+        return tuple(self._faults.values())
+
+    def heard(self, name: str, stamp_ns: int, now_s: float) -> None:
+        """An input came."""
+        self.pulses[name].beat(stamp_ns, now_s)
+
+    def judged(self, name: str, fault: str) -> None:
+        """Why the newest of an input is refused, "": it is sound."""
+        self._faults[name] = fault
+
+    def inputs(self, now_s: float, timeout_s: float, refused: Mapping[str, int]) -> Status:
+        """Rates, ages and refusals, and what is wrong."""
+        fault = next(filter(None, self.faults), "")
         values: dict[str, str] = {}
         silent: dict[str, str] = {}
         for name, pulse in self.pulses.items():
@@ -94,7 +107,7 @@ class Health:
             )
         if silent:
             return Status("inputs", Level.STALE, "; ".join(silent.values()), values)
-        return Status("inputs", Level.OK, "odom and sectors are sound", values)
+        return Status("inputs", Level.OK, f"{' and '.join(self.pulses)} are sound", values)
 
 
 def driving(

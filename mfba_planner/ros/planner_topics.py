@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What planner says: the move, everything about the decision, and how it is."""
+"""What planner says: the move, and everything about the decision."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
 
 from ..core.geometry import Point
 from ..core.jump import carried_off
-from ..core.planner import NANO, Decision, Mode
+from ..core.planner import Decision, Mode
 from ..node_settings import PlannerSettings
 from . import convert, markers, topics
-from .health import Status
 from .runtime import GraphNode
 
 
@@ -70,28 +68,3 @@ class PlannerTopics:
             self._cmd_vel.publish(rest)
         else:
             self._cmd_vel.publish(Twist())
-
-
-class DiagnosticTopic:
-    """The publisher of /diagnostics: once in a period, and at once when something changes."""
-
-    def __init__(self, node: GraphNode, settings: PlannerSettings) -> None:
-        """Advertise it; it outlives what PlannerTopics advertises."""
-        self._publisher = node.advertise(topics.DIAGNOSTICS)
-        self._who = node.get_fully_qualified_name().lstrip("/")
-        self._hardware_id = settings.hardware_id
-        self._period_ns = round(settings.diagnostics_period_s / NANO)
-        self._last_ns = -1
-        self._last_gist: list[Any] = []
-
-    def is_due(self, stamp_ns: int) -> bool:
-        """Whether a period has passed since the last, or time was set back."""
-        return not 0 <= self._last_ns <= stamp_ns < self._last_ns + self._period_ns
-
-    def publish(self, statuses: list[Status], stamp_ns: int, *, news: bool) -> None:
-        """Publish what is due, has changed its level, or is news for another reason."""
-        gist = [status.gist for status in statuses]
-        if news or gist != self._last_gist or self.is_due(stamp_ns):
-            self._last_gist, self._last_ns = gist, stamp_ns
-            message = convert.diagnostics_msg(statuses, self._who, self._hardware_id, stamp_ns)
-            self._publisher.publish(message)

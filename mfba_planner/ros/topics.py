@@ -149,7 +149,12 @@ INITIALPOSE = Topic(
     name="initialpose", type=PoseWithCovarianceStamped, readers=(WORLD_SIM,), qos=VIEW_QOS
 )
 WAYPOINTS = Topic(name="waypoints", type=Path, readers=(PLANNER,), qos=VIEW_QOS)
-DIAGNOSTICS = Topic(name="/diagnostics", type=DiagnosticArray, writers=(PLANNER,), qos=VIEW_QOS)
+DIAGNOSTICS = Topic(
+    name="/diagnostics",
+    type=DiagnosticArray,
+    writers=(VIRTUAL_SENSOR, PLANNER),
+    qos=VIEW_QOS,
+)
 MARKERS = Topic(name="markers", type=MarkerArray, writers=(WORLD_SIM, PLANNER), qos=VIEW_QOS)
 
 GRAPH: tuple[Topic, ...] = (

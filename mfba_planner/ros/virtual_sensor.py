@@ -23,6 +23,7 @@ from . import params, topics
 from .convert import sectors_msg, sensory_vector_msg
 from .pairing import StampPairs
 from .runtime import GraphNode, Refusals, spin_node
+from .sensor_health import SensorHealth
 
 _DEFAULT_RADII = [0.3]
 
@@ -43,8 +44,9 @@ class VirtualSensor(GraphNode):
         self._sectors = self.advertise(topics.SECTORS)
         self._vector = self.advertise(topics.SENSORY_VECTOR)
         self.listen(topics.ODOM, self._on_odom, from_anyone=not s.lockstep)
-        source = topics.OBSTACLES if s.source is Source.OBSTACLES else topics.SCAN
-        self.listen(source, self._on_measurement)
+        self._source = topics.OBSTACLES if s.source is Source.OBSTACLES else topics.SCAN
+        self._health = SensorHealth(self, s, self._refusals, self._source.name)
+        self.listen(self._source, self._on_measurement)
         self.offer_ready(names(s.wait_for))
         self.on_time_set_back(self._start_afresh)
 
@@ -57,26 +59,29 @@ class VirtualSensor(GraphNode):
         self._pose: Pose2D | None = None
 
     def _on_odom(self, message: Any) -> None:
-        self._pose = None
+        self._pose, fault = None, ""
+        self._health.heard("odom", stamp_ns(message.header.stamp))
         try:
             self._pose = robot_pose(message)
         except InputError as error:
-            self._refusals.add(error)
+            fault = self._refused(error, "odom")
+        self._health.judged("odom", fault)
         if self._by_stamp:
-            self._join(self._pairs.add_a, message, self._pose)
+            self._join(self._pairs.add_a, "odom", message, self._pose)
 
     def _on_measurement(self, message: Any) -> None:
+        self._health.heard(self._source.name, stamp_ns(message.header.stamp))
         if self._by_stamp:
-            self._join(self._pairs.add_b, message, message)
+            self._join(self._pairs.add_b, self._source.name, message, message)
         else:
             self._answer(stamp_ns(message.header.stamp), self._pose, message)
 
-    def _join(self, add: Any, message: Any, value: Any) -> None:
+    def _join(self, add: Any, name: str, message: Any, value: Any) -> None:
         stamp = stamp_ns(message.header.stamp)
         try:
             pair = add(stamp, value)
         except InputError as error:
-            self._refusals.add(error)
+            self._refused(error, name)
             return
         if pair is not None:
             self._answer(stamp, *pair)
@@ -85,11 +90,12 @@ class VirtualSensor(GraphNode):
         """Publish sectors for one stamp; NaN where the inputs were refused."""
         s = self.settings
         ranges: Ranges = (math.nan,) * self.sensor.sectors
+        fault = ""
         if pose is not None:
             try:
                 ranges = self._measure(pose, message)
             except InputError as error:
-                self._refusals.add(error)
+                fault = self._refused(error, self._source.name)
         else:
             self.get_logger().warning(
                 "no usable odom: the sectors are blind", throttle_duration_sec=1.0
@@ -99,6 +105,11 @@ class VirtualSensor(GraphNode):
         )
         if not math.isnan(ranges[0]):
             self._vector.publish(sensory_vector_msg(sensory_vector(ranges)))
+        self._health.judged(self._source.name, fault)
+
+    def _refused(self, error: InputError, source: str) -> str:
+        self._refusals.add(error, source)
+        return str(error)
 
     def _measure(self, pose: Pose2D, message: Any) -> Ranges:
         s = self.settings

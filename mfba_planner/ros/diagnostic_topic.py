@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""/diagnostics, as planner and virtual_sensor publish it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from ..core.planner import NANO
+from ..node_settings import PlannerSettings, VirtualSensorSettings
+from . import convert, topics
+from .health import Status
+from .runtime import GraphNode
+
+
+class DiagnosticTopic:
+    """The publisher of /diagnostics: once in a period, and at once when something changes.
+
+    Its stamps are those of what the node hears, and go on with a steady clock in between.
+    """
+
+    def __init__(self, node: GraphNode, settings: PlannerSettings | VirtualSensorSettings) -> None:
+        """Advertise it."""
+        self._publisher = node.advertise(topics.DIAGNOSTICS)
+        self._who = node.get_fully_qualified_name().lstrip("/")
+        self._hardware_id = settings.hardware_id
+        self._period_ns = round(settings.diagnostics_period_s / NANO)
+        self._last_ns = -1
+        self._last_gist: list[Any] = []
+        self._stamp_ns, self._stamp_s = node.get_clock().now().nanoseconds, time.monotonic()
+
+    def at(self, stamp_ns: int, now_s: float) -> None:
+        """What was heard is stamped stamp_ns; told the same again, time goes on all the same."""
+        if stamp_ns != self._stamp_ns:
+            self._stamp_ns, self._stamp_s = stamp_ns, now_s
+
+    def is_due(self, now_s: float) -> bool:
+        """Whether a period has passed since the last, or time was set back."""
+        stamp_ns = self._stamp(now_s)
+        return not 0 <= self._last_ns <= stamp_ns < self._last_ns + self._period_ns
+
+    def publish(self, statuses: list[Status], now_s: float, *, news: bool) -> None:
+        """Publish what is due, has changed its level, or is news for another reason."""
+        gist = [status.gist for status in statuses]
+        if news or gist != self._last_gist or self.is_due(now_s):
+            self._last_gist, self._last_ns = gist, self._stamp(now_s)
+            message = convert.diagnostics_msg(
+                statuses, self._who, self._hardware_id, self._last_ns
+            )
+            self._publisher.publish(message)
+
+    def _stamp(self, now_s: float) -> int:
+        return self._stamp_ns + round((now_s - self._stamp_s) / NANO)

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""No command is shown that no test and no step of .ci/run runs, at least a reduced form of it."""
+
+import re
+from pathlib import Path
+
+import pytest
+import shown
+from ros2_session import kind_of
+from shown import PAGES, REDUCED, ROOT, ours
+
+CI = re.findall(r"^make (\w+)$", (ROOT / ".ci/run").read_text(encoding="utf-8"), re.MULTILINE)
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+COLCON = (ROOT / "tools/colcon_check.sh").read_text(encoding="utf-8")
+SETUP = (ROOT / "setup.py").read_text(encoding="utf-8")
+EVERYTHING = [
+    (n, w) for n, page in PAGES.items() for w in shown.commands(page) + shown.inline(page)
+]
+# `make docs` is what test_docs.py does; the target calls the same builder as strictly.
+BY_TESTS = {"docs": "--builder html --nitpicky --fail-on-warning --keep-going"}
+
+
+def is_run(words: list[str]) -> bool:
+    """Whether a test or .ci/run runs it; AssertionError where it says what is not so."""
+    program, *rest = words
+    if ours(words) is not None:
+        return True  # by test_readme, test_docs and those that test_docs.ELSEWHERE names
+    if program == "ros2":
+        return bool(kind_of(words))  # by test_docs_ros2
+    if program == "python":
+        return " ".join(words) in REDUCED
+    if program == "make":
+        return rest[0] in CI or BY_TESTS[rest[0]] in MAKEFILE
+    return sets_up_a_workspace(words)
+
+
+def sets_up_a_workspace(words: list[str]) -> bool:
+    """Whether `make colcon` does it, which builds, sources and looks with what is installed."""
+    program, *rest = words
+    assert "colcon" in CI
+    assert "tools/colcon_check.sh" in MAKEFILE
+    if program == "pip":
+        assert rest[0] == "install"
+        return all(f'"{name}>=' in SETUP for name in rest[1:])
+    if program == "colcon":
+        assert (rest[0], rest[-1]) == ("build", "mfba_planner")
+        return '/bin/colcon" --log-base "$base/log" build' in COLCON
+    if program == "source":
+        return rest == ["install/setup.bash"] and 'source "$prefix/../setup.bash"' in COLCON
+    return words in (["cd", "~/ws"], ["ln", "-s", "~/mfba_planner", "src/"])
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_command_of_a_page_is_run(name: str) -> None:
+    for page, words in EVERYTHING:
+        if page == name:
+            assert is_run(words), f"{name}: {' '.join(words)}: nobody runs it"
+
+
+def test_commands_are_found_and_none_is_reduced_that_is_not_shown() -> None:
+    lines = {" ".join(words) for _, words in EVERYTHING}
+    assert len(lines) > 60
+    assert {"make demo", "make test", "python bench/robots.py"} <= lines
+    assert not set(REDUCED) - lines
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("python bench/robots.py", "360 beams, sectors        3 of 3 "),
+        (
+            "python bench/kidnapped.py --graph 5",
+            "arrived 1 of 1, without contact 1, noticed 1; graph: 1 of 1 ",
+        ),
+        ("python bench/fleet.py", "1 of 1"),
+    ],
+)
+def test_what_makes_the_tables_of_other_pages_runs(line: str, said: str, tmp_path: Path) -> None:
+    assert said in shown.script(shown.reduced(line.split()), tmp_path)
