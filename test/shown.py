@@ -27,7 +27,7 @@ REDUCED = {
     "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 100": (
         "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 4 --workers 1"
     ),
-    f"{_BENCH} --worlds 10000 --first 10000 --others 200 --few 150": (
+    f"{_BENCH} --worlds 10000 --first 10000 --others 200 --few 150 --seen 600": (
         f"{_BENCH} --worlds 2 --first 10000 {_SMALL}"
     ),
     f"{_BENCH} --worlds 10000 --first 10000 --others 200 --few 150 --out runs/benchmark "
