@@ -35,6 +35,11 @@ class Node:
     arguments: Sequence[str] = ()
     on_exit: Any = None
 
+    @property
+    def full_name(self) -> str:
+        """Its name below its namespace."""
+        return f"{self.namespace}/{self.name}".lstrip("/")
+
     def command_line(self, folder: Path) -> list[str]:
         """What launch_ros makes of it: everything told in files, the later the last word."""
         words = [*self.arguments, "--ros-args", "-r", f"__node:={self.name}"]
@@ -42,7 +47,7 @@ class Node:
         for number, part in enumerate(self.parameters):
             if isinstance(part, dict):
                 told = {name: getattr(value, "value", value) for name, value in part.items()}
-                part = folder / f"{self.name}{number}.yaml"
+                part = folder / f"{self.full_name.replace('/', '_')}{number}.yaml"
                 part.write_text(yaml.safe_dump({"/**": {"ros__parameters": told}}))
             words += ["--params-file", str(part)]
         return words + [w for a, b in self.remappings for w in ("-r", f"{a}:={b}")]

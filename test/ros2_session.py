@@ -4,6 +4,7 @@
 import json
 import signal
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,7 @@ class Session:
             self._replay(args, bag=args[0])
             return
         self._make_way({program})
-        self._start(program, args)
+        self._start(program, program, args)
         if program == "virtual_sensor":
             self.scan = "scan"
         told = [args[i + 1].partition(":=") for i, word in enumerate(args) if word == "-p"]
@@ -89,19 +90,19 @@ class Session:
         given = dict(word.split(":=", 1) for word in args)
         nodes = launched(file, given)
         assert {node.package for node in nodes} == {PACKAGE}
-        self._make_way({node.name for node in nodes})
-        staying = {node.name: node for node in nodes if node.name != "replay"}
-        for node in staying.values():
-            self._start(node.executable, node.command_line(self.cwd))
+        self._make_way({node.full_name for node in nodes})
+        staying = {node.full_name: node for node in nodes if node.name != "replay"}
+        for name, node in staying.items():
+            self._start(name, node.executable, node.command_line(self.cwd))
         self._await({name: _last_word(node) for name, node in staying.items()})
         for node in set_apart(nodes, "replay"):
             self._replay(node.command_line(self.cwd), bag=given["bag"])
             self.end()
         self.scan = dict(rule for node in nodes for rule in node.remappings).get("scan", "scan")
 
-    def _start(self, program: str, args: Words) -> None:
+    def _start(self, name: str, program: str, args: Words) -> None:
         assert (INSTALLED / program).is_file(), f"{program}: no such executable"
-        self.running[program] = Program(
+        self.running[name] = Program(
             program, *args, cwd=self.cwd, more_env=self.env, installed=True
         )
 
@@ -112,10 +113,14 @@ class Session:
     def _await(self, nodes: dict[str, dict[str, Any]]) -> None:
         """Wait until nodes are seen in the graph, with the parameters they were told."""
         for name, told in nodes.items():
-            seen = self.graph.probe.get_node_names
-            self._until(lambda name=name, seen=seen: name in seen())  # type: ignore[misc]
+            self._until(lambda name=name: name in self._seen())  # type: ignore[misc]
             if told:
                 assert self.graph.parameters(name, list(told)) == list(told.values())
+
+    def _seen(self) -> set[str]:
+        """The nodes in the graph, by their names below their namespaces."""
+        found = self.graph.probe.get_node_names_and_namespaces()
+        return {f"{namespace}/{name}".lstrip("/") for name, namespace in found}
 
     def _until(self, condition: Callable[[], bool]) -> None:
         def so() -> bool:
@@ -214,11 +219,30 @@ class Session:
     def prove(self) -> None:
         """Where the graph is complete, the robot drives."""
         if "world_sim" in self.running:
-            self._until(lambda: len({_place(m) for m in self.odoms}) > 3)
+            planners = [name for name in self.running if name.endswith("planner")]
+            least = 3 if planners else 0  # who is told nothing stays where it is
+            for name in planners or self._robots():
+                odoms = self._odoms_of(name.rpartition("/")[0])
+                self._until(lambda heard=odoms: len({_place(m) for m in heard}) > least)  # type: ignore[misc]
         elif {"virtual_sensor", "planner"} <= set(self.running):
             self._drive_on_a_scan()
         elif "planner" in self.running:
             assert self.graph.call(GetState, "planner/get_state").current_state.label == "active"
+
+    def _robots(self) -> list[str]:
+        """The topics of odometry there are, one for each robot."""
+        ends = f"/{topics.ODOM.name}"
+        self._until(lambda: any(n.endswith(ends) for n in self._topics_of_world_sim()))
+        return [n.lstrip("/") for n in self._topics_of_world_sim() if n.endswith(ends)]
+
+    def _topics_of_world_sim(self) -> list[str]:
+        found = self.graph.probe.get_publisher_names_and_types_by_node("world_sim", "/")
+        return [name for name, _ in found]
+
+    def _odoms_of(self, robot: str) -> list[Any]:
+        if not robot:
+            return self.odoms
+        return self.graph.hear(replace(topics.ODOM, name=f"{robot}/{topics.ODOM.name}"))
 
     def _drive_on_a_scan(self) -> None:
         odoms, goals = self.graph.writer(topics.ODOM), self.graph.writer(topics.GOAL_POSE)

@@ -119,6 +119,12 @@ def python(code: str, cwd: Path) -> str:
     return done.stdout
 
 
+def save(text: str, cwd: Path) -> None:
+    """Save the YAML of a page where it says."""
+    for name, content in zip(_SAVED.findall(text), blocks(text, "yaml"), strict=True):
+        (cwd / name).write_text(content, encoding="utf-8")
+
+
 def follow(text: str, cwd: Path) -> None:
     """Do what a page says: save its YAML, run its commands, then its Python.
 
@@ -126,9 +132,7 @@ def follow(text: str, cwd: Path) -> None:
     """
     for name in ("config", "test"):
         (cwd / name).symlink_to(ROOT / name)
-    files = dict(zip(_SAVED.findall(text), blocks(text, "yaml"), strict=True))
-    for name, content in files.items():
-        (cwd / name).write_text(content, encoding="utf-8")
+    save(text, cwd)
     for command in commands(text):
         arguments = ours(reduced(command))
         if arguments is not None:
