@@ -73,7 +73,7 @@ class Graph:
             self.probe.create_subscription(topic.type, topic.name, note(topic.name), topic.qos)
         return heard
 
-    def until(self, condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
+    def until(self, condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
         """Spin everything until a fact holds."""
         spin_until(self.executor, condition, timeout_s)
 

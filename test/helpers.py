@@ -9,12 +9,12 @@ from typing import Any
 from mfba_planner.launcher.domain import claim_domain as claim_domain
 
 
-def spin_until(executor: Any, condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+def spin_until(executor: Any, condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
     """Spin the executor until the condition holds; AssertionError after timeout_s."""
     _until(condition, timeout_s, lambda: executor.spin_once(timeout_sec=0.02))
 
 
-def wait_until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+def wait_until(condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
     """Wait for a fact that no executor brings: a file, a process; AssertionError likewise."""
     _until(condition, timeout_s, lambda: time.sleep(0.005))
 
