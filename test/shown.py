@@ -30,8 +30,8 @@ REDUCED = {
     f"{_BENCH} --worlds 10000 --first 10000 --others 200 --few 150 --seen 600": (
         f"{_BENCH} --worlds 2 --first 10000 {_SMALL}"
     ),
-    f"{_BENCH} --worlds 10000 --first 10000 --others 200 --few 150 --out runs/benchmark "
-    "--rounds 200 --workers 2": (
+    f"{_BENCH} --worlds 10000 --first 10000 --others 200 --few 150 --seen 600 "
+    "--out runs/benchmark --rounds 200 --workers 2": (
         f"{_BENCH} --worlds 2 --first 10184 {_SMALL} --out runs/benchmark --suite random-20"
     ),
     "python bench/robots.py": "python bench/robots.py --worlds 1 --only sectors",
