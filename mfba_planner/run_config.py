@@ -137,7 +137,7 @@ def recorder_parameters(
     return {
         "output": output,
         "nodes": ",".join(nodes),
-        "namespaces": ",".join(member.name for member in config.scenario.robots),
+        "namespaces": ",".join(config.scenario.robot_names),
         "sim_time": True,
         "run": json.dumps(run_facts(config)),
     }

@@ -51,7 +51,7 @@ def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> Named:
     if len(paths) == 1:
         scenario, _, episodes = _runs(paths[0], robots)
         if ALONE not in episodes:
-            return Named(list(episodes.items()), tuple(member.name for member in scenario.robots))
+            return Named(list(episodes.items()), scenario.robot_names)
     runs = []
     for path in paths:
         for robot, episode in _runs(path, robots).episodes.items():

@@ -26,7 +26,7 @@ def simulate(config: RunConfig, seeds: int, out: Path | None) -> int:
         )
     if seeds == 1:
         results = _results(config, config.seed)
-        print(fleet_text([member.name for member in config.scenario.robots], results), end="")
+        print(fleet_text(config.scenario.robot_names, results), end="")
         if why := why_no_success(results):
             raise MfbaError(why)
         return 0

@@ -120,6 +120,11 @@ class Scenario:
     kidnappings: tuple[Kidnapping, ...] = ()
     robots: tuple[Member, ...] = ()
 
+    @property
+    def robot_names(self) -> tuple[str, ...]:
+        """What the robots of a fleet are called; empty of one that is alone."""
+        return tuple(member.name for member in self.robots)
+
     def __post_init__(self) -> None:
         """Raise ConfigError for a task that makes no sense from the first moment."""
         if self.start_m == self.goal_m:

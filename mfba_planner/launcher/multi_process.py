@@ -12,7 +12,7 @@ from ..core.errors import BagError, GraphError
 from ..recording.reader import BagReader
 from ..recording.robots import ALONE, below
 from ..ros import topics
-from ..run_config import NODES, RunConfig, graph_parameters, recorder_parameters
+from ..run_config import NODES, graph_parameters, recorder_parameters
 from .attempt import Attempt
 from .crew import Crew
 from .directory import RunDirectory
@@ -44,7 +44,7 @@ def run_multi_process(attempt: Attempt) -> None:
     told = {RECORDER: recorder_parameters(config, bag, told)} | told
     with (
         private_domain() as domain,
-        Monitor(domain, robots_of(config)) as monitor,
+        Monitor(domain, config.scenario.robot_names or (ALONE,)) as monitor,
         Crew(attempt.screen.line, attempt.stop.is_urgent) as crew,
     ):
         attempt.screen.say(f"starting the nodes; look on with ROS_DOMAIN_ID={domain}")
@@ -52,11 +52,6 @@ def run_multi_process(attempt: Attempt) -> None:
         ticks = _Conductor(attempt, monitor, crew, list(told)).conduct()
     if not config.real_time:
         require_complete(attempt.directory, ticks)
-
-
-def robots_of(config: RunConfig) -> list[str]:
-    """What the robots of a run are called."""
-    return [member.name for member in config.scenario.robots] or [ALONE]
 
 
 class _Conductor:

@@ -68,11 +68,11 @@ def read_setups(reader: BagReader) -> Setups:
     try:
         world = nodes["world_sim"]
         scenario = load_scenario(world["scenario_json"])
-        names = [member.name for member in scenario.robots]
+        names = scenario.robot_names
         starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
         worlds = worlds_seen(scenario, starts, world["tick_ns"]) if names else [scenario]
         found = {}
-        for name, seen in zip(names or [ALONE], worlds):
+        for name, seen in zip(names or (ALONE,), worlds):
             above = f"{name}/" if name else ""
             planner, sensor = (nodes[above + node] for node in ("planner", "virtual_sensor"))
             found[name] = Setup(

@@ -53,7 +53,7 @@ class Company:
         self._time = node.advertise(topics.CLOCK)
         self.seats = [
             Seat(node, settings, name, scenario, refusals, on_heard)
-            for name in [member.name for member in scenario.robots] or [""]
+            for name in scenario.robot_names or ("",)
         ]
 
     @property

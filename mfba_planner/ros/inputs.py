@@ -12,6 +12,11 @@ from ..core.sensing import Ranges
 from .pairing import StampPairs
 
 
+def watch_period_s(timeout_s: float, *, lockstep: bool) -> float:
+    """How often to look whether an input has fallen silent for longer than timeout_s."""
+    return 0.5 if lockstep else min(max(0.25 * timeout_s, 0.02), 0.25)
+
+
 class Ready(NamedTuple):
     """Something to decide on."""
 

@@ -15,7 +15,7 @@ from ..node_settings import PlannerSettings, names
 from ..planners.method import brain
 from . import params, topics
 from .goals import Goals
-from .inputs import Lockstep, Newest, Ready
+from .inputs import Lockstep, Newest, Ready, watch_period_s
 from .managed import ManagedNode
 from .planner_health import PlannerHealth
 from .planner_topics import PlannerTopics
@@ -40,7 +40,7 @@ class PlannerNode(ManagedNode):
         self._forget()
         self.on_time_set_back(self._start_afresh)
         timeout_s = self.brain.params.input_timeout_s
-        self.every(0.5 if s.lockstep else min(max(0.25 * timeout_s, 0.02), 0.25), self._watch)
+        self.every(watch_period_s(timeout_s, lockstep=s.lockstep), self._watch)
         self.begin(s.autostart)
         self.offer_ready(names(s.wait_for))
 

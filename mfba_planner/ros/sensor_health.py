@@ -8,6 +8,7 @@ import time
 from ..node_settings import VirtualSensorSettings
 from .diagnostic_topic import DiagnosticTopic
 from .health import Health
+from .inputs import watch_period_s
 from .runtime import GraphNode, Refusals
 
 
@@ -24,8 +25,7 @@ class SensorHealth:
         self._health = Health(("odom", source))
         self._timeout_s = settings.input_timeout_s
         self._seen: tuple[str, ...] = ()
-        watch_s = 0.5 if settings.lockstep else min(max(0.25 * self._timeout_s, 0.02), 0.25)
-        node.every(watch_s, self.report)
+        node.every(watch_period_s(self._timeout_s, lockstep=settings.lockstep), self.report)
 
     def heard(self, name: str, stamp_ns: int) -> None:
         """An input came."""
