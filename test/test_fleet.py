@@ -111,6 +111,20 @@ def test_who_has_arrived_is_still_in_the_way() -> None:
     assert evaluate(near).collisions == 0  # its own run was over
 
 
+def test_time_goes_on_around_who_has_arrived() -> None:
+    obstacle = Obstacle(center_m=(2.0, 0.0), radius_m=0.3, speed_mps=0.2, heading_rad=1.0)
+    ends = (((0.0, 0.0), (0.3, 0.0)), ((0.0, 5.0), (8.0, 5.0)))
+    fleet = Fleet(fleet_of(*ends, obstacles=(obstacle,)), TICK_NS, 0.01, 0)
+    fleet.step({0: (0.3 / (TICK_NS * 1e-9), 0.0), 1: (0.1, 0.0)})
+    assert fleet.under_way == [1]
+    for _ in range(3):
+        fleet.step({1: (0.1, 0.0)})
+    here = fleet.places[0]
+    assert here.tick == fleet.tick == 4
+    _, circles = here.near(10.0)
+    assert circles[0][0] == pytest.approx(center_at(obstacle, 4 * TICK_NS * 1e-9))
+
+
 def test_the_others_are_where_they_went() -> None:
     done = run_fleet(load_scenario("swap"), seed=2)
     for episode in done:

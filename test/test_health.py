@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rates, ages, levels, orders and the deadman: what needs no ROS to be checked."""
 
+import pytest
+
 from mfba_planner.core.recovery import Phase
 from mfba_planner.node_settings import WorldSimSettings
 from mfba_planner.ros.deadman import Deadman
 from mfba_planner.ros.errands import Errands
 from mfba_planner.ros.health import Health, Level, Pulse, driving
+from mfba_planner.ros.inputs import watch_period_s
 
 
 def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
@@ -103,3 +106,11 @@ def test_a_twist_holds_for_the_timeout_but_never_less_than_its_tick() -> None:
     assert not holds(0.01, 0.13)
     assert holds(0.5, 10.0, factor=0.01), "a tick lasts 10 s in such slow motion"
     assert holds(0.0, 1e6), "0: never"
+
+
+@pytest.mark.parametrize(
+    ("timeout_s", "period_s"), [(0.25, 0.0625), (1.0, 0.25), (60.0, 0.25), (0.001, 0.02)]
+)
+def test_silence_is_looked_for_well_within_its_timeout(timeout_s: float, period_s: float) -> None:
+    assert watch_period_s(timeout_s, lockstep=False) == period_s
+    assert watch_period_s(timeout_s, lockstep=True) == 0.5

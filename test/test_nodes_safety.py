@@ -18,6 +18,7 @@ from mfba_planner.core.recovery import RecoveryParams, longest_s
 from mfba_planner.messages import stamp_ns
 from mfba_planner.ros import topics
 from mfba_planner.ros.convert import pose_stamped_msg
+from mfba_planner.ros.diagnostic_topic import DiagnosticTopic
 from mfba_planner.ros.planner import PlannerNode
 
 INF, NAN = math.inf, math.nan
@@ -194,6 +195,18 @@ def test_as_long_as_inputs_are_stale_diagnostics_go_on_once_a_period(graph: Grap
 
     graph.until(lambda: len(ages()) > 1 and ages()[-1] > ages()[0] + 3.0)
     assert len(ages()) <= ages()[-1] - ages()[0] + 4
+
+
+def test_a_stamp_that_is_told_again_does_not_hold_up_diagnostics(graph: Graph) -> None:
+    node = graph.start(PlannerNode, {"diagnostics_period_s": 1.0})
+    topic = DiagnosticTopic(node, node.settings)
+    topic.at(10**9, 0.0)
+    topic.publish([], 0.0, news=False)
+    assert not topic.is_due(0.5)
+    topic.at(10**9, 0.9)
+    assert topic.is_due(1.5)
+    topic.at(2 * 10**9 - 1, 1.5)
+    assert not topic.is_due(1.5)
 
 
 def test_when_every_gap_is_closed_it_rests_and_says_so(graph: Graph) -> None:

@@ -200,6 +200,17 @@ def test_lockstep_begins_when_somebody_listens(graph: Graph) -> None:
     graph.until(lambda: len(odom) == 1)
 
 
+def test_lockstep_begins_when_those_it_waits_for_are_there(graph: Graph) -> None:
+    told = {"lockstep": True, "answer_timeout_s": 0.05, "wait_for": "virtual_sensor"}
+    graph.start(WorldSim, told)
+    odom = graph.hear(topics.ODOM)  # somebody listens, but not everybody it waits for
+    started = time.monotonic()
+    graph.until(lambda: time.monotonic() > started + 0.5)
+    assert odom == []
+    graph.start(VirtualSensor, {})
+    graph.until(lambda: len(odom) > 0)
+
+
 def test_pause_holds_the_world_until_it_is_lifted(driver: Driver) -> None:
     response = driver.pause(True)
     assert (response.success, response.message) == (True, "paused")
