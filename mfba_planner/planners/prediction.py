@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
@@ -151,31 +151,38 @@ class Prediction:
         if total >= bound:
             return total
         left, tau = bound - total, self._tau
-        risk = self._leg(self._weighed, 0.0, qx / t1, qy / t1, t1 if t1 < tau else tau, left)
+        risk = self._leg(0.0, 0.0, 0.0, 0.0, qx / t1, qy / t1, t1 if t1 < tau else tau, left)
         driven = first / speed  # what is put off by waiting is no less of a risk
         if risk < left and driven < tau and second > 0.0:
             ux, uy = rx * speed / second, ry * speed / second
             lasts = min(second / speed, tau - driven)
-            risk = max(risk, self._leg(self._later(qx, qy, t1), driven, ux, uy, lasts, left))
+            later = self._leg(qx, qy, t1, driven, ux, uy, lasts, left)
+            if later > risk:
+                risk = later
         return total + risk
 
-    def _later(self, qx: float, qy: float, t0: float) -> Iterator[_Row]:
-        """The rows weighed, as they are around (qx, qy) at t0."""
-        for away, x, y, vx, vy, r, margin, outer, _ in self._weighed:
-            dx = x + vx * t0 - qx
-            dy = y + vy * t0 - qy
-            yield away, dx, dy, vx, vy, r, margin, outer, dx * dx + dy * dy
-
     def _leg(
-        self, rows: Iterable[_Row], s0: float, ux: float, uy: float, lasts: float, bound: float
+        self,
+        qx: float,
+        qy: float,
+        t0: float,
+        s0: float,
+        ux: float,
+        uy: float,
+        lasts: float,
+        bound: float,
     ) -> float:
-        """The worst risk of a leg from where the rows are around; or one not below bound.
+        """The worst risk of a leg that begins in (qx, qy) at t0; or one not below bound.
 
         s0 of the way is driven before it. Who is within a margin already may leave it in any
         direction, but not go deeper.
         """
         worst = 0.0
-        for _, x, y, vx, vy, r, margin, outer, away in rows:
+        for _, x, y, vx, vy, r, margin, outer, away in self._weighed:
+            if t0 > 0.0:
+                x = x + vx * t0 - qx
+                y = y + vy * t0 - qy
+                away = x * x + y * y
             wx = vx - ux
             wy = vy - uy
             b = x * wx + y * wy
