@@ -22,8 +22,11 @@ from mfba_planner.core.errors import InputError, OutputError
 from mfba_planner.core.fleet import run_fleet
 from mfba_planner.core.gaps import gap_heading
 from mfba_planner.core.metrics import evaluate, tick_clearances
-from mfba_planner.core.planner import Mode, PlannerParams
+from mfba_planner.core.planner import Method, Mode, PlannerParams
 from mfba_planner.core.robot import Noise
+from mfba_planner.core.sensing import SensorParams
+from mfba_planner.planners.method import simulate
+from mfba_planner.planners.predictive import preset
 from mfba_planner.recording.episode import read_episode
 from mfba_planner.report import words
 from mfba_planner.report.html.charts import look
@@ -46,7 +49,17 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The directory of a recorded run of case 2."""
     where = tmp_path_factory.mktemp("recorded")
     done = complete(
-        "mfba", "run", "case2", "--seed", "2", "--driver", "in-process", "--no-picture", cwd=where
+        "mfba",
+        "run",
+        "case2",
+        "--seed",
+        "2",
+        "--planner",
+        "paper",
+        "--driver",
+        "in-process",
+        "--no-picture",
+        cwd=where,
     )
     assert (done.process.returncode, done.stderr) == (0, "")
     return where / "runs/run-001"
@@ -196,6 +209,41 @@ def test_the_world_is_drawn_as_the_tick_has_it(
     )
     assert drawn["ring"] == episode.sensor.sensing_range_m
     assert drawn["bats"] == len(decision.candidates)
+
+
+def test_bits_of_headings_are_drawn_where_these_lead(browser: Browser, tmp_path: Path) -> None:
+    planner = preset(PlannerParams(method=Method.PREDICTIVE))
+    episode = simulate(load_scenario("case2"), planner=planner, sensor=SensorParams(), seed=2)
+    write_page([("run", episode)], tmp_path / "page.html")
+    browser.open(tmp_path / "page.html")
+    k = next(i for i, tick in enumerate(episode.ticks) if tick.gap > 12)
+    scrub(browser, k)
+    decision = episode.ticks[k]
+    n = len(decision.vs)
+    assert n == 72
+    assert browser.said() == []
+    assert bits(browser, "vs") == "".join(map(str, decision.vs))
+    assert field(browser, "vs").replace(" ", "") == "".join(map(str, decision.vs))
+    drawn = browser.run(
+        """
+        const all = [...document.querySelectorAll(".scene .sector")];
+        const inside = (wedge, angle) => wedge.isPointInFill(
+          new DOMPoint(0.5 * Math.cos(angle), -0.5 * Math.sin(angle)));
+        const heading = (i) => (2 * Math.PI * (i + 1)) / all.length;
+        const quarter = Math.PI / 2 / all.length;
+        return {
+          lit: all.map((wedge) => Number(wedge.classList.contains("lit"))),
+          middle: all.every((wedge, i) => inside(wedge, heading(i) - quarter)
+            && inside(wedge, heading(i) + quarter)),
+          taken: document.querySelector(".scene .taken").getAttribute("d"),
+        };
+        """
+    )
+    assert tuple(drawn["lit"]) == decision.vs
+    assert drawn["middle"]
+    heading, reach = 2.0 * math.pi * decision.gap / n, episode.sensor.sensing_range_m
+    tip = [float(word) for word in drawn["taken"].removeprefix("M0 0L").split()]
+    assert tip == pytest.approx([reach * math.cos(heading), -reach * math.sin(heading)])
 
 
 def test_it_plays_and_pauses(browser: Browser, single: Path) -> None:

@@ -35,6 +35,7 @@ def _all() -> dict[str, Entry]:
         "part": (_track(), "obstacle's track near closest pass"),
         "ring": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR at the switch"),
         "sector": (Patch(**style.SECTOR), "sectors set at the switch"),
+        "heading": (Patch(**style.SECTOR), "headings to a contact, at the switch"),
         "sensed": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle at the switch"),
         "particle": (Line2D([], [], **style.PARTICLE), "robot, a particle"),
         "outline": (_disc(style.OBSTACLE), "obstacle"),
@@ -43,6 +44,7 @@ def _all() -> dict[str, Entry]:
         "past": (Line2D([], [], **style.TRACK), "obstacle's way so far"),
         "reach": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR"),
         "set": (Patch(**style.SECTOR), "sectors set"),
+        "closing": (Patch(**style.SECTOR), "headings to a contact"),
         "seen": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle within SR"),
         "wall": (Line2D([], [], **_edge(style.WALL)), "wall"),
     }

@@ -26,6 +26,7 @@ from mfba_planner.core.world import Obstacle, center_at
 
 from . import style
 from .moments import Pass, encounter_ticks, is_finite, span_s, stretches, track
+from .ring import Ring, ring_of
 from .view import View
 
 Z_SECTOR, Z_TRACK, Z_OBSTACLE, Z_RING, Z_PATH, Z_MARK = (2.0 + 0.1 * i for i in range(6))
@@ -117,7 +118,9 @@ def _connect(ax: Axes, moment: Pass) -> None:
 def _ring(ax: Axes, episode: Episode, index: int, tick: Decision) -> None:
     """SR around the robot, the sectors that are set, and what set them (enlarged)."""
     position, reach = tick.pose.position, episode.sensor.sensing_range_m
-    draw_sectors(ax, position, reach, tick.vs, f"sector:{index}")
+    bits = ring_of(episode, tick.vs)
+    kind = "heading" if bits.of_headings else "sector"
+    draw_sectors(ax, position, reach, tick.vs, f"{kind}:{index}", bits)
     circles = episode.scenario.enlarged(episode.time_s(tick.stamp_ns))
     for center, radius in circles:
         if distance(position, center) - radius <= reach:
@@ -127,10 +130,10 @@ def _ring(ax: Axes, episode: Episode, index: int, tick: Decision) -> None:
     patch(ax, ring, f"ring:{index}")
 
 
-def draw_sectors(ax: Axes, center: Point, reach: float, bits: Bits, gid: str) -> None:
-    """Fill the sectors that are set, out to reach (m)."""
+def draw_sectors(ax: Axes, center: Point, reach: float, bits: Bits, gid: str, ring: Ring) -> None:
+    """Fill the sectors (or headings) that are set, out to reach (m)."""
     for first, count in _runs(bits):
-        start, end = (360.0 * i / len(bits) for i in (first, first + count))
+        start, end = map(math.degrees, ring.wedge(first, count))
         patch(ax, Wedge(center, reach, start, end, zorder=Z_SECTOR, **style.SECTOR), gid)
 
 

@@ -14,6 +14,7 @@ from mfba_planner.core.world import bounce_times, center_at
 
 from . import style
 from .moments import span_s, track
+from .ring import ring_of
 from .scene import (
     Z_MARK,
     Z_OBSTACLE,
@@ -40,7 +41,8 @@ def draw_snapshot(ax: Axes, episode: Episode, index: int) -> None:
     for number in range(1, len(episode.scenario.obstacles) + 1):
         _obstacle(ax, episode, index, number)
     position, reach = tick.pose.position, episode.sensor.sensing_range_m
-    draw_sectors(ax, position, reach, tick.vs, "set")
+    ring = ring_of(episode, tick.vs)
+    draw_sectors(ax, position, reach, tick.vs, "closing" if ring.of_headings else "set", ring)
     patch(ax, Circle(position, reach, fill=False, zorder=Z_RING, **style.RING), "reach")
     draw_path(ax, replace(episode, ticks=episode.ticks[: index + 1]))
     draw_ends(ax, episode)

@@ -23,6 +23,7 @@ from mfba_planner.outputs import refuse_existing
 
 from . import style, words
 from .html.data import clearances, in_one_scene, obstacle_names, speeds
+from .ring import ring_of
 
 _GREY, _DARK = style.FAINT, style.QUIET
 _AHEAD_S = 2.0  # arrows lead to where obstacles will be
@@ -216,7 +217,8 @@ class _Log:
         self._put(
             "world/sensor/ring", rr.LineStrips3D([_ring(here, reach)], colors=_rgb(style.ORANGE))
         )
-        lit = [_sector(here, reach, k, len(tick.vs)) for k, bit in enumerate(tick.vs) if bit]
+        ring = ring_of(self.episode, tick.vs)
+        lit = [_sector(here, reach, *ring.wedge(k)) for k, bit in enumerate(tick.vs) if bit]
         self._put(
             "world/sensor/sectors", rr.LineStrips3D(lit, colors=_rgb(style.ORANGE), radii=0.02)
         )
@@ -241,8 +243,8 @@ def _ring(center: Sequence[float], radius_m: float) -> Any:
     return np.stack([x, y, np.zeros_like(x)], axis=1)
 
 
-def _sector(center: Sequence[float], radius_m: float, k: int, count: int) -> Any:
-    angles = np.linspace(k, k + 1, 7) * (2.0 * math.pi / count)
+def _sector(center: Sequence[float], radius_m: float, begin: float, end: float) -> Any:
+    angles = np.linspace(begin, end, 7)
     x = np.concatenate([[0.0], radius_m * np.cos(angles), [0.0]]) + center[0]
     y = np.concatenate([[0.0], radius_m * np.sin(angles), [0.0]]) + center[1]
     return np.stack([x, y, np.zeros_like(x)], axis=1)

@@ -25,6 +25,13 @@ _OUTCOMES = {
 }
 
 
+def bits(of_headings: bool) -> tuple[str, str]:
+    """What it means that a bit of Vs is set, and one of Vg."""
+    if of_headings:
+        return "headings that lead to a contact", "the same: every heading is its own gap"
+    return "sectors in which something is", "gaps that are closed"
+
+
 def outcome(result: Result) -> str:
     """How the run ended."""
     return _OUTCOMES[result.outcome]

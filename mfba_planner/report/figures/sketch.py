@@ -14,6 +14,7 @@ from mfba_planner.core.sensing import Bits, SensorParams, sense_circles, sensory
 from mfba_planner.core.world import Obstacle, Scenario
 
 from .. import style
+from ..ring import Ring
 from ..scene import Z_MARK, Z_OBSTACLE, Z_RING, draw_sectors, line, patch
 
 SENSOR = SensorParams()
@@ -50,7 +51,7 @@ def draw_ring(ax: Axes, bits: Bits, spoke_m: float, bits_m: float | None = None)
     """Sectors with their names around the robot, a particle; their bits bits_m away from it."""
     n = len(bits)
     sr = SENSOR.sensing_range_m
-    draw_sectors(ax, HERE, sr, bits, "set")
+    draw_sectors(ax, HERE, sr, bits, "set", Ring(n))
     patch(ax, Circle(HERE, sr, fill=False, zorder=Z_RING, **style.RING), "reach")
     for sector, bit in enumerate(bits, start=1):
         spoke = [HERE, towards(HERE, 2.0 * math.pi * sector / n, spoke_m)]

@@ -15,7 +15,6 @@ import numpy as np
 
 from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Episode
-from mfba_planner.core.gaps import gap_heading
 from mfba_planner.core.jump import carried_off
 from mfba_planner.core.metrics import evaluate, tick_clearances, within_range
 from mfba_planner.core.motion import Motion
@@ -25,6 +24,7 @@ from mfba_planner.core.sensing import Bits, SensorParams
 from mfba_planner.core.world import velocity_at
 from mfba_planner.report import words
 from mfba_planner.report.moments import closest_passes
+from mfba_planner.report.ring import ring_of
 from mfba_planner.report.table import result_rows
 from mfba_planner.report.view import View, choose_view
 
@@ -99,7 +99,7 @@ def run_data(
     result = evaluate(episode)
     reasons = list(dict.fromkeys(tick.reason for tick in episode.ticks))
     number_of = {reason: number for number, reason in enumerate(reasons)}
-    sectors = episode.sensor.sectors
+    ring = ring_of(episode)
     return {
         "name": name,
         "title": words.run_title(episode),
@@ -117,10 +117,9 @@ def run_data(
             "obstacles": _obstacles(episode, names, times_s),
         },
         "reach": episode.sensor.sensing_range_m,
-        "sectors": sectors,
-        "gap_headings": [
-            gap_heading(gap, sectors, episode.planner.gap_heading) for gap in range(1, sectors + 1)
-        ],
+        "wedges": [ring.wedge(i) for i in range(ring.count)],
+        "gap_headings": ring.gaps,
+        "bits": words.bits(ring.of_headings),
         "reasons": reasons,
         "ticks": {
             "time": [episode.time_s(tick.stamp_ns) for tick in episode.ticks],

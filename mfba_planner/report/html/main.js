@@ -79,7 +79,7 @@ function legend() {
       svg("circle", { cx: 11, cy: 8, r: 7, class: "enlarged" }),
       svg("circle", { cx: 11, cy: 8, r: 4, class: "body" })),
     entry(`how far it goes in ${AHEAD} s`, svg("path", { d: "M1 8H20M14 4L20 8L14 12", class: "motion" })),
-    entry("sensing range, sector that is set",
+    entry("sensing range, sector or heading that is set",
       svg("path", { d: "M2 14A18 18 0 0 1 20 14L11 2Z", class: "sector lit" }),
       svg("path", { d: "M1 14A18 18 0 0 1 21 14", class: "ring" })),
     entry("gap: open, closed, taken",

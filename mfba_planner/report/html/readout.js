@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // What one run knew and decided at a tick, in words and figures.
 
-const MOST_CELLS = 36; // more sectors than this are shown as digits only
+const MOST_CELLS = 36; // more bits than this are shown as digits only
 
 class Readout {
   constructor(run) {
     this.run = run;
     this.mode = html("strong", { class: "mode", "data-field": "mode" });
     this.reason = html("p", { class: "reason", "data-field": "reason" });
-    this.vs = new Bits("Vs", "sectors in which something is", run.sectors);
-    this.vg = new Bits("Vg", "gaps that are closed", run.sectors);
+    this.vs = new Bits("Vs", run.bits[0], run.wedges.length);
+    this.vg = new Bits("Vg", run.bits[1], run.wedges.length);
     this.fields = {};
     this.element = html(
       "div",
@@ -87,6 +87,7 @@ class Bits {
     }
     this.row = html("span", { class: "cells", role: "img", "data-field": name.toLowerCase() });
     this.row.append(...this.cells);
+    if (!this.cells.length) this.row.classList.add("digits");
     this.element = html(
       "p",
       { class: `bits ${name.toLowerCase()}`, title: `${name}: ${meaning}` },
@@ -101,6 +102,6 @@ class Bits {
       cell.classList.toggle("set", bits[i] === "1");
       cell.classList.toggle("chosen", i + 1 === chosen);
     });
-    if (!this.cells.length) say(this.row, bits);
+    if (!this.cells.length) say(this.row, (bits.match(/.{1,12}/g) || []).join(" "));
   }
 }

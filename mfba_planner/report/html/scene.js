@@ -103,17 +103,15 @@ class Scene {
     });
   }
 
-  /** The ring of sensors around the robot: sectors, and the gaps between them. */
+  /** The ring of sensors around the robot: sectors (or headings) and gaps. */
   drawSensors() {
-    const { sectors, reach, gap_headings: headings } = this.run;
+    const { wedges, reach, gap_headings: headings } = this.run;
     this.sensors = this.add("g", { class: "sensors" });
-    this.lights = [];
-    for (let i = 0; i < sectors; i++) {
-      const [x0, y0] = polar(reach, (2 * Math.PI * i) / sectors);
-      const [x1, y1] = polar(reach, (2 * Math.PI * (i + 1)) / sectors);
+    this.lights = wedges.map(([from, to]) => {
+      const [[x0, y0], [x1, y1]] = [polar(reach, from), polar(reach, to)];
       const wedge = `M0 0L${x0} ${y0}A${reach} ${reach} 0 0 0 ${x1} ${y1}Z`;
-      this.lights.push(svg("path", { class: "sector", d: wedge }));
-    }
+      return svg("path", { class: "sector", d: wedge });
+    });
     this.gaps = headings.map((heading) => {
       const [x, y] = polar(reach, heading);
       return svg("path", { class: "gap", d: `M${0.86 * x} ${0.86 * y}L${x} ${y}` });

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the bits of a run's decisions stand for around the robot: sectors, or headings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..core.episode import Episode
+from ..core.gaps import GapHeading, gap_heading
+from ..core.sensing import Bits
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """As many equal wedges as there are bits; wedge i (from 0) begins i + first of them from +x.
+
+    Sectors begin at +x (Table 1). A planner of headings has each in the middle of its wedge, and
+    every heading is its own gap. rule says where gaps lead.
+    """
+
+    count: int
+    first: float = 0.0
+    rule: GapHeading = GapHeading.BOUNDARY
+
+    @property
+    def of_headings(self) -> bool:
+        """Whether the bits are headings that lead to contact, not sectors with something in."""
+        return self.first != 0.0
+
+    @property
+    def gaps(self) -> list[float]:
+        """The headings of the gaps in radians."""
+        return [gap_heading(gap, self.count, self.rule) for gap in range(1, self.count + 1)]
+
+    def wedge(self, i: int, wedges: int = 1) -> tuple[float, float]:
+        """Where wedge i, or so many from it on, begins and ends: radians from +x."""
+        width = 2.0 * math.pi / self.count
+        return (i + self.first) * width, (i + self.first + wedges) * width
+
+
+def ring_of(episode: Episode, bits: Bits = ()) -> Ring:
+    """The ring of these bits, else of the run's first: of headings unless as many as sectors."""
+    sectors = episode.sensor.sectors
+    count = len(bits) or next((len(tick.vs) for tick in episode.ticks if tick.vs), sectors)
+    return Ring(count, 0.5) if count != sectors else Ring(count, rule=episode.planner.gap_heading)
