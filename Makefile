@@ -25,7 +25,7 @@ help:
 	@echo "make clean   remove what the other targets made, recordings under runs/ excepted"
 
 demo: $(VENV)/.runtime
-	$(VENV)/bin/mfba run case1 --seed 1
+	$(VENV)/bin/mfba run case1 --seed 1 --planner paper
 
 # Without a Chromium the tests of the page fail and say so; all others run.
 test: lint

@@ -117,7 +117,16 @@ def bare_processes(steps: int) -> float:
 def graph(driver: str, seed: int, root: Path) -> float:
     """Ticks per second of the whole graph with the recorder on, over TICKS ticks."""
     out = root / f"{driver}{seed}"
-    command = ["run", str(scenario(root)), "--driver", driver, "--seed", str(seed)]
+    command = [
+        "run",
+        str(scenario(root)),
+        "--planner",
+        "paper",
+        "--driver",
+        driver,
+        "--seed",
+        str(seed),
+    ]
     code = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
     subprocess.run(
         [sys.executable, "-c", code, *command, "--out", str(out), "--no-picture"],

@@ -21,9 +21,7 @@ _SMALL = "--others 2 --few 2 --rounds 1 --workers 1 --docs docs"
 # What takes too long for a test, as shown, and what is run instead: the same with less of it.
 REDUCED = {
     ".venv/bin/mfba sim case2 --seeds 100": ".venv/bin/mfba sim case2 --seeds 3",
-    "mfba sim walled --planner predictive --seeds 100": (
-        "mfba sim walled --planner predictive --seeds 3"
-    ),
+    "mfba sim walled --seeds 100": ("mfba sim walled --seeds 3"),
     "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 100": (
         "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 4 --workers 1"
     ),

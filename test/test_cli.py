@@ -116,13 +116,15 @@ def test_scenarios_and_options_are_listed(capsys: Said) -> None:
     assert code == 0
     assert "planner.bat.algorithm " in out
     assert "sensor.sensing_range_m " in out
+    usual = "planner.bat.iterations=1, planner.method=predictive, planner.step_length_m=0.08\n"
+    assert out.endswith(f"Unless --planner says otherwise: {usual}")
 
 
 def test_info_tells_topics_and_result(capsys: Said, recorded: Path) -> None:
     code, out, err = mfba(capsys, "info", str(recorded / "bag"))
     assert (code, err) == (0, "")
     assert "Topic:       /planner/decision" in out
-    assert "case2, mfba, seed 0, in-process driver\n" in out
+    assert "case2, predictive, seed 0, in-process driver\n" in out
     assert mfba(capsys, "info", str(recorded))[1] == out  # the run's directory will do
 
 

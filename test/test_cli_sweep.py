@@ -54,6 +54,12 @@ def rows(directory: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def test_where_nobody_says_who_it_is_the_one_that_predicts(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert mfba("sweep", "random-3", "--worlds", "1", "--workers", "1", "--out", str(out)) == 0
+    assert [row["planner"] for row in rows(out)] == ["predictive"]
+
+
 def test_a_sweep_leaves_table_timings_report_and_parts(swept: Path) -> None:
     assert {path.name for path in swept.iterdir()} == {
         "chunks", "report.md", "study.json", "table.csv", "timings.csv",

@@ -55,7 +55,7 @@ def test_every_tick_of_every_run_is_there(episode: Episode, tmp_path: Path) -> N
 
 def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["sim", "empty", "--out", "made"]) == 0
+    assert cli.main(["sim", "empty", "--planner", "paper", "--out", "made"]) == 0
     assert cli.main(["view", "made", "--save", "made.rrd"]) == 0
     assert rows_of(tmp_path / "made.rrd")["/made/decision"] == len(
         run(load_scenario("empty")).ticks

@@ -308,6 +308,9 @@ def test_sim_prints_a_row_per_robot_or_per_seed(capsys: pytest.CaptureFixture[st
     assert said[-1] == "2 of 2 seeds with all robots at the goal without collision"
 
 
+PAPER = ("--planner", "paper")
+
+
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """`mfba run` of four robots: the whole graph, one call."""
@@ -316,7 +319,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     some = replace(whole, robots=whole.robots[::5] + whole.robots[2::5])
     file = place / "some.json"
     file.write_text(scenario_to_json(some), encoding="utf-8")
-    assert cli.main(["run", str(file), "--seed", "3", "--out", str(place / "run")]) == 0
+    assert cli.main(["run", str(file), *PAPER, "--seed", "3", "--out", str(place / "run")]) == 0
     return place / "run"
 
 

@@ -9,11 +9,13 @@ from typing import Any
 
 import pytest
 import reference
+import yaml
 from graph import Graph
 from launch_standin import declared, launched
 
 from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.core.options import flatten
+from mfba_planner.core.planner import Method, PlannerParams
 from mfba_planner.launcher.by_launch import ARGUMENTS, told_by_launch
 from mfba_planner.launcher.robot_by_launch import (
     PLANNER_ARGUMENTS,
@@ -22,6 +24,7 @@ from mfba_planner.launcher.robot_by_launch import (
     robot,
 )
 from mfba_planner.node_settings import Source
+from mfba_planner.planners.predictive import preset
 from mfba_planner.ros.planner import PlannerNode
 from mfba_planner.ros.replay_args import parse
 from mfba_planner.ros.virtual_sensor import VirtualSensor
@@ -36,10 +39,33 @@ def given(**changes: str) -> dict[str, str]:
 
 
 def test_defaults_are_case_study_1_in_real_time_and_unrecorded() -> None:
-    config = RunConfig(scenario=load_scenario("case1"), real_time=True)
+    usual = preset(PlannerParams(method=Method.PREDICTIVE))
+    config = RunConfig(scenario=load_scenario("case1"), planner=usual, real_time=True)
     expected = node_parameters(config, NODES)
     expected["world_sim"]["start_paused"] = False
     assert told_by_launch(given()) == expected
+
+
+@pytest.mark.parametrize(
+    ("changes", "method", "iterations"),
+    [
+        ({"planner": "paper"}, "paper", 5),
+        ({"algorithm": "ba"}, "paper", 5),
+        ({"reading": "fig1"}, "paper", 1),
+        ({"planner": "predictive", "algorithm": "ba"}, "predictive", 1),
+    ],
+)
+def test_what_is_about_algorithm_1_is_given_to_it(
+    changes: dict[str, str], method: str, iterations: int
+) -> None:
+    told = told_by_launch(given(**changes))["planner"]
+    assert (told["method"], told["bat.iterations"]) == (method, iterations)
+
+
+def test_a_robot_drives_with_the_planner_that_does_not_collide() -> None:
+    told = yaml.safe_load((LAUNCH.parent / "config/planner.yaml").read_text(encoding="utf-8"))
+    planner = told["/**/planner"]["ros__parameters"]
+    assert (planner["method"], planner["bat.iterations"]) == ("predictive", 1)
 
 
 def test_arguments_reach_the_nodes() -> None:

@@ -10,13 +10,17 @@ from launching import Program, complete
 from mfba_planner import scenarios
 from mfba_planner.core import episode
 from mfba_planner.core.options import override
-from mfba_planner.core.planner import PlannerParams
+from mfba_planner.core.planner import Method, PlannerParams
+from mfba_planner.launcher.options import read_order
+from mfba_planner.planners.method import simulate
 from mfba_planner.recording.configuration import read_configuration
 from mfba_planner.recording.episode import read_episode
 from mfba_planner.recording.reader import BagReader
 from mfba_planner.ros import topics
 
 PNG = b"\x89PNG\r\n\x1a\n"
+
+PAPER = ("--planner", "paper", "--no-picture")
 
 
 def check_bag(bag: Path, expected: episode.Episode) -> None:
@@ -70,7 +74,10 @@ def test_in_process_run_is_the_core_s(tmp_path: Path) -> None:
         "launcher", "--driver", "in-process", "--out", "a/b", "--no-picture", cwd=tmp_path
     )
     assert (done.process.returncode, done.stderr) == (0, "")
-    check_bag(tmp_path / "a/b/bag", episode.run(scenarios.load_scenario("case1")))
+    config = read_order([], "launcher").config
+    assert config.planner.method is Method.PREDICTIVE
+    expected = simulate(config.scenario, planner=config.planner, sensor=config.sensor, seed=0)
+    check_bag(tmp_path / "a/b/bag", expected)
     assert sorted(path.name for path in (tmp_path / "a/b").iterdir()) == ["bag", "result.json"]
 
 
@@ -84,8 +91,8 @@ def test_core_run_leaves_result_and_picture(tmp_path: Path) -> None:
 
 def test_two_launchers_at_once_do_not_meet(tmp_path: Path) -> None:
     with (
-        Program("launcher", "case1", "--seed", "1", "--no-picture", cwd=tmp_path) as first,
-        Program("launcher", "case2", "--seed", "2", "--no-picture", cwd=tmp_path) as second,
+        Program("launcher", "case1", "--seed", "1", *PAPER, cwd=tmp_path) as first,
+        Program("launcher", "case2", "--seed", "2", *PAPER, cwd=tmp_path) as second,
     ):
         assert [first.end(), second.end()] == [0, 0], first.stderr + second.stderr
     episodes = [read_episode(run / "bag") for run in sorted((tmp_path / "runs").iterdir())]
@@ -97,9 +104,7 @@ def test_two_launchers_at_once_do_not_meet(tmp_path: Path) -> None:
 
 
 def test_real_time_run_reaches_the_goal(tmp_path: Path) -> None:
-    done = complete(
-        "launcher", "empty", "--speed", "4", "--no-picture", "--out", "run", cwd=tmp_path
-    )
+    done = complete("launcher", "empty", "--speed", "4", *PAPER, "--out", "run", cwd=tmp_path)
     assert (done.process.returncode, done.stderr) == (0, "")
     assert "m to the goal, path generation" in done.stdout  # progress, without a terminal
     recorded = read_episode(tmp_path / "run/bag")

@@ -16,9 +16,11 @@ from mfba_planner.core.digest import digest
 from mfba_planner.core.episode import Outcome
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.fleet import run_fleet
+from mfba_planner.core.sensing import SensorParams
 from mfba_planner.core.world import Member, Obstacle, Scenario
 from mfba_planner.launcher import crew
 from mfba_planner.launcher.options import MOST_ROBOTS, read_order
+from mfba_planner.planners.method import simulate_fleet
 from mfba_planner.recording.configuration import read_configuration
 from mfba_planner.recording.episode import read_recording
 from mfba_planner.recording.reader import BagReader
@@ -26,6 +28,7 @@ from mfba_planner.run_config import OF_ROBOT, Parameters
 from mfba_planner.scenarios import scenario_to_json
 
 PROCESSES = ["--driver", "multi-process", "--no-picture", "--out", "run"]
+PAPER = ["--planner", "paper"]
 LONG = [*PROCESSES, "--set", "planner.step_length_m=0.002"]
 PAIR = Scenario(
     name="pair",
@@ -48,7 +51,7 @@ def here(tmp_path: Path) -> Path:
 
 def test_two_robots_as_six_processes_decide_as_in_one(here: Path) -> None:
     told = "--planner-args=-p view_period_s:=7.5"
-    done = complete("launcher", "pair.json", "--seed", "3", *PROCESSES, told, cwd=here)
+    done = complete("launcher", "pair.json", "--seed", "3", *PAPER, *PROCESSES, told, cwd=here)
     assert (done.process.returncode, done.stderr) == (0, "")
     recorded = read_recording(here / "run/bag").episodes
     core = run_fleet(PAIR, seed=3)
@@ -90,7 +93,8 @@ def test_whoever_starts_first(
     monkeypatch.chdir(here)
     from mfba_planner import launcher
 
-    core = run_fleet(PAIR, seed=1)
+    planner = read_order([], "launcher").config.planner  # who drives where nobody says
+    core = simulate_fleet(PAIR, planner=planner, sensor=SensorParams(), seed=1)
     for place in ("one", "two"):
         args = ["pair.json", "--seed", "1", *PROCESSES[:-1], place]
         assert launcher.main(args) == 0, capsys.readouterr().out

@@ -20,6 +20,7 @@ from rclpy.node import Node
 from mfba_planner.core.bat import Algorithm
 from mfba_planner.core.errors import GraphError, OutputError
 from mfba_planner.core.options import flatten
+from mfba_planner.core.planner import Method, PlannerParams
 from mfba_planner.launcher import child as child_module
 from mfba_planner.launcher.child import Child
 from mfba_planner.launcher.crew import Crew, parameters_yaml
@@ -30,13 +31,15 @@ from mfba_planner.launcher.screen import Screen
 from mfba_planner.launcher.settings import option_rows
 from mfba_planner.launcher.stop import StoppedError, StopRequest
 from mfba_planner.paper import readings
+from mfba_planner.planners.predictive import preset
 from mfba_planner.run_config import Driver, RunConfig, node_parameters
 from mfba_planner.scenarios import load_scenario
 
 
 def test_order_without_arguments_is_case_study_1() -> None:
     order = read_order([], "launcher")
-    assert order.config == RunConfig(scenario=load_scenario("case1"))
+    usual = preset(PlannerParams(method=Method.PREDICTIVE))
+    assert order.config == RunConfig(scenario=load_scenario("case1"), planner=usual)
     assert order.config.driver is Driver.MULTI_PROCESS
     assert (order.out, order.timeout_s, order.picture) == (None, 600.0, True)
     assert order.node_args == {
@@ -65,7 +68,30 @@ def test_every_option_can_be_set_to_its_default() -> None:
     ]
     settings = [setting.replace("True", "true") for setting in settings]
     assert len(settings) > 10
-    assert read_order(settings, "launcher").config == read_order([], "launcher").config
+    paper = ["--planner=paper"]  # whose defaults they are
+    told, plain = (read_order([*paper, *more], "launcher").config for more in (settings, []))
+    assert told == plain
+
+
+@pytest.mark.parametrize(
+    ("args", "method", "step_m"),
+    [
+        ([], "predictive", 0.08),
+        (["--set=planner.step_length_m=0.2"], "predictive", 0.2),
+        (["--planner=paper"], "paper", 0.3),
+        (["--algorithm=ba"], "paper", 0.3),
+        (["--algorithm=ba", "--planner=predictive"], "predictive", 0.08),
+        (["--reading=section6"], "paper", 0.3),
+        (["--reading=fig1"], "paper", 0.1),
+        (["--swarm=literal"], "paper", 0.3),
+    ],
+)
+def test_what_is_about_algorithm_1_is_given_to_it(
+    args: list[str], method: str, step_m: float
+) -> None:
+    planner = read_order(args, "launcher").config.planner
+    assert (planner.method.value, planner.step_length_m) == (method, step_m)
+    assert (planner.bat.algorithm is Algorithm.BA) == ("--algorithm=ba" in args)
 
 
 def test_speed_means_real_time_and_time_enough() -> None:

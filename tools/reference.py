@@ -26,6 +26,8 @@ from mfba_planner.core.options import override, walk
 from mfba_planner.core.planner import PlannerParams
 from mfba_planner.core.robot import Robot
 from mfba_planner.core.sensing import SensorParams
+from mfba_planner.planners.method import USUAL
+from mfba_planner.planners.predictive import preset
 from mfba_planner.ros import topics
 
 README = Path(__file__).resolve().parent.parent / "README.md"
@@ -39,6 +41,8 @@ ROBOT: dict[str, dict[str, Any]] = {
         "step_length_m": 0.05,  # a decision is for 0.1 s
         "goal_tolerance_m": 0.1,
         "input_timeout_s": 0.25,
+        "method": USUAL.value,
+        "bat.iterations": preset().bat.iterations,
         "recovery.enabled": True,
     },
 }

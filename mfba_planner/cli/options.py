@@ -7,8 +7,10 @@ from enum import Enum
 from typing import Any
 
 from ..arguments import Parser
-from ..core.options import Spec
+from ..core.options import Spec, flatten
+from ..core.planner import PlannerParams
 from ..launcher.settings import option_rows
+from ..planners.method import named
 
 
 def main(args: list[str]) -> int:
@@ -22,6 +24,10 @@ def main(args: list[str]) -> int:
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
     for name, default, meaning in rows:
         print(f"{name:<{widths[0]}}  {default:<{widths[1]}}  {meaning}")
+    usual = named(None, PlannerParams(), algorithm_1=False)
+    changes = set(flatten(usual).items()) - set(flatten(PlannerParams()).items())
+    own = ", ".join(f"planner.{name}={value}" for name, value in sorted(changes))
+    print(f"Unless --planner says otherwise: {own}")
     return 0
 
 

@@ -17,6 +17,7 @@ from ..core.planner import PlannerParams
 from ..core.sensing import SensorParams
 from ..launcher.settings import add_set_argument, with_settings
 from ..outputs import new_run_directory, write_same
+from ..planners.method import USUAL
 from ..planners.perception import NAMES as PERCEPTIONS
 from ..planners.registry import PLANNERS
 from ..study.compute import check_workers
@@ -67,7 +68,8 @@ def _parser() -> Parser:
     parser.add_argument("suite", metavar="SUITE", help=f"one of {', '.join(suite_names())}")
     parser.add_argument(
         "--planner", action="append", default=[], metavar="NAME", dest="planners",
-        help=f"one of {', '.join(PLANNERS)}, or MODULE:NAME; may be repeated (default: paper)",
+        help=f"one of {', '.join(PLANNERS)}, or MODULE:NAME; may be repeated "
+        f"(default: {USUAL.value})",
     )  # fmt: skip
     for name, default, what in (
         ("--worlds", 100, "how many worlds"),
@@ -104,7 +106,7 @@ def _parser() -> Parser:
 
 
 def _order(found: argparse.Namespace) -> Order:
-    usual, planners = PlannerParams(speed_mps=SPEED_MPS), tuple(found.planners or ["paper"])
+    usual, planners = PlannerParams(speed_mps=SPEED_MPS), tuple(found.planners or [USUAL.value])
     params, sensor = with_settings(usual, SensorParams(), found.settings)
     # What was said on the command line holds for all, whatever a planner is made for.
     own = {

@@ -7,14 +7,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.bat import Algorithm
 from ..core.errors import ConfigError
 from ..core.options import override
+from ..core.planner import Method
 from ..paper import readings
+from ..planners.method import USUAL, named
 from ..run_config import NODES, Parameters, RunConfig, graph_parameters, recorder_parameters
 from ..scenarios import load_scenario
 from .options import RECORDER
 
 _TRUE_OR_FALSE = ("true", "false")
+_MFBA = Algorithm.MFBA.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +33,14 @@ class Argument:
 ARGUMENTS = {
     "scenario": Argument("case1", "a shipped scenario's name, or a .yaml file"),
     "seed": Argument("0", "seed of all randomness"),
-    "algorithm": Argument("mfba", "law of beta in eq. 4", ("mfba", "ba")),
-    "reading": Argument("section6", "how section 6.2 is read", tuple(readings.PLANNERS)),
+    "planner": Argument(
+        "",
+        f"who decides; empty: {USUAL.value}, or {Method.PAPER.value} for another algorithm or "
+        "reading than the usual ones",
+        ("", *(method.value for method in Method)),
+    ),
+    "algorithm": Argument(_MFBA, "law of beta in eq. 4", tuple(a.value for a in Algorithm)),
+    "reading": Argument(readings.USUAL, "how section 6.2 is read", tuple(readings.PLANNERS)),
     "real_time": Argument(
         "true", "tick on a wall timer; false: as fast as it goes", _TRUE_OR_FALSE
     ),
@@ -43,11 +53,11 @@ ARGUMENTS = {
 
 def told_by_launch(given: Mapping[str, str]) -> Parameters:
     """Every node's parameters, the recorder's first if there is one; ConfigError if refused."""
+    planner = override(readings.planner(given["reading"]), {"bat.algorithm": given["algorithm"]})
+    algorithm_1 = (given["algorithm"], given["reading"]) != (_MFBA, readings.USUAL)
     config = RunConfig(
         scenario=load_scenario(given["scenario"]),
-        planner=override(
-            readings.planner(given["reading"]), {"bat.algorithm": given["algorithm"]}
-        ),
+        planner=named(given["planner"] or None, planner, algorithm_1=algorithm_1),
         seed=_number("seed", given["seed"], int),
         real_time=given["real_time"] == "true",
         speed_factor=_number("speed_factor", given["speed_factor"], float),

@@ -16,7 +16,7 @@ from ..core.options import override
 from ..core.planner import Method
 from ..core.sensing import SensorParams
 from ..paper import readings
-from ..planners.predictive import preset
+from ..planners.method import USUAL, named
 from ..run_config import NODES, Driver, RunConfig
 from ..scenarios import load_scenario
 from .settings import add_set_argument, with_robot_settings, with_settings
@@ -116,17 +116,15 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--reading",
-        default="section6",
         metavar="NAME",
         help="how the paper's path planning is read: "
-        f"{', '.join(readings.PLANNERS)} (default: %(default)s)",
+        f"{', '.join(readings.PLANNERS)} (default: {readings.USUAL})",
     )
     parser.add_argument(
         "--planner",
         choices=[method.value for method in Method],
-        default=Method.PAPER.value,
-        help="who decides: Algorithm 1 (default), or our planner that predicts, with its own "
-        "step and swarm",
+        help="who decides: Algorithm 1, or our planner that predicts, with its own step and swarm "
+        f"(default: {USUAL.value}; {Method.PAPER.value} with --algorithm, --reading or --swarm)",
     )
     parser.add_argument(
         "--swarm",
@@ -138,13 +136,13 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
 
 def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
     """The RunConfig that add_world_arguments' values describe; later ones override earlier."""
-    planner = readings.planner(found.reading)
+    planner = readings.planner(found.reading or readings.USUAL)
     if found.swarm:
         planner = replace(planner, bat=readings.swarm(found.swarm))
     if found.algorithm:
         planner = override(planner, {"bat.algorithm": found.algorithm})
-    if found.planner == Method.PREDICTIVE.value:
-        planner = preset(replace(planner, method=Method.PREDICTIVE))
+    algorithm_1 = any((found.algorithm, found.reading, found.swarm))
+    planner = named(found.planner, planner, algorithm_1=algorithm_1)
     scenario = load_scenario(found.scenario)
     robot, others = with_robot_settings(scenario.robot, found.settings)
     planner, sensor = with_settings(planner, SensorParams(), others)

@@ -12,6 +12,8 @@ from ..core.planner import PlannerParams, Swarm
 
 T = TypeVar("T")
 
+USUAL = "section6"  # of the path planning
+
 # The paper says what the swarm does in words; `robust` is the core's default.
 SWARMS: dict[str, BatParams] = {
     "robust": BatParams(),

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from ..core.episode import Episode, World, look, look_at_scan, run
 from ..core.fleet import Fleet, run_fleet
@@ -11,6 +12,21 @@ from ..core.guarded import Guarded, algorithm_1
 from ..core.planner import Method, PlannerParams
 from ..core.sensing import SensorParams
 from ..core.world import Scenario
+
+USUAL = Method.PREDICTIVE  # of the programs and launch files: the robot that does not collide
+
+
+def named(method: str | None, params: PlannerParams, *, algorithm_1: bool) -> PlannerParams:
+    """The given options for the method of that name, with the step and swarm it is made for.
+
+    None: USUAL; or the paper's, where something was said that is about Algorithm 1 alone.
+    """
+    usual = Method.PAPER if algorithm_1 else USUAL
+    if Method(method or usual) is Method.PAPER:
+        return params
+    from .predictive import preset
+
+    return preset(replace(params, method=Method.PREDICTIVE))
 
 
 def brain(params: PlannerParams, sensor: SensorParams | None = None, seed: int = 0) -> Guarded:

@@ -57,7 +57,7 @@ class Benchmark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trips:
-    """Episodes of one planner in one scenario: what `mfba sim --seed N` tells of each seed."""
+    """Episodes of Algorithm 1 in one scenario: as `mfba sim --planner paper`."""
 
     scenario: Scenario
     planner: PlannerParams
