@@ -158,7 +158,8 @@ class Session:
             name, program = self.running.popitem()
             program.process.send_signal(signal.SIGINT)
             with program:
-                assert (program.end(), program.stderr) == (0, ""), name
+                code = program.end()
+                assert (code, program.stderr) == (0, ""), f"{name}: {code} {program.stderr}"
         self._look_away()
         self._look()
 
