@@ -17,7 +17,8 @@ MARK = "MFBA_TEST_MARK"
 INSTALLED = Path(sys.executable).parent
 PROGRAM = "import sys; from mfba_planner import entry; sys.exit(entry.{}())"
 # Thousands of ticks: long enough to be caught in the middle of it.
-LONG = ["case1", "--seed", "1", "--set", "planner.step_length_m=0.002", "--no-picture"]
+LONG = ["case1", "--planner", "paper", "--seed", "1", "--no-picture"]
+LONG += ["--set", "planner.step_length_m=0.002"]
 
 
 class Program:

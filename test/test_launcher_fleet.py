@@ -29,7 +29,7 @@ from mfba_planner.scenarios import scenario_to_json
 
 PROCESSES = ["--driver", "multi-process", "--no-picture", "--out", "run"]
 PAPER = ["--planner", "paper"]
-LONG = [*PROCESSES, "--set", "planner.step_length_m=0.002"]
+LONG = [*PAPER, *PROCESSES, "--set", "planner.step_length_m=0.002"]
 PAIR = Scenario(
     name="pair",
     start_m=(0.0, 0.0),

@@ -21,7 +21,7 @@ from .monitor import Monitor
 from .options import RECORDER
 from .stop import StoppedError
 
-READY_TIMEOUT_S = 15.0
+READY_TIMEOUT_S = 30.0  # a busy machine may take its time to start five processes
 MORE_PER_ROBOT_S = 5.0
 ANSWER_TIMEOUT_S = 5.0
 FREEZE_TIMEOUT_S = 1.0

@@ -30,7 +30,7 @@ KINDS: dict[str, Callable[..., GraphNode]] = {
 
 # Nobody is there to call them, and the executor waits for each service at every turn.
 _UNATTENDED = {"start_type_description_service": False}
-READY_TIMEOUT_S = 10.0  # and a second more for every robot
+READY_TIMEOUT_S = 30.0  # and a second more for every robot
 DRAIN_TURNS = 500  # delivery within a process is synchronous: enough for what is queued
 
 
