@@ -120,12 +120,9 @@ def graph(driver: str, seed: int, root: Path) -> float:
     command = [
         "run",
         str(scenario(root)),
-        "--planner",
-        "paper",
-        "--driver",
-        driver,
-        "--seed",
-        str(seed),
+        "--planner=paper",
+        f"--driver={driver}",
+        f"--seed={seed}",
     ]
     code = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
     subprocess.run(

@@ -40,7 +40,8 @@ class Ring:
 
 
 def ring_of(episode: Episode, bits: Bits = ()) -> Ring:
-    """The ring of these bits, else of the run's first: of headings unless as many as sectors."""
+    """The ring of a run's bits: of headings where they are not as many as its sectors."""
     sectors = episode.sensor.sectors
-    count = len(bits) or next((len(tick.vs) for tick in episode.ticks if tick.vs), sectors)
-    return Ring(count, 0.5) if count != sectors else Ring(count, rule=episode.planner.gap_heading)
+    if len(bits) in (0, sectors):
+        return Ring(sectors, rule=episode.planner.gap_heading)
+    return Ring(len(bits), 0.5)

@@ -99,7 +99,7 @@ def run_data(
     result = evaluate(episode)
     reasons = list(dict.fromkeys(tick.reason for tick in episode.ticks))
     number_of = {reason: number for number, reason in enumerate(reasons)}
-    ring = ring_of(episode)
+    ring = ring_of(episode, next((tick.vs for tick in episode.ticks if tick.vs), ()))
     return {
         "name": name,
         "title": words.run_title(episode),
