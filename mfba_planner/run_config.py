@@ -24,6 +24,7 @@ from .scenarios import scenario_to_json
 
 Parameters = dict[str, dict[str, Any]]
 
+READY_TIMEOUT_S = 30.0  # until nodes have found each other, on a busy machine too
 NODES = ("world_sim", "virtual_sensor", "planner")
 OF_ROBOT = NODES[1:]  # of a fleet, each robot has its own
 

@@ -12,7 +12,7 @@ from ..core.errors import BagError, GraphError
 from ..recording.reader import BagReader
 from ..recording.robots import ALONE, below
 from ..ros import topics
-from ..run_config import NODES, graph_parameters, recorder_parameters
+from ..run_config import NODES, READY_TIMEOUT_S, graph_parameters, recorder_parameters
 from .attempt import Attempt
 from .crew import Crew
 from .directory import RunDirectory
@@ -21,7 +21,6 @@ from .monitor import Monitor
 from .options import RECORDER
 from .stop import StoppedError
 
-READY_TIMEOUT_S = 30.0  # a busy machine may take its time to start five processes
 MORE_PER_ROBOT_S = 5.0
 ANSWER_TIMEOUT_S = 5.0
 FREEZE_TIMEOUT_S = 1.0

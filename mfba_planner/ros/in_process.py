@@ -13,7 +13,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from ..core.errors import GraphError
-from ..run_config import NODES, RunConfig, graph_parameters, recorder_parameters
+from ..run_config import NODES, READY_TIMEOUT_S, RunConfig, graph_parameters, recorder_parameters
 from . import params, topics
 from .planner import PlannerNode
 from .recorder import Recorder
@@ -30,7 +30,6 @@ KINDS: dict[str, Callable[..., GraphNode]] = {
 
 # Nobody is there to call them, and the executor waits for each service at every turn.
 _UNATTENDED = {"start_type_description_service": False}
-READY_TIMEOUT_S = 30.0  # and a second more for every robot
 DRAIN_TURNS = 500  # delivery within a process is synchronous: enough for what is queued
 
 
