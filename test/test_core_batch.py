@@ -3,64 +3,27 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from any_bats import ANY_READING
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core import batch
-from mfba_planner.core.bat import (
-    Acceptance,
-    Algorithm,
-    BatParams,
-    BatSwarm,
-    Bounds,
-    Box,
-    Epsilon,
-    Initial,
-    Schedule,
-    Step,
-    Update,
-    Vector,
-    Velocity,
-    Walk,
-    minimize,
-)
+from mfba_planner.core.bat import Algorithm, BatParams, BatSwarm, Box, Disc, Vector, Walk, minimize
 from mfba_planner.core.batch import minimize_batch
 from mfba_planner.core.errors import InputError
 
 BOX = Box((-1.0, -2.0), (3.0, 0.5))
-READINGS: dict[str, Any] = {
-    "algorithm": Algorithm,
-    "velocity": Velocity,
-    "schedule": Schedule,
-    "bounds": Bounds,
-    "epsilon": Epsilon,
-    "initial": Initial,
-    "walk": Walk,
-    "step": Step,
-    "acceptance": Acceptance,
-    "update": Update,
-}
-ANY_READING = st.builds(
-    BatParams,
-    population=st.integers(2, 6),
-    iterations=st.integers(1, 12),
-    f_min=st.floats(0.0, 0.5),
-    f_max=st.floats(0.5, 1000.0),
-    rho=st.floats(0.0, 5.0),
-    sigma=st.floats(0.0, 10.0),
-    alpha=st.floats(0.5, 1.0),
-    a0=st.floats(0.0, 2.0),
-    inertia=st.sampled_from([0.0, 0.7, 1.0]),
-    r0=st.floats(0.0, 1.0),
-    **{name: st.sampled_from(list(kind)) for name, kind in READINGS.items()},
-)
 BOXES = st.lists(
     st.tuples(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0)), min_size=1, max_size=4
 ).map(lambda sides: Box(*zip(*map(sorted, sides))))  # type: ignore[arg-type]
+
+
+DISCS = st.builds(
+    Disc, st.floats(0.001, 9.0), st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+)
 
 
 def generators(runs: int, seed: int = 7) -> list[np.random.Generator]:
@@ -91,14 +54,14 @@ def bowls(x: np.ndarray) -> np.ndarray:
     return np.where((x[..., 0] > 0.9) & (x[..., -1] > 0.2), math.nan, total)
 
 
-@given(ANY_READING, BOXES, st.integers(0, 2**32), st.integers(1, 5))
+@given(ANY_READING, BOXES | DISCS, st.integers(0, 2**32), st.integers(1, 5))
 def test_each_run_equals_the_single_engine_bit_by_bit(
-    p: BatParams, box: Box, seed: int, runs: int
+    p: BatParams, region: Box | Disc, seed: int, runs: int
 ) -> None:
     ours, theirs = generators(runs, seed), generators(runs, seed)
-    result = minimize_batch(bowls, box, p, ours)
+    result = minimize_batch(bowls, region, p, ours)
     for i, rng in enumerate(theirs):
-        swarm = BatSwarm(p, box, rng)
+        swarm = BatSwarm(p, region, rng)
         for t in range(p.iterations + 1):
             swarm.tell([bowl(x) for x in swarm.ask()])
             assert result.history[i, t] == swarm.best_value

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from mfba_planner.core.bat import Algorithm, BatParams, Bounds, Disc, Schedule, minimize
+from mfba_planner.core.bat import Algorithm, BatParams, Bounds, Schedule
 from mfba_planner.core.episode import Outcome, World, run, sense
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
@@ -24,7 +24,6 @@ from mfba_planner.core.planner import (
     PlannerParams,
     Swarm,
     decide,
-    fresh_step,
     transition,
 )
 from mfba_planner.core.sensing import SensorParams
@@ -269,33 +268,6 @@ def test_the_velocity_leads_to_the_waypoint_and_never_too_fast(
 
 
 # --- the bats' step -------------------------------------------------------------------------
-
-
-def test_a_fresh_swarm_searches_the_disc_of_one_step() -> None:
-    position, goal = (1.0, 2.0), (4.0, 6.0)
-    params = PlannerParams(bat=BatParams(population=7, iterations=3))
-    waypoint, candidates = fresh_step(position, goal, params, stream(3, 77))
-
-    def cost(x: list[float]) -> float:
-        return math.hypot(x[0] - 3.0, x[1] - 4.0)
-
-    swarm = minimize(cost, Disc(0.3), params.bat, stream(3, 77))
-    assert waypoint == pytest.approx((1.0 + swarm.best_x[0], 2.0 + swarm.best_x[1]))
-    assert len(candidates) == 7
-    for candidate, x in zip(candidates, swarm.candidates):
-        assert candidate == pytest.approx((1.0 + x[0], 2.0 + x[1]))
-    assert math.dist(waypoint, goal) < 4.8, "nearly the whole step is gained"
-
-
-def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
-    bat = BatParams(bounds=Bounds.NONE, schedule=Schedule.RAW)
-    params = PlannerParams(bat=bat)
-    waypoint, candidates = fresh_step((1.0, 2.0), GOAL, params, stream(0, 1))
-    assert max(math.dist((1.0, 2.0), c) for c in candidates) > 0.3
-    assert math.dist((1.0, 2.0), waypoint) == pytest.approx(0.3)
-    swarm = minimize(lambda x: math.hypot(x[0] - 11.0, x[1] - 10.0), Disc(0.3), bat, stream(0, 1))
-    heading = math.atan2(waypoint[1] - 2.0, waypoint[0] - 1.0)
-    assert heading == pytest.approx(math.atan2(swarm.best_x[1], swarm.best_x[0]))
 
 
 @pytest.mark.parametrize("kind", Swarm)

@@ -4,7 +4,8 @@
 Every run has a generator of its own and draws what bat.py would draw; a stream read in one
 piece or in many is the same stream. What could differ in the last bit is done as bat.py does
 it: exp by the math module (numpy's differs in 5 % of the arguments), the mean loudness by
-fsum. So equal bits from the objective give equal bits in the result.
+fsum. So equal bits from the objective give equal bits in the result. Runs whose generators would
+be in the same state may share one: what they draw is drawn once.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from .bat import (
     BatParams,
     Bounds,
     Box,
+    Disc,
     Epsilon,
     Initial,
     Schedule,
@@ -36,6 +38,7 @@ from .errors import InputError
 Array = np.ndarray
 Objective = Callable[[Array], Array]
 
+_SCALE, _LARGEST = 2.0**60, 2.0**63
 CACHED_BATS = 8192  # flown at once: their arrays fit a processor's cache
 DRAWN = 2**20  # uniforms held at once
 
@@ -54,13 +57,13 @@ class BatchResult:
 
 
 def minimize_batch(
-    objective: Objective, box: Box, params: BatParams, rngs: Sequence[Generator]
+    objective: Objective, region: Box | Disc, params: BatParams, rngs: Sequence[Generator]
 ) -> BatchResult:
     """Run one swarm per generator; objective takes points (..., d) and returns values (...).
 
     Raises InputError for an objective that raises or returns another shape.
     """
-    runs, d = len(rngs), len(box.lower)
+    runs, d = len(rngs), len(region.span()[0])
     result = BatchResult(
         best_value=np.empty(runs),
         best_x=np.empty((runs, d)),
@@ -70,68 +73,90 @@ def minimize_batch(
     at_once = max(1, CACHED_BATS // params.population)
     for begin in range(0, runs, at_once):
         rows = slice(begin, begin + at_once)
-        swarms = _Swarms(objective, box, params, rngs[rows])
-        with np.errstate(over="ignore", invalid="ignore"):
-            swarms.run(result.history[rows])
+        swarms = Swarms(objective, region, params, rngs[rows], len(rngs[rows]))
+        result.history[rows] = swarms.run()
         result.best_value[rows] = swarms.best_value
         result.best_x[rows] = swarms.best_x.T
         result.failures[rows] = swarms.failures
     return result
 
 
-class _Swarms:
-    """R swarms of n bats; coordinates come first: x and v are (d, R, n), best_x is (d, R)."""
+class Swarms:
+    """R swarms of n bats; coordinates come first: x and v are (d, R, n), best_x is (d, R).
+
+    candidates (d, R, n) are those of the last iteration.
+    """
 
     def __init__(
-        self, objective: Objective, box: Box, params: BatParams, rngs: Sequence[Generator]
+        self,
+        objective: Objective,
+        region: Box | Disc,
+        params: BatParams,
+        rngs: Sequence[Generator],
+        runs: int,
+        shared: Sequence[int] | None = None,
     ) -> None:
-        self.objective, self.box, self.params, self.rngs = objective, box, params, rngs
-        n, d, runs = params.population, len(box.lower), len(rngs)
+        """Take a generator per run, or fewer, of which run i draws from number shared[i]."""
+        self.objective, self.region, self.params, self.rngs = objective, region, params, rngs
+        self.runs = runs
+        # One generator for all is spread over them by arithmetic itself.
+        self.shared = None if shared is None or len(rngs) == 1 else np.array(shared)
+        self.d = len(region.span()[0])
+        self.stride = draws_per_bat(params, self.d)
+
+    def _begin(self) -> None:
+        """Draw and value the first population."""
+        n, d, runs, params = self.params.population, self.d, self.runs, self.params
         sign = 1.0 if params.initial is Initial.INSIDE else -1.0
-        u = np.empty((runs, n, d))
-        for row, rng in zip(u, rngs):
+        u = np.empty((len(self.rngs), n, d))
+        for row, rng in zip(u, self.rngs):
             rng.random(out=row)
+        if self.shared is not None:
+            u = u[self.shared]
         self.x = np.empty((d, runs, n))
-        for j, (low, high) in enumerate(zip(*box.span())):
+        for j, (low, high) in enumerate(zip(*self.region.span())):
             self.x[j] = low + sign * u[:, :, j] * (high - low)  # eq. 3
         self._bound(self.x)
+        self.candidates = self.x.copy()
         self.v = np.zeros((d, runs, n))
         self.a = np.full((runs, n), params.a0)
         self.r = np.full((runs, n), params.r0)
         self.failures = np.zeros(runs, dtype=np.int64)
         self.row = np.arange(runs)
-        self.loudness = np.empty(runs)
-        self._average(self.row)
-        values = self._value(self.x)
+        self._average()
+        values = self._value()
         self.values = _numbers(values)
-        self.stride = draws_per_bat(params, d)
         self.best_x = self.x[:, :, 0].copy()
         self.best_value = np.full(runs, math.inf)
-        self._keep_best(self.x, values)
+        self._keep_best(values)
 
-    def run(self, history: Array) -> None:
-        """Fly T iterations and write the best value after each into history (R, T + 1)."""
+    def run(self) -> Array:
+        """Fly T iterations; the best values (R, T + 1) of the first population and after each."""
         p = self.params
-        history[:, 0] = self.best_value
-        done = 0
-        each = len(self.rngs) * p.population * self.stride
-        while done < p.iterations:
-            count = min(p.iterations - done, max(1, DRAWN // each))
-            for u in self._draw(count):
-                done += 1
-                candidates = self._fly(u, done)
-                values = self._value(candidates)
-                self._accept(candidates, values, u[2], done)
-                self._keep_best(candidates, values)
-                history[:, done] = self.best_value
+        history = np.empty((self.runs, p.iterations + 1))
+        with np.errstate(over="ignore", invalid="ignore"):
+            self._begin()
+            history[:, 0] = self.best_value
+            done = 0
+            each = len(self.rngs) * p.population * self.stride
+            while done < p.iterations:
+                count = min(p.iterations - done, max(1, DRAWN // each))
+                for u in self._draw(count):
+                    done += 1
+                    self.candidates = self._fly(u, done)
+                    values = self._value()
+                    self._accept(values, u[2], done)
+                    self._keep_best(values)
+                    history[:, done] = self.best_value
+        return history
 
     def _draw(self, count: int) -> Array:
-        """Uniforms of so many iterations, (count, stride, R, n): bat.py's order within a run."""
+        """Uniforms of so many iterations, (count, stride, R or 1, n): bat.py's order in a run."""
         n, stride = self.params.population, self.stride
         u = np.empty((count, stride, len(self.rngs), n))
         for i, rng in enumerate(self.rngs):
             u[:, :, i] = rng.random((count, n, stride)).transpose(0, 2, 1)
-        return u
+        return u if self.shared is None else u[:, :, self.shared]
 
     def _betas(self, u: Array, t: int) -> Array:
         p = self.params
@@ -150,17 +175,17 @@ class _Swarms:
         walk = u[1] > self.r
         scale = self.loudness[:, None]
         pair = self._pairs(u[-2], u[-1]) if p.step is Step.PAIR else None
-        candidates = np.empty_like(self.x)
-        for j, (x, v, best) in enumerate(zip(self.x, self.v, self.best_x)):
+        x, v, best = self.x, self.v, self.best_x[:, :, None]
+        if p.inertia != 1.0:
             v *= p.inertia
-            v += (best[:, None] - x) * f  # eq. 5
-            flown = x + v  # eq. 6
-            epsilon = 2.0 * u[3 + (0 if p.epsilon is Epsilon.SCALAR else j)] - 1.0
-            if pair:
-                here, there = (np.take_along_axis(x, bats, axis=1) for bats in pair)
-                epsilon *= there - here
-            base = best[:, None] if p.walk is Walk.BEST else flown
-            candidates[j] = np.where(walk, base + scale * epsilon, flown)  # eq. 7
+        v += (best - x) * f  # eq. 5
+        flown = x + v  # eq. 6
+        epsilon = 2.0 * (u[3:4] if p.epsilon is Epsilon.SCALAR else u[3 : 3 + self.d]) - 1.0
+        if pair:
+            here, there = (np.take_along_axis(x, bats[None], axis=2) for bats in pair)
+            epsilon = epsilon * (there - here)
+        candidates = (best if p.walk is Walk.BEST else flown) + scale * epsilon  # eq. 7
+        np.copyto(candidates, flown, where=~walk)
         self._bound(candidates)
         return candidates
 
@@ -170,9 +195,9 @@ class _Swarms:
         a = (ones * n).astype(np.int64)
         return a, (a + 1 + (others * (n - 1)).astype(np.int64)) % n
 
-    def _value(self, x: Array) -> Array:
-        """The objective at (d, R, n) points as (R, n) values."""
-        points = np.moveaxis(x, 0, -1)
+    def _value(self) -> Array:
+        """The objective at the candidates as (R, n) values."""
+        points = self.candidates.transpose(1, 2, 0)
         try:
             values = np.array(self.objective(points), dtype=float)
         except Exception as error:
@@ -186,46 +211,77 @@ class _Swarms:
                 f"return {points.shape[:-1]}"
             )
         finite = np.isfinite(values)
-        if not finite.all():
+        self.finite = bool(finite.all())
+        if not self.finite:
             self.failures += np.count_nonzero(~finite, axis=1)
             values[values == -math.inf] = math.nan
         return values
 
-    def _accept(self, candidates: Array, values: Array, gate: Array, t: int) -> None:
+    def _accept(self, values: Array, gate: Array, t: int) -> None:
         """Take what is good enough, with probability A_i; then eq. 8 and 9."""
         p = self.params
         limit: Array | float = self.values
         if p.acceptance is not Acceptance.OWN:
             limit = self.best_value[:, None] if p.acceptance is Acceptance.BEST else math.inf
         accepted = (values <= limit) & (gate < self.a)
-        np.copyto(self.x, candidates, where=accepted)
+        np.copyto(self.x, self.candidates, where=accepted)
         np.copyto(self.values, values, where=accepted)
         changed = accepted if p.update is Update.ACCEPTED else np.full_like(accepted, True)
         np.multiply(self.a, p.alpha, out=self.a, where=changed)  # eq. 8
-        self.r[changed] = p.r0 * (1.0 - math.exp(-p.gamma * t))  # eq. 9
+        np.copyto(self.r, p.r0 * (1.0 - math.exp(-p.gamma * t)), where=changed)  # eq. 9
         if p.alpha != 1.0:
-            self._average(np.flatnonzero(changed.any(axis=1)))
+            self._average()
 
-    def _average(self, rows: Array) -> None:
-        """Sigma times the mean loudness, for the runs in which it has changed."""
-        p = self.params
-        sums = [p.sigma * math.fsum(a) / p.population for a in self.a[rows].tolist()]
-        self.loudness[rows] = sums
+    def _average(self) -> None:
+        """Sigma times the mean loudness, rounded once, as fsum is.
 
-    def _keep_best(self, candidates: Array, values: Array) -> None:
-        values = _numbers(values)
+        As multiples of 2^-60 loudnesses are added up as whole numbers: nothing is lost.
+        """
+        p, scaled = self.params, self.a * _SCALE
+        if self.a.size and scaled.max() * p.population < _LARGEST:
+            whole = scaled.astype(np.int64)
+            if (whole == scaled).all():
+                self.loudness = p.sigma * (whole.sum(axis=1) / _SCALE) / p.population
+                return
+        sums = [p.sigma * math.fsum(a) / p.population for a in self.a.tolist()]
+        self.loudness = np.array(sums)
+
+    def _keep_best(self, values: Array) -> None:
+        """Remember the best of the candidates where it is better than all before."""
+        values = values if self.finite else _numbers(values)
         first = values.argmin(axis=1)
         least = values[self.row, first]
         better = least < self.best_value
-        self.best_value[better] = least[better]
-        self.best_x[:, better] = candidates[:, better, first[better]]
+        np.copyto(self.best_value, least, where=better)
+        np.copyto(self.best_x, self.candidates[:, self.row, first], where=better)
 
     def _bound(self, x: Array) -> None:
-        """Cut (d, R, n) points to the box, a NaN to its lower edge, as Box.clamp does."""
-        if self.params.bounds is Bounds.CLAMP:
-            for xj, low, high in zip(x, *self.box.span()):
-                np.copyto(xj, low, where=~(xj > low))
-                np.copyto(xj, high, where=~(xj < high))
+        """Put (d, R, n) points outside back onto the edge."""
+        if self.params.bounds is Bounds.NONE:
+            return
+        if isinstance(self.region, Disc):
+            _into_disc(x, self.region)
+        else:
+            _into_box(x, self.region)
+
+
+def _into_box(x: Array, box: Box) -> None:
+    """Each coordinate is cut to its interval, a NaN to the lower edge: as Box.clamp."""
+    for xj, low, high in zip(x, *box.span()):
+        np.copyto(xj, low, where=~(xj > low))
+        np.copyto(xj, high, where=~(xj < high))
+
+
+def _into_disc(x: Array, disc: Disc) -> None:
+    """A point outside is drawn back along its radius: as Disc.clamp."""
+    center = np.array(disc.center)[:, None, None]
+    offset = x - center
+    squares = offset * offset
+    norm = np.sqrt(squares[0] + squares[1])
+    outside = norm > disc.radius
+    offset *= disc.radius / np.maximum(norm, disc.radius)
+    offset += center
+    np.copyto(x, offset, where=outside)
 
 
 def _numbers(values: Array) -> Array:

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import TypeVar
 
 from .drive import Speeds, command, obey
 from .errors import ConfigError, InputError
@@ -27,6 +28,7 @@ from .planner import (
 from .sensing import Ranges, SensorParams, aligned, blind, sense_circles, sense_scan
 from .world import Scenario, velocity_at
 
+T = TypeVar("T")
 DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
 
 
@@ -216,6 +218,42 @@ def look_at_scan(world: World, sensor: SensorParams) -> Observation:
 Look = Callable[[World, SensorParams], Observation]
 
 
+def course(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams | None = None,
+    sensor: SensorParams | None = None,
+    seed: int = 0,
+    go_on: Callable[[World], bool] = lambda _: True,
+    brain: PathPlanner | None = None,
+    look: Look = look,
+) -> Generator[Observation, None, Episode]:
+    """run(), pausing before every decision: yields what is about to be decided upon."""
+    planner = planner or PlannerParams()
+    sensor = sensor or SensorParams()
+    world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
+    brain = brain or algorithm_1(planner, seed)
+    obs = look(world, sensor)
+    yield obs
+    ticks, truth = [brain.plan(obs)], [world.pose]
+    while (outcome := world.outcome()) is None and go_on(world):
+        world.step(command(ticks[-1], scenario.robot, world.tick_ns))
+        obs = look(world, sensor)
+        yield obs
+        ticks.append(brain.plan(obs))
+        truth.append(world.pose)
+    return Episode(
+        scenario=scenario,
+        sensor=sensor,
+        planner=planner,
+        seed=seed,
+        driver="core",
+        ticks=tuple(ticks),
+        outcome=outcome or Outcome.INTERRUPTED,
+        truth=tuple(truth) if scenario.robot.noise.of_odometry else (),
+    )
+
+
 def run(
     scenario: Scenario,
     *,
@@ -232,22 +270,17 @@ def run(
     the decisions instead of Algorithm 1, with planner's speed, step and tolerance; look is what
     it gets to know.
     """
-    planner = planner or PlannerParams()
-    sensor = sensor or SensorParams()
-    world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
-    brain = brain or algorithm_1(planner, seed)
-    ticks, truth = [brain.plan(look(world, sensor))], [world.pose]
-    while (outcome := world.outcome()) is None and go_on(world):
-        world.step(command(ticks[-1], scenario.robot, world.tick_ns))
-        ticks.append(brain.plan(look(world, sensor)))
-        truth.append(world.pose)
-    return Episode(
-        scenario=scenario,
-        sensor=sensor,
-        planner=planner,
-        seed=seed,
-        driver="core",
-        ticks=tuple(ticks),
-        outcome=outcome or Outcome.INTERRUPTED,
-        truth=tuple(truth) if scenario.robot.noise.of_odometry else (),
+    under_way = course(
+        scenario, planner=planner, sensor=sensor, seed=seed, go_on=go_on, brain=brain, look=look
     )
+    return ended(under_way)
+
+
+def ended(under_way: Generator[object, None, T]) -> T:
+    """Go on to the end, and return what comes of it."""
+    while True:
+        try:
+            next(under_way)
+        except StopIteration as end:
+            result: T = end.value
+            return result

@@ -27,7 +27,11 @@ class Nearby:
         self._motion, self._tick_ns = motion, tick_ns
         self._centers = np.zeros((2, 0, 0))
         self._centers_from = 0
-        self._picked: list[Found] = []
+        self._which: list[int] = []
+        self._radii: list[float] = []
+        self._xs: list[list[float]] = []  # of them, a row per tick
+        self._ys: list[list[float]] = []
+        self._found: tuple[int, Found] | None = None  # the tick asked for last
         self._picked_from = 0
         self._picked_at: Point = (math.nan, math.nan)
         self._reach_m, self._roam_m = math.nan, ROAM_M
@@ -41,13 +45,16 @@ class Nearby:
         k = tick - self._picked_from
         dx, dy = position[0] - self._picked_at[0], position[1] - self._picked_at[1]
         if not (
-            0 <= k < len(self._picked)
+            0 <= k < len(self._xs)
             and dx * dx + dy * dy <= self._roam_m * self._roam_m
             and reach_m == self._reach_m
         ):
             self._pick(tick, position, reach_m)
             k = 0
-        return self._picked[k]
+        if self._found is None or self._found[0] != tick:
+            centers = zip(self._xs[k], self._ys[k])
+            self._found = tick, (self._which, list(zip(centers, self._radii)))
+        return self._found[1]
 
     def _pick(self, tick: int, position: Point, reach_m: float) -> None:
         k = tick - self._centers_from
@@ -60,9 +67,9 @@ class Nearby:
         else:
             centers = self._centers[:, k : k + PICKED_TICKS]
             which = self._near(centers, tick, position, reach_m)
-        x, y = centers[:, :, which].tolist()
-        names, radii = which.tolist(), self._motion.radius_m[which].tolist()
-        self._picked = [(names, list(zip(zip(xs, ys), radii))) for xs, ys in zip(x, y)]
+        self._xs, self._ys = centers[:, :, which].tolist()
+        self._which, self._radii = which.tolist(), self._motion.radius_m[which].tolist()
+        self._found = None
         self._picked_from, self._picked_at, self._reach_m = tick, position, reach_m
 
     def _near(self, centers: Array, tick: int, position: Point, reach_m: float) -> Array:

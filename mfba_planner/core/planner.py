@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
-from numpy.random import Generator
-
-from .bat import BatParams, BatSwarm, Bounds, Disc, Vector, minimize
+from .bat import BatParams, BatSwarm, Disc, Vector
 from .caution import CautionParams
 from .errors import ConfigError
 from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
@@ -21,9 +19,11 @@ from .options import check, option
 from .recovery import RecoveryParams
 from .seen import Method, SeenParams
 from .sensing import Bits, Ranges, Scan, sensory_vector
+from .steps import Start, Step, fresh_step, fresh_steps
 from .streams import stream
 
 NANO = 1e-9
+FEW = 8  # bats of so few planners are no quicker at once
 
 
 class Mode(Enum):
@@ -197,7 +197,7 @@ class PathPlanner(Protocol):
         ...
 
 
-Generate = Callable[[Point, Point], tuple[Point, tuple[Point, ...]]]
+Generate = Callable[[Point, Point], Step]
 
 
 def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Generate) -> Decision:
@@ -313,6 +313,7 @@ class Planner:
         self._swarm: BatSwarm | None = None
         self._stamp_ns = 0
         self._watch = JumpWatch()
+        self._foreseen: tuple[Start, PlannerParams, Step] | None = None
 
     def reset(self) -> None:
         """Forget everything but parameters and seed (a jump of time, a new trip)."""
@@ -331,12 +332,31 @@ class Planner:
         self.mode = decision.mode
         return explained(decision, carried)
 
-    def _generate(self, position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
-        if self.params.swarm is Swarm.PERSISTENT:
+    def _generate(self, position: Point, goal: Point) -> Step:
+        params = self.params
+        if params.swarm is Swarm.PERSISTENT:
             return self._fly_on(position, goal)
-        return fresh_step(position, goal, self.params, stream(self.seed, self._stamp_ns))
+        start = Start(position, goal, self.seed, self._stamp_ns)
+        if self._foreseen is not None:
+            foreseen, told, step = self._foreseen
+            self._foreseen = None
+            if foreseen == start and (told is params or told == params):
+                return step
+        return fresh_step(start, params.step_length_m, params.bat)
 
-    def _fly_on(self, position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
+    def start(self, obs: Observation) -> Start | None:
+        """What fresh_step() will be asked for by plan(), None where it will not be."""
+        if self.params.swarm is not Swarm.FRESH or obs.goal is None or obs.refused:
+            return None
+        if any(sensory_vector(obs.ranges_m)):
+            return None
+        return Start(obs.pose.position, obs.goal, self.seed, obs.stamp_ns)
+
+    def foresee(self, start: Start, params: PlannerParams, step: Step) -> None:
+        """Take what fresh_steps() found; plan() uses it if it is just what it would ask for."""
+        self._foreseen = start, params, step
+
+    def _fly_on(self, position: Point, goal: Point) -> Step:
         """Fig. 1 read literally: bat.iterations per robot step, within the robot's reach.
 
         The bats stay where they are in the world, but are drawn into the disc of one step
@@ -363,26 +383,18 @@ class Planner:
         return (x, y), tuple((px, py) for px, py in self._swarm.candidates)
 
 
-def fresh_step(
-    position: Point, goal: Point, params: PlannerParams, rng: Generator
-) -> tuple[Point, tuple[Point, ...]]:
-    """Next point by a fresh swarm in the disc of one step; the last step is cut to the goal.
+def fly_together(planners: Sequence[Planner], observations: Sequence[Observation]) -> None:
+    """Let the bats of all that are about to generate a path fly at once, before they plan().
 
-    Objective: distance of the candidate to GP (eq. 1; eq. 2 is its reciprocal).
+    Their decisions stay the same to the last bit. Who has other params than the first flies
+    alone later, as do few: arrays cost more than they spare then.
     """
-    if distance(position, goal) <= params.step_length_m:
-        return goal, ()
-    px, py = position
-    gx, gy = goal[0] - px, goal[1] - py
-
-    def cost(x: Vector) -> float:
-        dx, dy = x[0] - gx, x[1] - gy
-        return math.sqrt(dx * dx + dy * dy)
-
-    reach = Disc(params.step_length_m)
-    swarm = minimize(cost, reach, params.bat, rng)
-    best = swarm.best_x
-    if params.bat.bounds is Bounds.NONE:
-        best = reach.clamp(best)  # bats may leave the disc, the robot cannot
-    bx, by = best
-    return (px + bx, py + by), tuple([(px + x, py + y) for x, y in swarm.candidates])
+    about = [(planner, planner.start(obs)) for planner, obs in zip(planners, observations)]
+    starting = [(planner, start) for planner, start in about if start is not None]
+    if len(starting) < FEW:
+        return
+    params = starting[0][0].params
+    starts = [start for _, start in starting]
+    steps = fresh_steps(starts, params.step_length_m, params.bat)
+    for (planner, start), step in zip(starting, steps):
+        planner.foresee(start, params, step)

@@ -36,7 +36,10 @@ class SensorParams:
 
 def sensory_vector(ranges_m: Iterable[float]) -> Bits:
     """Vs of eq. 11: a(i) = 0 where sector i is free (+inf), 1 for any other range."""
-    return tuple([0 if r == math.inf else 1 for r in ranges_m])
+    ranges = tuple(ranges_m)
+    if ranges.count(math.inf) == len(ranges):
+        return (0,) * len(ranges)  # most of the time
+    return tuple([0 if r == math.inf else 1 for r in ranges])
 
 
 def blind(sector: int, range_m: float) -> str:

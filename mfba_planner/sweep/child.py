@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -14,9 +15,12 @@ from typing import Any
 from ..leash import end_with_parent
 from . import parts as _parts  # noqa: F401  # now: later it would be taken for slow work
 
+MANY = 50_000  # new objects before the collector looks for cycles: runs are large and have none
+
 
 def main(descriptor: int) -> None:
     """Do what is asked for until the pipe is closed."""
+    gc.set_threshold(MANY)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is the parent's matter
     end_with_parent(int(os.environ["MFBA_PARENT"]))
     # Whoever has heard enough closes the pipe.

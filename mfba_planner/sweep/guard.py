@@ -24,12 +24,13 @@ class HungError(BaseException):
 class Guard:
     """Passes on what a planner decides; PlannerFault where it must not be followed.
 
-    decisions are those that were followed, times_ns what each took by the machine's clock.
+    decisions are those that were followed, times_ns what each took by the machine's clock, and
+    planner who decides, None before take().
     """
 
     def __init__(self, params: PlannerParams) -> None:
         """Start without a planner, with what it was told."""
-        self._planner: PathPlanner | None = None
+        self.planner: PathPlanner | None = None
         self._limit_mps = params.speed_mps * (1.0 + SPEED_SLACK)
         self.decisions: list[Decision] = []
         self.times_ns: list[int] = []
@@ -37,19 +38,19 @@ class Guard:
     def take(self, make: Callable[[], PathPlanner]) -> PathPlanner:
         """Make the planner; return it. Raises PlannerFault, and MfbaErrors as they are."""
         try:
-            self._planner = make()
+            self.planner = made = make()
         except MfbaError:
             raise
         except Exception as error:
             raise PlannerFault(_raised(error)) from error
-        return self._planner
+        return made
 
     def plan(self, obs: Observation) -> Decision:
         """Ask the planner. Raises PlannerFault."""
-        assert self._planner is not None
+        assert self.planner is not None
         begun = perf_counter_ns()
         try:
-            decision = self._planner.plan(obs)
+            decision = self.planner.plan(obs)
         except Exception as error:
             raise PlannerFault(_raised(error)) from error
         self.times_ns.append(perf_counter_ns() - begun)

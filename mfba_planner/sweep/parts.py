@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -16,7 +16,7 @@ from ..worlds.difficulty import survivability
 from .columns import Row, lost_row, made_row, timing_row
 from .keeper import Lost, each
 from .order import Order, Run, Setting
-from .play import play
+from .play import flies_together, play, play_together
 
 RUNS_AT_ONCE = 100
 WORLDS_AT_ONCE = 20
@@ -43,21 +43,38 @@ class Runs:
 
     def run(self) -> Columns:
         """Make the runs; COLUMNS (without the oracle's) and TIMINGS."""
-        answers = each(make, self.runs, self.setting, self.setting.patience_s)
-        found = [
-            lost_row(run, answer.why) if isinstance(answer, Lost) else answer
-            for run, answer in zip(self.runs, answers)
-        ]
+        batches: list[tuple[Run, ...]] = [(run,) for run in self.runs]
+        if flies_together(self.runs[0].planner, self.setting):
+            first, others = self.runs[:1], self.runs[1:]  # one alone: what does a decision take?
+            batches = [first, others] if others else [first]
+        found = list(self._made(batches))
         names = dict.fromkeys(name for row in found for name in row)
         return {name: [row.get(name) for row in found] for name in names}
 
+    def _made(self, batches: Sequence[tuple[Run, ...]]) -> Iterator[Row]:
+        """The rows, in order; runs that are lost together are made again one by one."""
+        answers = each(make, batches, self.setting, self.setting.patience_s)
+        for batch, answer in zip(batches, answers):
+            if not isinstance(answer, Lost):
+                yield from answer
+            elif len(batch) == 1:
+                yield lost_row(batch[0], answer.why)
+            else:
+                yield from self._made([(run,) for run in batch])
 
-def make(run: Run, setting: Setting) -> Row:
-    """Make one run here; its row and its timing."""
+
+def make(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
+    """Make some runs here, together where they are several; their rows and timings."""
     begun = perf_counter()
-    played = play(run, setting, whole=False)
-    wall_ms = 1e3 * (perf_counter() - begun)
-    return {**timing_row(played.times_ns, wall_ms), **made_row(run, played)}
+    if len(runs) == 1:
+        played = [play(runs[0], setting, whole=False)]
+    else:
+        played = play_together(runs, setting)
+    wall_ms = 1e3 * (perf_counter() - begun) / len(runs)
+    return [
+        {**timing_row(one.times_ns, wall_ms), **made_row(run, one)}
+        for run, one in zip(runs, played)
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
+from typing import cast
 
-from ..core.episode import Episode, Look, Outcome, look
-from ..core.episode import run as drive
-from ..core.planner import Planner
+from ..core.episode import Episode, Look, Outcome, course, ended, look
+from ..core.planner import Observation, Planner, Swarm, fly_together
+from ..planners.registry import known
 from .guard import Guard, HungError, PlannerFault
 from .order import Run, Setting
 
@@ -18,7 +21,7 @@ class Played:
 
     episode: Episode
     fault: str
-    times_ns: tuple[int, ...]  # what each decision took
+    times_ns: tuple[int, ...] = ()  # what each decision took
 
     @property
     def fault_at(self) -> str:
@@ -32,11 +35,47 @@ def play(run: Run, setting: Setting, *, whole: bool = True) -> Played:
     After a fault of the planner the Episode holds what was decided before, which may be nothing.
     whole=False: the record may lack sectors that the planner does not read; its way is the same.
     """
-    scenario, fault = setting.scenario(run), ""
     guard = Guard(setting.params)
+    played = ended(_playing(run, setting, guard, whole))
+    return replace(played, times_ns=tuple(guard.times_ns))
+
+
+def play_together(runs: Sequence[Run], setting: Setting) -> list[Played]:
+    """play() of runs that flies_together() says yes to: tick by tick, all their bats at once.
+
+    The same decisions to the last bit. What one of them takes cannot be told: times_ns is empty.
+    """
+    guards = [Guard(setting.params) for _ in runs]
+    left = {i: _playing(*run, False) for i, run in enumerate(zip(runs, repeat(setting), guards))}
+    found: dict[int, Played] = {}
+    while left:
+        seen: dict[int, Observation] = {}
+        for i, under_way in left.items():
+            try:
+                seen[i] = next(under_way)
+            except StopIteration as end:
+                found[i] = end.value
+        left = {i: left[i] for i in seen}
+        planners = [cast(Planner, guards[i].planner) for i in seen]
+        fly_together(planners, list(seen.values()))
+    return [found[i] for i in range(len(runs))]
+
+
+def flies_together(planner: str, setting: Setting) -> bool:
+    """Whether it is Algorithm 1 with fresh bats, which are quicker flown at once."""
+    if ":" in planner or setting.params.swarm is not Swarm.FRESH:
+        return False
+    return type(known(planner)(setting.params, setting.sensor, 0)) is Planner
+
+
+def _playing(
+    run: Run, setting: Setting, guard: Guard, whole: bool
+) -> Generator[Observation, None, Played]:
+    """A run under way; it pauses before every decision."""
+    scenario, fault = setting.scenario(run), ""
     try:
         brain = guard.take(lambda: setting.brain(run))
-        episode = drive(
+        episode = yield from course(
             scenario,
             planner=setting.params,
             sensor=setting.sensor,
@@ -57,7 +96,7 @@ def play(run: Run, setting: Setting, *, whole: bool = True) -> Played:
         )
     if run.planner != "paper":
         episode = replace(episode, brain=run.planner)
-    return Played(episode=episode, fault=fault, times_ns=tuple(guard.times_ns))
+    return Played(episode=episode, fault=fault)
 
 
 def _look(brain: object, run: Run, setting: Setting, whole: bool) -> Look:

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One step of path generation: in the disc of one step, and the same alone or among many."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+from any_bats import ANY_READING
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mfba_planner.core import planner as module
+from mfba_planner.core.bat import BatParams, Bounds, Disc, Schedule, minimize
+from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.planner import FEW, Observation, Planner, PlannerParams, Swarm, fly_together
+from mfba_planner.core.steps import Start, Step, fresh_step, fresh_steps
+from mfba_planner.core.streams import stream
+
+FREE = (math.inf,) * 12
+GOAL = (12.0, 12.0)
+STEP_M = 0.3
+METRES = st.floats(-100.0, 100.0)
+STARTS = st.builds(
+    Start,
+    st.tuples(METRES, METRES),
+    st.tuples(METRES, METRES),
+    st.integers(0, 2),
+    st.sampled_from([382_165_605, 2**33]),
+)
+
+
+def test_a_fresh_swarm_searches_the_disc_of_one_step() -> None:
+    bat = BatParams(population=7, iterations=3)
+    waypoint, candidates = fresh_step(Start((1.0, 2.0), (4.0, 6.0), 3, 77), STEP_M, bat)
+
+    def cost(x: list[float]) -> float:
+        return math.hypot(x[0] - 3.0, x[1] - 4.0)
+
+    swarm = minimize(cost, Disc(STEP_M), bat, stream(3, 77))
+    assert waypoint == pytest.approx((1.0 + swarm.best_x[0], 2.0 + swarm.best_x[1]))
+    assert len(candidates) == 7
+    for candidate, x in zip(candidates, swarm.candidates):
+        assert candidate == pytest.approx((1.0 + x[0], 2.0 + x[1]))
+    assert math.dist(waypoint, (4.0, 6.0)) < 4.8, "nearly the whole step is gained"
+
+
+def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
+    bat = BatParams(bounds=Bounds.NONE, schedule=Schedule.RAW)
+    waypoint, candidates = fresh_step(Start((1.0, 2.0), GOAL, 0, 1), STEP_M, bat)
+    assert max(math.dist((1.0, 2.0), c) for c in candidates) > STEP_M
+    assert math.dist((1.0, 2.0), waypoint) == pytest.approx(STEP_M)
+    swarm = minimize(
+        lambda x: math.hypot(x[0] - 11.0, x[1] - 10.0), Disc(STEP_M), bat, stream(0, 1)
+    )
+    heading = math.atan2(waypoint[1] - 2.0, waypoint[0] - 1.0)
+    assert heading == pytest.approx(math.atan2(swarm.best_x[1], swarm.best_x[0]))
+
+
+@given(st.lists(STARTS, max_size=6), ANY_READING, st.floats(0.001, 3.0))
+def test_many_steps_at_once_are_the_same_steps(
+    starts: list[Start], bat: BatParams, step_m: float
+) -> None:
+    starts.append(Start((1.0, 2.0), (1.0 + 0.9 * step_m, 2.0), 0, 1))  # the last of its trip
+    assert fresh_steps(starts, step_m, bat) == [fresh_step(s, step_m, bat) for s in starts]
+
+
+def test_a_start_among_others_of_its_seed_is_the_same() -> None:
+    starts = [Start((0.1 * k, 2.0), GOAL, 5, 2**33) for k in range(20)]
+    assert fresh_steps(starts, STEP_M, BatParams()) == [
+        fresh_step(s, STEP_M, BatParams()) for s in starts
+    ]
+
+
+# --- planners that let their bats fly together ------------------------------------------------
+
+
+def observed(k: int, ranges_m: tuple[float, ...] = FREE, goal: Point | None = GOAL) -> Observation:
+    stamp_ns = 382_165_605
+    return Observation(
+        stamp_ns=stamp_ns, now_ns=stamp_ns, pose=Pose2D(0.1 * k, 2.0), ranges_m=ranges_m, goal=goal
+    )
+
+
+@pytest.fixture
+def alone(monkeypatch: pytest.MonkeyPatch) -> list[Start]:
+    """The steps that were made alone."""
+    made: list[Start] = []
+
+    def noted(start: Start, step_length_m: float, bat: BatParams) -> Step:
+        made.append(start)
+        return fresh_step(start, step_length_m, bat)
+
+    monkeypatch.setattr(module, "fresh_step", noted)
+    return made
+
+
+def planners(seeds: Sequence[int], params: PlannerParams | None = None) -> list[Planner]:
+    return [Planner(params or PlannerParams(), seed) for seed in seeds]
+
+
+def test_planners_find_their_bats_flown_and_decide_the_same(alone: list[Start]) -> None:
+    seeds = [k % 3 for k in range(FEW + 3)]
+    seen = [observed(k) for k in range(len(seeds))]
+    blocked = (0.5, *FREE[1:])
+    seen[1], seen[2] = observed(1, blocked), observed(2, goal=None)
+    ours, theirs = planners(seeds), planners(seeds)
+    fly_together(ours, seen)
+    decided = [planner.plan(obs) for planner, obs in zip(ours, seen)]
+    assert alone == []
+    assert decided == [planner.plan(obs) for planner, obs in zip(theirs, seen)]
+    assert len(alone) == len(seeds) - 2
+    again = [replace(obs, stamp_ns=2 * obs.stamp_ns, now_ns=2 * obs.now_ns) for obs in seen]
+    for planner, other, obs in zip(ours, theirs, again):
+        assert planner.plan(obs) == other.plan(obs), "bats that flew once do not come again"
+
+
+def test_few_fly_alone(alone: list[Start]) -> None:
+    ours = planners(range(FEW - 1))
+    seen = [observed(k) for k in range(FEW - 1)]
+    fly_together(ours, seen)
+    for planner, obs in zip(ours, seen):
+        planner.plan(obs)
+    assert len(alone) == FEW - 1
+
+
+def test_whoever_is_elsewhere_or_has_other_options_flies_alone(alone: list[Start]) -> None:
+    ours = planners(range(FEW))
+    seen = [observed(k) for k in range(FEW)]
+    fly_together(ours, seen)
+    ours[1].params = replace(ours[1].params, step_length_m=0.2)
+    ours[2].params = replace(ours[2].params, bat=BatParams())  # an equal one
+    ours[3].seed = 77
+    seen[4] = observed(44)
+    seen[5] = replace(seen[5], goal=(3.0, 3.0))
+    seen[6] = replace(seen[6], stamp_ns=7, now_ns=7)
+    decided = [planner.plan(obs) for planner, obs in zip(ours, seen)]
+    assert [start.seed for start in alone] == [1, 77, 4, 5, 6]
+    for mine, planner, obs in zip(decided, ours, seen):
+        assert mine == Planner(planner.params, planner.seed).plan(obs)
+
+
+def test_a_swarm_that_lives_on_is_not_flown_for_its_planner(alone: list[Start]) -> None:
+    params = PlannerParams(swarm=Swarm.PERSISTENT)
+    ours, theirs = planners(range(FEW), params), planners(range(FEW), params)
+    seen = [observed(k) for k in range(FEW)]
+    fly_together(ours, seen)
+    assert [p.plan(o) for p, o in zip(ours, seen)] == [p.plan(o) for p, o in zip(theirs, seen)]
+    assert [planner.start(obs) for planner, obs in zip(ours, seen)] == [None] * FEW
+    assert alone == []
