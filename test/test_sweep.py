@@ -5,7 +5,7 @@ import csv
 import io
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,10 @@ from pyarrow import parquet
 from mfba_planner.core.episode import run
 from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.metrics import assess
-from mfba_planner.core.planner import PlannerParams, Swarm
+from mfba_planner.core.planner import Observation, Planner, PlannerParams, Swarm
 from mfba_planner.oracle import solve
 from mfba_planner.sweep import keeper, parts
+from mfba_planner.sweep import play as play_module
 from mfba_planner.sweep.columns import COLUMNS, TIMINGS, Row
 from mfba_planner.sweep.keeper import Keeper, Lost, each
 from mfba_planner.sweep.order import Order, Run, Setting, read_run
@@ -101,6 +102,23 @@ def test_runs_made_together_are_the_runs_made_alone(planner: str) -> None:
         assert played.episode == together.episode
         assert (together.fault, together.times_ns) == ("", ())
         assert len(played.times_ns) == len(played.episode.ticks)
+
+
+def test_runs_with_many_ticks_are_made_together_in_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = [Run("random-3", world, "paper", 0) for world in range(7)]
+    under_way: list[int] = []
+
+    def noted(planners: Sequence[Planner], seen: Sequence[Observation]) -> None:
+        under_way.append(len(planners))
+
+    monkeypatch.setattr(play_module, "fly_together", noted)
+    # Of 120 s in ticks of 0.375 s, 320 each.
+    monkeypatch.setattr(play_module, "TICKS_HELD", 1000)
+    found = list(play_together(runs, Setting()))
+    assert max(under_way) == 3
+    assert [one.episode for one in found] == [play(run, Setting()).episode for run in runs]
+    assert len(list(play_together(runs, Setting(params=PlannerParams(step_length_m=2.0))))) == 7
+    assert max(under_way) == 7
 
 
 def test_only_fresh_bats_of_ours_fly_together() -> None:

@@ -66,15 +66,11 @@ class Runs:
 def make(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
     """Make some runs here, together where they are several; their rows and timings."""
     begun = perf_counter()
-    if len(runs) == 1:
-        played = [play(runs[0], setting, whole=False)]
-    else:
-        played = play_together(runs, setting)
+    alone = len(runs) == 1
+    all_played = [play(runs[0], setting, whole=False)] if alone else play_together(runs, setting)
+    made = [(played.times_ns, made_row(run, played)) for run, played in zip(runs, all_played)]
     wall_ms = 1e3 * (perf_counter() - begun) / len(runs)
-    return [
-        {**timing_row(one.times_ns, wall_ms), **made_row(run, one)}
-        for run, one in zip(runs, played)
-    ]
+    return [{**timing_row(times_ns, wall_ms), **row} for times_ns, row in made]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

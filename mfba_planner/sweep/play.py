@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import cast
 
 from ..core.episode import Episode, Look, Outcome, course, ended, look
-from ..core.planner import Observation, Planner, Swarm, fly_together
+from ..core.planner import NANO, Observation, Planner, Swarm, fly_together
 from ..planners.registry import known
 from .guard import Guard, HungError, PlannerFault
 from .order import Run, Setting
+
+TICKS_HELD = 100_000  # of all runs under way at once, of some kB each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,11 +42,18 @@ def play(run: Run, setting: Setting, *, whole: bool = True) -> Played:
     return replace(played, times_ns=tuple(guard.times_ns))
 
 
-def play_together(runs: Sequence[Run], setting: Setting) -> list[Played]:
+def play_together(runs: Sequence[Run], setting: Setting) -> Iterator[Played]:
     """play() of runs that flies_together() says yes to: tick by tick, all their bats at once.
 
     The same decisions to the last bit. What one of them takes cannot be told: times_ns is empty.
     """
+    limit_s = setting.scenario(runs[0]).time_limit_s
+    at_once = max(1, int(TICKS_HELD * setting.params.tick_ns * NANO / limit_s))
+    for begin in range(0, len(runs), at_once):
+        yield from _tick_by_tick(runs[begin : begin + at_once], setting)
+
+
+def _tick_by_tick(runs: Sequence[Run], setting: Setting) -> list[Played]:
     guards = [Guard(setting.params) for _ in runs]
     left = {i: _playing(*run, False) for i, run in enumerate(zip(runs, repeat(setting), guards))}
     found: dict[int, Played] = {}
