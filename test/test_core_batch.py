@@ -71,6 +71,14 @@ def test_each_run_equals_the_single_engine_bit_by_bit(
         assert ours[i].random() == rng.random(), "both took the same number of draws"
 
 
+@pytest.mark.parametrize("a0", [1e-7, 0.3, 2.0, 100.0])
+def test_loud_and_quiet_bats_walk_as_far_as_in_the_single_engine(a0: float) -> None:
+    p = BatParams(a0=a0, sigma=0.05 / a0, r0=0.0, iterations=9)
+    result = minimize_batch(bowls, BOX, p, generators(4))
+    for i, rng in enumerate(generators(4)):
+        assert result.best_x[i].tolist() == minimize(bowl, BOX, p, rng).best_x
+
+
 def test_long_runs_in_pieces_are_the_same_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     p = BatParams(population=8, iterations=40, f_max=1.5)
     whole = minimize_batch(bowls, BOX, p, generators(9))
