@@ -5,6 +5,7 @@ import csv
 import io
 import math
 import os
+import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -135,10 +136,20 @@ def dies_among_others(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
     return make(runs, setting)
 
 
-def test_runs_that_are_lost_together_are_made_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def hangs_among_others(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
+    """As make(), but runs that are made together come to no end."""
+    if len(runs) > 1:
+        signal.pause()
+    return make(runs, setting)
+
+
+@pytest.mark.parametrize("lost", [dies_among_others, hangs_among_others])
+def test_runs_that_are_lost_together_are_made_one_by_one(
+    monkeypatch: pytest.MonkeyPatch, lost: Any
+) -> None:
     plain = sweep(an_order(planners=("paper",)))
-    monkeypatch.setattr(parts, "make", dies_among_others)
-    again = sweep(an_order(planners=("paper",)))
+    monkeypatch.setattr(parts, "make", lost)
+    again = sweep(an_order(planners=("paper",), setting=Setting(patience_s=4.0)))
     assert again.hash == plain.hash
     assert all(row["decision_us"] > 0.0 for row in again.timings), "each was made alone"
 

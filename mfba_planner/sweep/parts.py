@@ -53,7 +53,8 @@ class Runs:
 
     def _made(self, batches: Sequence[tuple[Run, ...]]) -> Iterator[Row]:
         """The rows, in order; runs that are lost together are made again one by one."""
-        answers = each(make, batches, self.setting, self.setting.patience_s)
+        # All answers first: a child that hangs is there until its last one has been asked for.
+        answers = list(each(make, batches, self.setting, self.setting.patience_s))
         for batch, answer in zip(batches, answers):
             if not isinstance(answer, Lost):
                 yield from answer
