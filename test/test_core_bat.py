@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from any_bats import ANY_READING, OURS, READINGS
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -39,34 +40,8 @@ from mfba_planner.core.flight import Law
 
 Values = list[float]
 BOX = Box((-1.0, 10.0), (3.0, 12.0))
-READINGS = {
-    "algorithm": Algorithm,
-    "velocity": Velocity,
-    "schedule": Schedule,
-    "bounds": Bounds,
-    "epsilon": Epsilon,
-    "initial": Initial,
-    "walk": Walk,
-}
-OURS = {"step": Step, "acceptance": Acceptance, "update": Update}  # not in the paper's gaps
 SILENT = {"r0": 1.0}  # rand > 1 never holds: no local walk
 WALKING = {"r0": 0.0}  # rand > 0 always holds
-
-
-ANY_READING = st.builds(
-    BatParams,
-    population=st.integers(2, 6),
-    iterations=st.integers(1, 8),
-    f_max=st.floats(0.0, 1000.0),
-    rho=st.floats(0.0, 5.0),
-    sigma=st.floats(0.0, 10.0),
-    a0=st.floats(0.0, 2.0),
-    r0=st.floats(0.0, 1.0),
-    inertia=st.sampled_from([0.0, 0.6, 1.0]),
-    **{  # type: ignore
-        name: st.sampled_from(list(kind)) for name, kind in {**READINGS, **OURS}.items()
-    },
-)
 COORDINATE = st.floats(-100.0, 100.0)
 DISCS = st.builds(Disc, st.floats(0.001, 50.0), st.tuples(COORDINATE, COORDINATE))
 BOXES = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=1, max_size=4).map(
