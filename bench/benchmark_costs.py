@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What runs cost, and one decision: ours, pyrvo's ORCA, a dynamic window, among ever more.
 
-The dynamic window is this package's `dwa` (samples of velocities simulated on, as in the tutorial
-PythonRobotics, but all at once in numpy); the tutorial is no package that could be measured.
+The dynamic window is this package's `dwa`, all velocities at once in numpy, and once more as
+tutorials have it (stepwise_dwa.py); PythonRobotics itself is no package that could be measured.
 """
 
 from __future__ import annotations
@@ -16,16 +16,19 @@ from dataclasses import dataclass
 import numpy as np
 from benchmark_runs import FINE, Entry
 from planners import arrangement
+from stepwise_dwa import StepwiseDwa
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner import Observation
+from mfba_planner.core.planner import Observation, PathPlanner
+from mfba_planner.core.sensing import SensorParams
 from mfba_planner.planners.registry import make
 from mfba_planner.sweep.keeper import Lost, each
 from mfba_planner.sweep.order import Order
 from mfba_planner.sweep.run import sweep
 
 COUNTS = (1, 3, 10, 30, 100, 300, 1000)
-NAMES = ("predictive", "orca", "dwa")
+STEPWISE = "dwa, step by step"
+NAMES = ("predictive", "orca", "dwa", STEPWISE)
 ARRANGEMENTS = 20
 FEWEST = 3 * ARRANGEMENTS  # rounds; in the first third every planner meets its arrangement
 PATIENCE_S = 3600.0
@@ -96,7 +99,7 @@ def _deciding(name: str, count: int) -> Callable[[int], object]:
     """Decisions of as many planners as there are arrangements, the same ones for every name."""
     rng = np.random.default_rng(count)
     crowds = [arrangement(count, rng) for _ in range(ARRANGEMENTS)]
-    planners = [make(name, FINE.params) for _ in crowds]
+    planners = [_planner(name) for _ in crowds]
     calls = iter(range(10**9))
 
     def once(stamp: int) -> object:
@@ -109,3 +112,9 @@ def _deciding(name: str, count: int) -> Callable[[int], object]:
         )  # fmt: skip
 
     return once
+
+
+def _planner(name: str) -> PathPlanner:
+    if name == STEPWISE:
+        return StepwiseDwa(FINE.params, SensorParams(), 0)
+    return make(name, FINE.params)

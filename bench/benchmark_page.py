@@ -225,6 +225,7 @@ def _costs(costs: Costs) -> str:
         "over the sensing region, which grows with their number beyond 10), "
         f"{costs.rounds} rounds at 10 and fewer where more are in range. "
         f"Growth as count^s from 10 on: s = {slopes}. `orca` is pyrvo asked "
-        "`ROUNDS` times per decision; `dwa` is ours, in the manner of PythonRobotics', but with "
-        f"all velocities at once in numpy.\n\n{markdown(head, lines)}"
+        "`ROUNDS` times per decision; `dwa` is ours, all velocities at once in numpy, and step by "
+        "step it simulates one velocity after the other, as PythonRobotics' tutorial goes about "
+        f"it.\n\n{markdown(head, lines)}"
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmark_costs import NAMES, Costs
+from benchmark_costs import NAMES, STEPWISE, Costs
 from benchmark_runs import INGREDIENTS, LEAD, STRIPPED, Counts, Entry, Results
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -30,6 +30,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "predictive": {"color": style.BLUE, "marker": "o"},
     "orca": {"color": style.VERMILLION, "marker": "^"},
     "dwa": {"color": style.GREEN, "marker": "D"},
+    STEPWISE: {"color": style.PURPLE, "marker": "v"},
 }
 # where wins are looked for first: many obstacles make telling pictures
 CLEAR = ("adversarial",)  # with few obstacles, so that whole ways can be seen
@@ -180,7 +181,7 @@ def _ablation(results: Results, suites: Sequence[str], counts: Counts) -> Figure
 
 
 def _cost(costs: Costs) -> Figure:
-    sheet, (ax,) = _panels(1, "One decision", "median, all in turn", EDGE + _AXIS, _LEGEND + 0.6)
+    sheet, (ax,) = _panels(1, "One decision", "median, all in turn", EDGE + _AXIS, _LEGEND + 1.0)
     for name in NAMES:
         label = f"{name}: count^{costs.slope(name):.2f}"
         ax.loglog(costs.counts, costs.median_us[name], label=label, markersize=5.0, **LOOKS[name])
@@ -188,7 +189,7 @@ def _cost(costs: Costs) -> Figure:
     for axis in (ax.xaxis, ax.yaxis):
         _plain(axis)
     ax.set_ylabel("us")
-    _legend(sheet, ax, _LEGEND + 0.6)
+    _legend(sheet, ax, _LEGEND + 1.0)
     return sheet.figure
 
 

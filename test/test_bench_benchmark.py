@@ -10,9 +10,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import shown
 
+from mfba_planner.planners.dwa import DynamicWindow
 from mfba_planner.report.sweep import HEAD
 from mfba_planner.statistics import Interval
 from mfba_planner.sweep.read import read_sweep
@@ -198,3 +200,16 @@ def test_every_command_of_the_page_is_run_here_and_options_in_its_text_exist(
     for part in re.findall(r"`(--.*?)`", PAGE):
         options = [word for word in part.split() if word.startswith("--")]
         assert all(word == "--help" or f"{word} " in parser.format_help() for word in options)
+
+
+def test_the_window_step_by_step_sees_what_ours_sees_between_its_steps() -> None:
+    stepwise = runpy.run_path(str(ROOT / "bench" / "stepwise_dwa.py"))
+    rng = np.random.default_rng(3)
+    around = rng.uniform([-2.0, -2.0, -0.3, -0.3, 0.3], [2.0, 2.0, 0.3, 0.3, 0.6], size=(12, 5))
+    samples = rng.uniform(-0.6, 0.6, size=(40, 2))
+    exact = DynamicWindow.gaps(around, samples)
+    missed = stepwise["StepwiseDwa"].gaps(around, samples) - exact
+    # Within half a step nobody comes nearer than by its own way and the robot's.
+    most = 0.5 * stepwise["STEP_S"] * (np.hypot(0.3, 0.3) + np.hypot(0.6, 0.6))
+    assert missed.min() >= -1e-12
+    assert 0.0 < missed.max() <= most

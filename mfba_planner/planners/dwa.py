@@ -43,7 +43,7 @@ class DynamicWindow(Steering):
         if not around.size:
             return Move(velocity=ahead, reason="nothing within SR")
         samples = np.concatenate([self._samples, [ahead]])
-        gap = _smallest_gap(around, samples, HORIZON_S)
+        gap = self.gaps(around, samples)
         gx, gy = goal[0] - obs.pose.x, goal[1] - obs.pose.y
         left = math.hypot(gx, gy)
         lasts = max(min(HORIZON_S, left / self.params.speed_mps), self.params.tick_ns * NANO)
@@ -58,11 +58,11 @@ class DynamicWindow(Steering):
             event=Event.OBSTACLE if safe else Event.NO_GAP,
         )
 
-
-def _smallest_gap(around: np.ndarray, samples: np.ndarray, horizon_s: float) -> np.ndarray:
-    """Smallest distance to any enlarged edge within the horizon, per sample; (m,), metres."""
-    x, y, vx, vy, radius = around.T[:, :, None]
-    wx, wy = vx - samples[:, 0], vy - samples[:, 1]
-    t = np.clip(-(x * wx + y * wy) / np.maximum(wx * wx + wy * wy, 1e-12), 0.0, horizon_s)
-    gap: np.ndarray = (np.hypot(x + t * wx, y + t * wy) - radius).min(axis=0)
-    return gap
+    @staticmethod
+    def gaps(around: np.ndarray, samples: np.ndarray) -> np.ndarray:
+        """Smallest distance to any enlarged edge within the horizon, per sample; (m,), metres."""
+        x, y, vx, vy, radius = around.T[:, :, None]
+        wx, wy = vx - samples[:, 0], vy - samples[:, 1]
+        t = np.clip(-(x * wx + y * wy) / np.maximum(wx * wx + wy * wy, 1e-12), 0.0, HORIZON_S)
+        gap: np.ndarray = (np.hypot(x + t * wx, y + t * wy) - radius).min(axis=0)
+        return gap
