@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import shown
 import yaml
-from ros2_session import KINDS, Session, holds, kind_of
+from ros2_session import KINDS, SOON_S, Session, holds, kind_of
 from shown import PAGES, ROOT
 
 from mfba_planner.ros.in_process import run_in_process
@@ -76,6 +76,11 @@ def home(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Pat
     return tmp_path
 
 
+def recorded(home: Path) -> list[Path]:
+    """The bags that were not there before."""
+    return [path for path in (home / "runs").iterdir() if path.name != "mine"]
+
+
 @pytest.mark.parametrize("name", WITH_ROS2)
 def test_the_commands_of_a_page_do_what_it_says(name: str, home: Path, domain_id: int) -> None:
     bag = None
@@ -87,7 +92,8 @@ def test_the_commands_of_a_page_do_what_it_says(name: str, home: Path, domain_id
                 session.do(words)
             session.prove()
         if "recorder" in session.running:
-            (bag,) = (path for path in (home / "runs").iterdir() if path.name != "mine")
+            session.graph.until(lambda: bool(recorded(home)), SOON_S)  # a node is seen before that
+            (bag,) = recorded(home)
             for turn in range(100):  # its recorder and the others may find each other late
                 if holds(bag, "/cmd_vel", home / f"saved{turn}"):
                     break
