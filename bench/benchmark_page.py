@@ -206,7 +206,8 @@ def _cost_targets(workers: int, costs: Costs, rates: Mapping[str, Sequence[float
         ),
         ("exponent of its growth, 10 to 1000 in range", costs.slope("predictive"), SLOPE),
     ):
-        yield [what, f"<= {most:g}", f"{found:.3g}", "met" if found <= most else "**missed**"]
+        told = f"{found:.3g}" if found < 100.0 else f"{found:.0f}"
+        yield [what, f"<= {most:g}", told, "met" if found <= most else "**missed**"]
 
 
 def _costs(costs: Costs) -> str:
