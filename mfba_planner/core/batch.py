@@ -3,9 +3,9 @@
 
 Every run has a generator of its own and draws what bat.py would draw; a stream read in one
 piece or in many is the same stream. What could differ in the last bit is done as bat.py does
-it: exp by the math module (numpy's differs in 5 % of the arguments), the mean loudness by
-fsum. So equal bits from the objective give equal bits in the result. Runs whose generators would
-be in the same state may share one: what they draw is drawn once.
+it: exp by the math module (numpy's differs in 5 % of the arguments), the mean loudness rounded
+once, as by fsum. So equal bits from the objective give equal bits in the result. Runs whose
+generators would be in the same state may share one: what they draw is drawn once.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def minimize_batch(
     at_once = max(1, CACHED_BATS // params.population)
     for begin in range(0, runs, at_once):
         rows = slice(begin, begin + at_once)
-        swarms = Swarms(objective, region, params, rngs[rows], len(rngs[rows]))
+        swarms = Swarms(objective, region, params, rngs[rows])
         result.history[rows] = swarms.run()
         result.best_value[rows] = swarms.best_value
         result.best_x[rows] = swarms.best_x.T
@@ -93,12 +93,11 @@ class Swarms:
         region: Box | Disc,
         params: BatParams,
         rngs: Sequence[Generator],
-        runs: int,
         shared: Sequence[int] | None = None,
     ) -> None:
         """Take a generator per run, or fewer, of which run i draws from number shared[i]."""
         self.objective, self.region, self.params, self.rngs = objective, region, params, rngs
-        self.runs = runs
+        self.runs = len(rngs if shared is None else shared)
         # One generator for all is spread over them by arithmetic itself.
         self.shared = None if shared is None or len(rngs) == 1 else np.array(shared)
         self.d = len(region.span()[0])

@@ -216,23 +216,25 @@ def look_at_scan(world: World, sensor: SensorParams) -> Observation:
 
 
 Look = Callable[[World, SensorParams], Observation]
+GoOn = Callable[[World], bool]
+
+
+def to_the_end(_: World) -> bool:
+    """Go on, whatever the world is like."""
+    return True
 
 
 def course(
     scenario: Scenario,
-    *,
-    planner: PlannerParams | None = None,
-    sensor: SensorParams | None = None,
-    seed: int = 0,
-    go_on: Callable[[World], bool] = lambda _: True,
-    brain: PathPlanner | None = None,
-    look: Look = look,
+    planner: PlannerParams,
+    sensor: SensorParams,
+    seed: int,
+    go_on: GoOn,
+    brain: PathPlanner,
+    look: Look,
 ) -> Generator[Observation, None, Episode]:
     """run(), pausing before every decision: yields what is about to be decided upon."""
-    planner = planner or PlannerParams()
-    sensor = sensor or SensorParams()
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
-    brain = brain or algorithm_1(planner, seed)
     obs = look(world, sensor)
     yield obs
     ticks, truth = [brain.plan(obs)], [world.pose]
@@ -260,7 +262,7 @@ def run(
     planner: PlannerParams | None = None,
     sensor: SensorParams | None = None,
     seed: int = 0,
-    go_on: Callable[[World], bool] = lambda _: True,
+    go_on: GoOn = to_the_end,
     brain: PathPlanner | None = None,
     look: Look = look,
 ) -> Episode:
@@ -270,10 +272,9 @@ def run(
     the decisions instead of Algorithm 1, with planner's speed, step and tolerance; look is what
     it gets to know.
     """
-    under_way = course(
-        scenario, planner=planner, sensor=sensor, seed=seed, go_on=go_on, brain=brain, look=look
-    )
-    return ended(under_way)
+    planner = planner or PlannerParams()
+    brain = brain or algorithm_1(planner, seed)
+    return ended(course(scenario, planner, sensor or SensorParams(), seed, go_on, brain, look))
 
 
 def ended(under_way: Generator[object, None, T]) -> T:

@@ -31,7 +31,6 @@ class Nearby:
         self._radii: list[float] = []
         self._xs: list[list[float]] = []  # of them, a row per tick
         self._ys: list[list[float]] = []
-        self._found: tuple[int, Found] | None = None  # the tick asked for last
         self._picked_from = 0
         self._picked_at: Point = (math.nan, math.nan)
         self._reach_m, self._roam_m = math.nan, ROAM_M
@@ -51,10 +50,7 @@ class Nearby:
         ):
             self._pick(tick, position, reach_m)
             k = 0
-        if self._found is None or self._found[0] != tick:
-            centers = zip(self._xs[k], self._ys[k])
-            self._found = tick, (self._which, list(zip(centers, self._radii)))
-        return self._found[1]
+        return self._which, list(zip(zip(self._xs[k], self._ys[k]), self._radii))
 
     def _pick(self, tick: int, position: Point, reach_m: float) -> None:
         k = tick - self._centers_from
@@ -69,7 +65,6 @@ class Nearby:
             which = self._near(centers, tick, position, reach_m)
         self._xs, self._ys = centers[:, :, which].tolist()
         self._which, self._radii = which.tolist(), self._motion.radius_m[which].tolist()
-        self._found = None
         self._picked_from, self._picked_at, self._reach_m = tick, position, reach_m
 
     def _near(self, centers: Array, tick: int, position: Point, reach_m: float) -> Array:

@@ -313,7 +313,7 @@ class Planner:
         self._swarm: BatSwarm | None = None
         self._stamp_ns = 0
         self._watch = JumpWatch()
-        self._foreseen: tuple[Start, PlannerParams, Step] | None = None
+        self._foreseen: tuple[tuple[Start, PlannerParams], Step] | None = None
 
     def reset(self) -> None:
         """Forget everything but parameters and seed (a jump of time, a new trip)."""
@@ -337,11 +337,9 @@ class Planner:
         if params.swarm is Swarm.PERSISTENT:
             return self._fly_on(position, goal)
         start = Start(position, goal, self.seed, self._stamp_ns)
-        if self._foreseen is not None:
-            foreseen, told, step = self._foreseen
-            self._foreseen = None
-            if foreseen == start and (told is params or told == params):
-                return step
+        foreseen, self._foreseen = self._foreseen, None
+        if foreseen is not None and foreseen[0] == (start, params):
+            return foreseen[1]
         return fresh_step(start, params.step_length_m, params.bat)
 
     def start(self, obs: Observation) -> Start | None:
@@ -354,7 +352,7 @@ class Planner:
 
     def foresee(self, start: Start, params: PlannerParams, step: Step) -> None:
         """Take what fresh_steps() found; plan() uses it if it is just what it would ask for."""
-        self._foreseen = start, params, step
+        self._foreseen = (start, params), step
 
     def _fly_on(self, position: Point, goal: Point) -> Step:
         """Fig. 1 read literally: bat.iterations per robot step, within the robot's reach.

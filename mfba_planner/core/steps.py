@@ -53,11 +53,11 @@ def fresh_step(start: Start, step_length_m: float, bat: BatParams) -> Step:
 def fresh_steps(starts: Sequence[Start], step_length_m: float, bat: BatParams) -> list[Step]:
     """fresh_step() of each start, to the last bit, all bats flown at once."""
     found: list[Step] = [(start.goal, ()) for start in starts]
-    away = [i for i, s in enumerate(starts) if distance(s.position, s.goal) > step_length_m]
+    away = {i: s for i, s in enumerate(starts) if distance(s.position, s.goal) > step_length_m}
     if not away:
         return found
-    here = np.array([starts[i].position for i in away]).T
-    to_goal = np.array([starts[i].goal for i in away]).T - here
+    here = np.array([start.position for start in away.values()]).T
+    to_goal = np.array([start.goal for start in away.values()]).T - here
 
     def cost(x: Array) -> Array:
         dx, dy = x[..., 0] - to_goal[0, :, None], x[..., 1] - to_goal[1, :, None]
@@ -65,17 +65,16 @@ def fresh_steps(starts: Sequence[Start], step_length_m: float, bat: BatParams) -
         return np.sqrt(squares)
 
     # Who has the same seed at the same moment draws the same numbers.
-    draws = [starts[i][2:] for i in away]
-    numbers = {draw: number for number, draw in enumerate(dict.fromkeys(draws))}
-    rngs = [stream(*draw) for draw in numbers]
+    numbers: dict[tuple[int, int], int] = {}
+    shared = [numbers.setdefault((s.seed, s.stamp_ns), len(numbers)) for s in away.values()]
     reach = Disc(step_length_m)
-    swarms = Swarms(cost, reach, bat, rngs, len(away), [numbers[draw] for draw in draws])
+    swarms = Swarms(cost, reach, bat, [stream(*draw) for draw in numbers], shared)
     swarms.run()
     best = swarms.best_x.T.tolist()
     if bat.bounds is Bounds.NONE:
         best = [reach.clamp(x) for x in best]
     xs, ys = (swarms.candidates + here[:, :, None]).tolist()
-    for i, (bx, by), x, y in zip(away, best, xs, ys):
-        px, py = starts[i].position
+    for (i, start), (bx, by), x, y in zip(away.items(), best, xs, ys):
+        px, py = start.position
         found[i] = (px + bx, py + by), tuple(zip(x, y))
     return found

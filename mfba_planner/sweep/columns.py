@@ -69,11 +69,8 @@ COLUMNS = {**_KEY, **_MADE, **_JUDGED}
 # Clocks differ from run to run: these stand in a table of their own.
 TIMINGS: dict[str, tuple[type, str]] = {
     **_KEY,
-    "decision_us": (
-        float,
-        "decision time, median of the ticks, us; NaN for runs made at once",
-    ),
-    "decision_max_us": (float, "longest decision, us; NaN likewise"),
+    "decision_us": (float, "decision time, median of the ticks, us; none of runs made at once"),
+    "decision_max_us": (float, "longest decision, us; none likewise"),
     "wall_ms": (float, "wall time of the whole run, ms; its share of those made at once"),
 }
 

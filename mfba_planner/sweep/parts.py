@@ -45,8 +45,8 @@ class Runs:
         """Make the runs; COLUMNS (without the oracle's) and TIMINGS."""
         batches: list[tuple[Run, ...]] = [(run,) for run in self.runs]
         if flies_together(self.runs[0].planner, self.setting):
-            first, others = self.runs[:1], self.runs[1:]  # one alone: what does a decision take?
-            batches = [first, others] if others else [first]
+            # One alone: what does a decision take?
+            batches = [batch for batch in (self.runs[:1], self.runs[1:]) if batch]
         found = list(self._made(batches))
         names = dict.fromkeys(name for row in found for name in row)
         return {name: [row.get(name) for row in found] for name in names}

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import repeat
 from typing import cast
 
-from ..core.episode import Episode, Look, Outcome, course, ended, look
+from ..core.episode import Episode, Look, Outcome, course, ended, look, to_the_end
 from ..core.planner import NANO, Observation, Planner, Swarm, fly_together
 from ..planners.registry import known
 from .guard import Guard, HungError, PlannerFault
@@ -55,7 +54,7 @@ def play_together(runs: Sequence[Run], setting: Setting) -> Iterator[Played]:
 
 def _tick_by_tick(runs: Sequence[Run], setting: Setting) -> list[Played]:
     guards = [Guard(setting.params) for _ in runs]
-    left = {i: _playing(*run, False) for i, run in enumerate(zip(runs, repeat(setting), guards))}
+    left = {i: _playing(run, setting, guards[i], False) for i, run in enumerate(runs)}
     found: dict[int, Played] = {}
     while left:
         seen: dict[int, Observation] = {}
@@ -86,11 +85,12 @@ def _playing(
         brain = guard.take(lambda: setting.brain(run))
         episode = yield from course(
             scenario,
-            planner=setting.params,
-            sensor=setting.sensor,
-            seed=run.seed,
-            brain=guard,
-            look=_look(brain, run, setting, whole),
+            setting.params,
+            setting.sensor,
+            run.seed,
+            to_the_end,
+            guard,
+            _look(brain, run, setting, whole),
         )
     except (PlannerFault, HungError) as error:
         fault = str(error)
