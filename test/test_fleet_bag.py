@@ -73,8 +73,8 @@ def lines(said: Said, *args: str | Path, code: int = 0) -> list[str]:
 
 
 def test_its_episodes_are_the_core_s(bag: Path, core: dict[str, Episode]) -> None:
-    scenario, seed, episodes = read_recording(bag)
-    assert (scenario, seed, list(episodes)) == (TRIO, 5, ["a", "b", "c"])
+    scenario, seed, episodes, missed = read_recording(bag)
+    assert (scenario, seed, list(episodes), missed) == (TRIO, 5, ["a", "b", "c"], {})
     for name, episode in episodes.items():
         assert digest(episode.ticks) == digest(core[name].ticks)
         assert episode.truth == core[name].truth != ()

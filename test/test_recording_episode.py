@@ -139,9 +139,9 @@ def test_a_decision_that_is_there_twice_counts_once(bag: Path, tmp_path: Path) -
 
 
 def test_the_summary_is_that_of_the_episode(bag: Path) -> None:
-    episode, result, found = summarize(bag)
+    episode, result, found, missed = summarize(bag)
     whole = read_episode(bag)
-    assert (result, found) == (evaluate(whole), digest(whole.ticks))
+    assert (result, found, missed) == (evaluate(whole), digest(whole.ticks), "")
     assert (episode.outcome, episode.ticks) == (whole.outcome, whole.ticks[-1:])
 
 

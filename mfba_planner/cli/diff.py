@@ -12,38 +12,46 @@ from ..core.errors import BagError
 from ..core.metrics import evaluate
 from ..core.options import flatten
 from ..outputs import bag_in
-from ..recording.episode import read_recording
+from ..recording.episode import Recording, read_recording
+from ..recording.left_out import tell
 from ..recording.robots import of_robot
 from ..report.table import comparison_text
 from ..verification.compare import first_divergence, side_by_side
 
 
 def main(args: list[str]) -> int:
-    """Compare two bags; 0 when all decisions are equal, 1 when not, as diff does."""
+    """Compare two bags; 0 when all decisions are equal, 1 when not, as diff does.
+
+    Decisions that one bag has and cannot show, and the other has not, are not equal.
+    """
     parser = Parser(prog="mfba diff", description="Say where the decisions of two bags differ.")
     for name in ("left", "right"):
         parser.add_bag(name)
     parser.add_robots()
     given = parser.parse(args)
-    left, right = (
-        read_recording(bag_in(path), given.robots).episodes for path in (given.left, given.right)
-    )
-    if left.keys() != right.keys():
+    bags = [bag_in(path) for path in (given.left, given.right)]
+    one, other = (read_recording(bag, given.robots) for bag in bags)
+    if one.episodes.keys() != other.episodes.keys():
         raise BagError(
             f"{given.right}: holds other robots than {given.left}; name one that both have with "
             "--robot"
         )
-    differ = [_compare(given, robot, left[robot], right[robot]) for robot in left]
+    tell(bags[0], one.missed)
+    tell(bags[1], other.missed)
+    differ = [_compare(given, robot, one, other) for robot in one.episodes]
     return int(any(differ))
 
 
-def _compare(given: argparse.Namespace, robot: str, left: Episode, right: Episode) -> bool:
+def _compare(given: argparse.Namespace, robot: str, one: Recording, other: Recording) -> bool:
     """Print how two runs of a robot differ; whether they do."""
+    left, right = one.episodes[robot], other.episodes[robot]
     found = first_divergence(left.ticks, right.ticks)
     if found is None:
-        said = f"identical, {len(left.ticks)} decisions, digest {digest(left.ticks)}"
-        print(of_robot(robot, said))
-        return False
+        alike = one.missed.get(robot) == other.missed.get(robot)
+        said = f"{len(left.ticks)} decisions, digest {digest(left.ticks)}"
+        how = "identical" if alike else "identical but for what is left out"
+        print(of_robot(robot, f"{how}, {said}"))
+        return not alike
     for name, a, b in _settings(left, right):
         print(of_robot(robot, f"{name}: {a} against {b}"))
     names = (str(given.left), str(given.right))

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from ..arguments import Parser
 from ..outputs import bag_in
 from ..recording.episode import summaries
+from ..recording.left_out import tell
 from ..recording.robots import ALONE, chosen
 from ..report.result import read_result
 
@@ -35,4 +37,8 @@ def _digests(path: Path, robots: list[str]) -> dict[str, str]:
     if path.suffix == ".json":
         chosen(path, [ALONE], robots)
         return {ALONE: str(read_result(path)["digest"])}
-    return {name: run.digest for name, run in summaries(bag_in(path), robots).items()}
+    bag = bag_in(path)
+    runs = summaries(bag, robots)
+    # Not among the lines that others read.
+    tell(bag, {name: run.missed for name, run in runs.items()}, sys.stderr)
+    return {name: run.digest for name, run in runs.items()}

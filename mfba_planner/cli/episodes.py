@@ -23,6 +23,7 @@ from ..core.world import Scenario
 from ..outputs import bag_in
 from ..planners.method import simulate
 from ..recording.episode import Recording, read_recording
+from ..recording.left_out import tell
 from ..recording.robots import ALONE, chosen
 from ..report.result import read_result
 from ..resources import scenario_names
@@ -47,14 +48,14 @@ class Named(NamedTuple):
 
 
 def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> Named:
-    """Read or make the runs; raises BagError, InputError."""
-    if len(paths) == 1:
-        scenario, _, episodes = _runs(paths[0], robots)
-        if ALONE not in episodes:
-            return Named(list(episodes.items()), scenario.robot_names)
+    """Read or make the runs, and say what is left out of them; raises BagError, InputError."""
+    recordings = [_runs(path, robots) for path in paths]
+    first = recordings[0]
+    if len(paths) == 1 and ALONE not in first.episodes:
+        return Named(list(first.episodes.items()), first.scenario.robot_names)
     runs = []
-    for path in paths:
-        for robot, episode in _runs(path, robots).episodes.items():
+    for path, recording in zip(paths, recordings):
+        for robot, episode in recording.episodes.items():
             runs.append((".".join(filter(None, (_name(path), robot))), episode))
     return Named(runs)
 
@@ -72,10 +73,12 @@ def _runs(path: Path, robots: Sequence[str]) -> Recording:
     if bag == path and not any(path.glob("*.mcap")) and (path / _RESULT).is_file():
         path = path / _RESULT
     if path.suffix != ".json":
-        return read_recording(bag, robots)
+        recording = read_recording(bag, robots)
+        tell(bag, recording.missed)
+        return recording
     chosen(path, [ALONE], robots)
     episode = _again(path)
-    return Recording(episode.scenario, episode.seed, {ALONE: episode})
+    return Recording(episode.scenario, episode.seed, {ALONE: episode}, {})
 
 
 def _again(path: Path) -> Episode:

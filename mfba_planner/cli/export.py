@@ -14,6 +14,7 @@ from ..arguments import Parser
 from ..core.errors import BagError, ConfigError
 from ..outputs import bag_in, new_file
 from ..recording.decisions import deciders
+from ..recording.left_out import tell
 from ..recording.reader import BagReader
 from ..recording.robots import chosen
 from ..recording.table import COLUMNS, Row, read_rows
@@ -38,13 +39,16 @@ def main(args: list[str]) -> int:
     write = writers.get(found.table.suffix)
     if write is None:
         raise ConfigError(f"{found.table}: unknown kind of table; give a name in .csv or .parquet")
+    missed: dict[str, str] = {}
     with BagReader(bag_in(found.bag)) as reader:
-        rows = read_rows(reader, chosen(reader.path, deciders(reader), found.robots))
+        robots = chosen(reader.path, deciders(reader), found.robots)
+        rows = read_rows(reader, robots, missed)
         first = next(rows, None)
         if first is None:
             raise BagError(f"{found.bag}: holds no decision to export; give another bag")
         with new_file(found.table) as file:
             count = write(file, list(first), chain([first], rows))
+    tell(reader.path, missed)
     print(f"wrote {found.table}: {count} rows")
     return 0
 

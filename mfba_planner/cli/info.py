@@ -10,6 +10,7 @@ from ..outputs import bag_in
 from ..recording.configuration import ATTACHMENT_NAME
 from ..recording.episode import Summary, summaries
 from ..recording.info import describe, format_info
+from ..recording.left_out import tell
 from ..recording.robots import ALONE
 from ..report.roster import fleet_text
 
@@ -29,6 +30,7 @@ def main(args: list[str]) -> int:
         else:
             print()
             _show(runs)
+            tell(bag, {robot: run.missed for robot, run in runs.items()})
     return 0
 
 

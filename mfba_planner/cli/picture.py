@@ -8,6 +8,7 @@ from pathlib import Path
 from ..arguments import Parser
 from ..outputs import bag_in
 from ..recording.episode import read_recording
+from ..recording.left_out import tell
 
 
 def main(args: list[str]) -> int:
@@ -19,7 +20,9 @@ def main(args: list[str]) -> int:
     parser.add_argument("png", type=Path, metavar="PNG", help="file to create")
     parser.add_robots()
     found = parser.parse(args)
-    scenario, seed, runs = read_recording(bag_in(found.bag), found.robots)
+    bag = bag_in(found.bag)
+    scenario, seed, runs, missed = read_recording(bag, found.robots)
+    tell(bag, missed)
     # What draws takes its time: only where there is something to draw.
     if len(runs) == 1:
         from ..report.figure import draw_run

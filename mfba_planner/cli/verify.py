@@ -119,7 +119,7 @@ def _fleet_again(
     bag: Path, reports: dict[str, Report], settings: list[str]
 ) -> Iterator[tuple[str, Episode, Episode]]:
     """All robots at once, since they shared a world; yields those that were asked for."""
-    scenario, seed, episodes = read_recording(bag)
+    scenario, seed, episodes, _ = read_recording(bag)
     first = next(iter(episodes.values()))
     planner, sensor = with_settings(first.planner, first.sensor, settings)
     last_ns = max(episode.ticks[-1].stamp_ns for episode in episodes.values())

@@ -11,7 +11,9 @@ from ..core.episode import Episode, Outcome
 from ..core.errors import MfbaError
 from ..core.geometry import distance
 from ..core.metrics import Result, evaluate
-from ..recording.episode import read_episode
+from ..recording.episode import read_recording
+from ..recording.left_out import tell
+from ..recording.robots import ALONE
 from .attempt import Attempt
 
 
@@ -51,11 +53,15 @@ def conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> Co
     from ..report.result import result_to_dict, write_result
 
     directory = attempt.directory
+    left_out = ""
     if episode is None:
-        episode = read_episode(directory.bag)
+        recording = read_recording(directory.bag)
+        tell(directory.bag, recording.missed)
+        episode, left_out = recording.episodes[ALONE], recording.missed.get(ALONE, "")
     result = evaluate(episode)
     speed = result.ticks / attempt.wall_s if attempt.wall_s else None
     extra = {"wall_s": attempt.wall_s, "ticks_per_s": speed, "failure": failure or None}
+    extra |= {"left_out": left_out} if left_out else {}
     write_result(directory.result, result_to_dict(episode, extra))
     if attempt.order.picture:
         from ..report.figure import draw_run

@@ -8,6 +8,7 @@ import sys
 from ..core.errors import MfbaError
 from ..core.metrics import evaluate
 from ..recording.episode import read_recording
+from ..recording.left_out import tell
 from ..report.roster import fleet_text, why_no_success
 from .attempt import Attempt
 
@@ -22,11 +23,14 @@ def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
     from ..report.result import result_to_dict, write_result
 
     directory, config = attempt.directory, attempt.order.config
-    runs = read_recording(directory.bag).episodes
+    recording = read_recording(directory.bag)
+    tell(directory.bag, recording.missed)
+    runs = recording.episodes
     results = [evaluate(episode) for episode in runs.values()]
     extra = {"fleet_seed": config.seed, "wall_s": attempt.wall_s, "failure": failure or None}
     for name, episode in runs.items():
-        write_result(directory.path / f"{name}.json", result_to_dict(episode, extra))
+        left_out = {"left_out": recording.missed[name]} if name in recording.missed else {}
+        write_result(directory.path / f"{name}.json", result_to_dict(episode, extra | left_out))
     if attempt.order.picture:
         draw_fleet(config.scenario, config.seed, runs, directory.picture)
     sys.stdout.write(fleet_text(list(runs), results))

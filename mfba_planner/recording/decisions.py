@@ -11,6 +11,7 @@ from ..core.errors import BagError, InputError
 from ..core.planner import Decision
 from ..core.sensing import Ranges
 from ..messages import decision, sector_ranges, stamp_ns
+from .left_out import left_out
 from .reader import BagReader, DecodedMessage
 from .robots import ALONE, below, heard_by_robot, of_robot
 
@@ -40,12 +41,15 @@ def require_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> No
             raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
 
 
-def stream_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> Iterator[Answer]:
+def stream_decisions(
+    reader: BagReader, robots: Sequence[str], missed: dict[str, str]
+) -> Iterator[Answer]:
     """Yield each robot's decisions in the order of the bag, one for each stamp, in one pass.
 
-    The first counts: a later one on its stamp only says that its inputs have become stale.
-    Raises BagError for a bag without decisions, for one that is garbled, and where the sectors
-    of a decision are missing.
+    The first counts: a later one on its stamp only says that its inputs have become stale. Those
+    that came after the last sectors of the bag are left out, which `missed` says by robot in the
+    end. Raises BagError for a bag without decisions, for one that is garbled, and where the
+    sectors of a decision are missing though later ones are there.
     """
     require_decisions(reader, robots)
     pairs = {robot: _Pairs() for robot in robots}
@@ -55,11 +59,18 @@ def stream_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> Ite
             said, sectors = pair
             yield Answer(_decision(reader, said, sectors), sectors, robot)
         if len(pairs[robot].decisions) > REMEMBERED:
-            break
-    for robot in robots:
-        for stamp in pairs[robot].decisions:
-            said = of_robot(robot, f"no sectors at stamp {stamp} ns; was the bag edited?")
-            raise BagError(f"{reader.path}: {said}")
+            raise _hole(reader, robot, next(iter(pairs[robot].decisions)))
+    for robot, waiting in pairs.items():
+        for stamp in waiting.decisions:
+            if not waiting.ended_before(stamp):
+                raise _hole(reader, robot, stamp)
+        if waiting.decisions:
+            missed[robot] = left_out(waiting.decisions, [SECTORS])
+
+
+def _hole(reader: BagReader, robot: str, stamp: int) -> BagError:
+    said = of_robot(robot, f"no sectors at stamp {stamp} ns; was the bag edited?")
+    return BagError(f"{reader.path}: {said}")
 
 
 class _Pairs:
@@ -70,10 +81,17 @@ class _Pairs:
         self.decisions: OrderedDict[int, Any] = OrderedDict()
         self._answered: OrderedDict[int, None] = OrderedDict()
         self._waiting = {SECTORS: self.sectors, DECISION: self.decisions}
+        self._last_sectors_ns = -1
+
+    def ended_before(self, stamp: int) -> bool:
+        """Whether there were sectors with their decisions, but none as late as this stamp."""
+        return bool(self._answered) and self._last_sectors_ns < stamp
 
     def take(self, message: DecodedMessage) -> tuple[Any, Any] | None:
         """Take the next message; (decision, sectors) where both have come now."""
         stamp = stamp_ns(message.message.header.stamp)
+        if message.topic == SECTORS:
+            self._last_sectors_ns = max(self._last_sectors_ns, stamp)
         if stamp in self._answered:
             return None
         self._waiting[message.topic].setdefault(stamp, message.message)
@@ -87,10 +105,12 @@ class _Pairs:
         return pair
 
 
-def rising_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> Iterator[Answer]:
+def rising_decisions(
+    reader: BagReader, robots: Sequence[str], missed: dict[str, str]
+) -> Iterator[Answer]:
     """stream_decisions; raises BagError where a robot's stamp goes back."""
     last_ns = dict.fromkeys(robots, -1)
-    for answer in stream_decisions(reader, robots):
+    for answer in stream_decisions(reader, robots, missed):
         stamp, before_ns = answer.decision.stamp_ns, last_ns[answer.robot]
         if stamp < before_ns:
             raise BagError(

@@ -32,6 +32,7 @@ class Recording(NamedTuple):
     scenario: Scenario
     seed: int
     episodes: dict[str, Episode]  # in the scenario's order; a robot alone is called ALONE
+    missed: dict[str, str]  # of whom the last decisions are left out: which, and why
 
 
 def read_recording(
@@ -39,16 +40,18 @@ def read_recording(
 ) -> Recording:
     """The Episodes of a bag, of all its robots or those named; the others move as they went.
 
-    `salvage` also reads a bag that was never closed. Raises BagError for a bag without
-    configuration or without decisions, where a decision's inputs are missing, and for a robot
-    that is not there.
+    Decisions after the end of their inputs are left out and named in `missed`. `salvage` also
+    reads a bag that was never closed. Raises BagError for a bag without configuration or without
+    decisions, where a decision's inputs are missing before their end, and for a robot that is
+    not there.
     """
     with BagReader(path, salvage=salvage) as reader:
         scenario, seed, setups = read_setups(reader)
         names = list(setups)
         wanted = chosen(reader.path, names, robots)
         ticks: dict[str, dict[int, Decision]] = {name: {} for name in names}
-        for found in stream_decisions(reader, names):
+        missed: dict[str, str] = {}
+        for found in stream_decisions(reader, names, missed):
             ticks[found.robot].setdefault(found.decision.stamp_ns, found.decision)
         truth = _read_truth(reader, names)
     episodes = {
@@ -60,7 +63,8 @@ def read_recording(
         tick_ns = next(iter(setups.values())).planner.tick_ns
         worlds = dict(zip(names, worlds_seen(scenario, poses, tick_ns)))
         episodes = {name: replace(episodes[name], scenario=worlds[name]) for name in wanted}
-    return Recording(scenario, seed, episodes)
+    told = {name: missed[name] for name in episodes if name in missed}
+    return Recording(scenario, seed, episodes, told)
 
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
@@ -71,11 +75,15 @@ def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
 
 
 class Summary(NamedTuple):
-    """A run in short: episode has its last tick only where the bag was streamed."""
+    """A run in short: episode has its last tick only where the bag was streamed.
+
+    missed says which of the last decisions are left out, and why, "" where none is.
+    """
 
     episode: Episode
     result: Result
     digest: str
+    missed: str
 
 
 def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
@@ -85,14 +93,16 @@ def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
     """
     with BagReader(path, salvage=salvage) as reader:
         setup, truth = read_setup(reader), _read_truth(reader, [ALONE])[ALONE]
-        stream = (found.decision for found in rising_decisions(reader))
+        missed: dict[str, str] = {}
+        stream = (found.decision for found in rising_decisions(reader, [ALONE], missed))
         first = next(stream)  # or it raises
         tally, hashed = Tally(setup.episode((first,))), Digest()
         for tick in chain([first], stream):
             tally.add(tick, truth.get(tick.stamp_ns))
             hashed.add(tick)
     episode = setup.episode((tick,), truth)
-    return Summary(episode, tally.result(episode.outcome), hashed.hexdigest())
+    result = tally.result(episode.outcome)
+    return Summary(episode, result, hashed.hexdigest(), missed.get(ALONE, ""))
 
 
 def summaries(
@@ -105,8 +115,11 @@ def summaries(
     if names == [ALONE]:
         return {ALONE: summarize(path, salvage=salvage)}
     # What the others did is part of what happened to each, so all has to be read first.
-    episodes = read_recording(path, robots, salvage=salvage).episodes
-    return {name: Summary(e, evaluate(e), digest(e.ticks)) for name, e in episodes.items()}
+    found = read_recording(path, robots, salvage=salvage)
+    return {
+        name: Summary(e, evaluate(e), digest(e.ticks), found.missed.get(name, ""))
+        for name, e in found.episodes.items()
+    }
 
 
 def _read_truth(reader: BagReader, robots: Sequence[str]) -> dict[str, dict[int, Pose2D]]:

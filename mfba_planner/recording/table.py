@@ -37,13 +37,13 @@ COLUMNS: dict[str, tuple[type, str]] = {
 }
 
 
-def read_rows(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> Iterator[Row]:
+def read_rows(reader: BagReader, robots: Sequence[str], missed: dict[str, str]) -> Iterator[Row]:
     """Yield the rows under rising stamps, those of a stamp in the order of robots.
 
-    Raises BagError as rising_decisions does.
+    Leaves out and raises BagError as rising_decisions does.
     """
     first_ns: int | None = None
-    answers = rising_decisions(reader, robots)
+    answers = rising_decisions(reader, robots, missed)
     for stamp, found in groupby(answers, lambda answer: answer.decision.stamp_ns):
         first_ns = stamp if first_ns is None else first_ns
         for answer in sorted(found, key=lambda answer: robots.index(answer.robot)):

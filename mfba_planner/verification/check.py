@@ -96,7 +96,8 @@ def verify_each(path: str | Path, robots: Sequence[str] = ()) -> dict[str, Repor
     for name in names:
         setup = setups[name]
         tick_ns = setup.planner.tick_ns if setup.lockstep else None
-        found[name] = _check(setup, gather(messages.pop(name), tick_ns, setup.odom_frame))
+        evidence = gather(messages.pop(name), tick_ns, setup.odom_frame, inputs=_inputs(setup))
+        found[name] = _check(setup, evidence)
     return found
 
 
@@ -111,8 +112,12 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
     recorded, decided = [], []
     unchecked, errand = 0, ""
     for tick in evidence.ticks:
-        if DECISION not in tick.said or SECTORS not in tick.said:
+        if DECISION not in tick.said or tick.stamp_ns in evidence.left_out:
             continue  # named by evidence where it must not be
+        if SECTORS not in tick.said:
+            if not setup.lockstep:  # there evidence names it
+                faults.append(f"stamp {tick.stamp_ns} ns: no {SECTORS}")
+            continue
         ranges = or_refused(read_sectors, tick.said[SECTORS])
         try:
             was = read_decision(tick.said[DECISION], () if isinstance(ranges, str) else ranges)
@@ -155,6 +160,15 @@ def _check(setup: Setup, evidence: Evidence) -> Report:
         faults=tuple(faults),
         notes=tuple(notes),
     )
+
+
+def _inputs(setup: Setup) -> list[str]:
+    """What a decision is decided again on, of its own stamp."""
+    return [
+        SECTORS,
+        *([ODOM] if setup.lockstep else []),  # otherwise the decision says where it was
+        *([SCAN] if setup.planner.tracks_scan else []),
+    ]
 
 
 def _with_scan(setup: Setup, tick: Tick, obs: Observation) -> Observation:

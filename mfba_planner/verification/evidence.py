@@ -12,6 +12,7 @@ from ..core.errors import InputError
 from ..core.geometry import Point
 from ..messages import goal_point, stamp_ns, waypoint_points
 from ..recording.decisions import DECISION, SECTORS, ranges_seen, require_decisions
+from ..recording.left_out import left_out
 from ..recording.reader import BagReader, DecodedMessage
 from ..recording.robots import heard_by_robot
 
@@ -38,6 +39,7 @@ class Evidence:
     goals: list[Point]
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    left_out: frozenset[int] = frozenset()  # stamps of decisions after the end of their inputs
 
 
 def collect(reader: BagReader, robots: Sequence[str]) -> dict[str, list[DecodedMessage]]:
@@ -52,10 +54,17 @@ def collect(reader: BagReader, robots: Sequence[str]) -> dict[str, list[DecodedM
     return found
 
 
-def gather(messages: Iterable[DecodedMessage], tick_ns: int | None, frame: str = "") -> Evidence:
+def gather(
+    messages: Iterable[DecodedMessage],
+    tick_ns: int | None,
+    frame: str = "",
+    *,
+    inputs: Sequence[str],
+) -> Evidence:
     """Join a robot's messages; tick_ns is the duration of a tick, None where it is not fixed.
 
-    frame is the one that goals must be in, "" for any.
+    frame is the one that goals must be in, "" for any; inputs are what a decision is decided
+    again on.
     """
     heard: dict[str, list[Any]] = {name: [] for name in HEARD}
     found = Evidence(ticks=[], goals=[])
@@ -75,6 +84,7 @@ def gather(messages: Iterable[DecodedMessage], tick_ns: int | None, frame: str =
     alike = bool(tick_ns)
     _join_by_order(found, ticks, STEP, heard[STEP], TWIST, heard[TWIST], all_alike=alike)
     found.ticks = [ticks[stamp] for stamp in sorted(ticks)]
+    _leave_out(found, inputs)
     if tick_ns:
         _look_for_gaps(found, tick_ns, (*STAMPED, *([SCAN] if heard[SCAN] else []), TWIST))
     return found
@@ -147,6 +157,22 @@ def _join_by_order(
             found.faults.append(f"{topic}: stamp {stamp} ns is there twice, and not alike")
 
 
+def _leave_out(found: Evidence, inputs: Sequence[str]) -> None:
+    """Name the decisions after the end of an input, as recording/left_out.py has it.
+
+    Not where that would be all of them, nor for an input that was never recorded.
+    """
+    last_ns = {name: tick.stamp_ns for tick in found.ticks for name in tick.said}
+    decided = [tick.stamp_ns for tick in found.ticks if DECISION in tick.said]
+    ended = {
+        name: last_ns[name] for name in inputs if last_ns.get(name, decided[-1]) < decided[-1]
+    }
+    stamps = [stamp for stamp in decided if any(last < stamp for last in ended.values())]
+    if stamps and len(stamps) < len(decided):
+        found.left_out = frozenset(stamps)
+        found.notes.append(left_out(stamps, ended))
+
+
 def _look_for_gaps(found: Evidence, tick_ns: int, needed: tuple[str, ...]) -> None:
     """In lockstep each tick follows the other, and each has all its messages."""
     first = found.ticks[0].stamp_ns
@@ -162,5 +188,5 @@ def _look_for_gaps(found: Evidence, tick_ns: int, needed: tuple[str, ...]) -> No
             )
     for tick in found.ticks[:-1]:  # the last one may have been cut off
         absent = [topic for topic in needed if topic not in tick.said]
-        if absent:
+        if absent and tick.stamp_ns not in found.left_out:
             found.faults.append(f"stamp {tick.stamp_ns} ns: no {', '.join(absent)}")

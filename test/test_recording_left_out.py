@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A kill took the last inputs of decisions: those are left out and named, a hole is refused."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from edited_bags import Edit, record, rewrite, swapped
+from test_fleet_bag import TRIO
+
+from mfba_planner import cli
+from mfba_planner.core.digest import digest
+from mfba_planner.core.episode import Episode, Outcome
+from mfba_planner.core.errors import BagError
+from mfba_planner.core.robot import Lidar, Robot
+from mfba_planner.launcher.attempt import Attempt
+from mfba_planner.launcher.conclusion import conclude
+from mfba_planner.launcher.directory import RunDirectory
+from mfba_planner.launcher.fleet import conclude_fleet
+from mfba_planner.launcher.options import read_order
+from mfba_planner.launcher.screen import Screen
+from mfba_planner.launcher.stop import StopRequest
+from mfba_planner.recording import decisions
+from mfba_planner.recording.episode import read_episode, read_recording, summaries, summarize
+from mfba_planner.recording.robots import ALONE
+from mfba_planner.scenarios import load_scenario, scenario_to_json
+from mfba_planner.verification.check import verify
+
+SECTORS, VECTOR, ODOM, DECISION = "/sectors", "/sensory_vector", "/odom", "/planner/decision"
+SENSOR = (SECTORS, VECTOR)  # what virtual_sensor says of a tick
+Said = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("left_out") / "bag", "empty", 2)
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("fleet") / "bag", scenario_to_json(TRIO), 5)
+
+
+def without(topics: Iterable[str], *indices: int) -> Edit:
+    """Without these messages of each of the topics."""
+
+    def edit(messages: list[Any]) -> list[Any]:
+        gone = set()
+        for topic in topics:
+            places = [k for k, message in enumerate(messages) if message.topic == topic]
+            gone |= {places[index] for index in indices}
+        return [message for k, message in enumerate(messages) if k not in gone]
+
+    return edit
+
+
+def then(*edits: Edit) -> Edit:
+    def edit(messages: list[Any]) -> list[Any]:
+        for each in edits:
+            messages = list(each(messages))
+        return messages
+
+    return edit
+
+
+def in_real_time(content: Any) -> Any:
+    """The configuration of a run whose stamps are not checked for gaps."""
+    content["nodes"]["planner"]["lockstep"] = False
+    return content
+
+
+def of_c(topics: Iterable[str]) -> list[str]:
+    return [f"/c{topic}" for topic in topics]
+
+
+def said_of(whole: Episode, count: int, topics: str = SECTORS) -> str:
+    stamp = whole.ticks[-count].stamp_ns
+    return (
+        f"left out the last {count} decisions, from stamp {stamp} ns on: {topics} ended before "
+        "(a node that was killed?)"
+    )
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_decisions_after_the_end_of_their_sectors_are_left_out(
+    bag: Path, tmp_path: Path, count: int
+) -> None:
+    cut = rewrite(bag, tmp_path / "cut", without([SECTORS], *range(-count, 0)))
+    whole, (_, _, episodes, missed) = read_episode(bag), read_recording(cut)
+    assert episodes[ALONE].ticks == whole.ticks[:-count]
+    assert (whole.outcome, episodes[ALONE].outcome) == (Outcome.GOAL_REACHED, Outcome.INTERRUPTED)
+    assert missed == {ALONE: said_of(whole, count)}
+    assert read_episode(cut) == episodes[ALONE]
+    assert summarize(cut)[2:] == (digest(whole.ticks[:-count]), missed[ALONE])
+
+
+def test_a_fleet_s_other_robots_lose_nothing(fleet: Path, tmp_path: Path) -> None:
+    cut = rewrite(fleet, tmp_path / "cut", without(of_c([SECTORS]), -1))
+    whole, (_, _, episodes, missed) = read_recording(fleet).episodes, read_recording(cut)
+    assert episodes["a"].ticks == whole["a"].ticks
+    assert episodes["b"].ticks == whole["b"].ticks
+    assert episodes["c"].ticks == whole["c"].ticks[:-1]
+    assert episodes["c"].truth == whole["c"].truth[:-1]
+    assert missed == {"c": said_of(whole["c"], 1)}
+    assert [s.missed for s in summaries(cut).values()] == ["", "", missed["c"]]
+    assert read_recording(cut, ["a"]).missed == {}
+
+
+def test_a_bag_that_was_never_closed_is_read_so_too(bag: Path, tmp_path: Path) -> None:
+    cut = rewrite(bag, tmp_path / "cut", without([SECTORS], -1))
+    killed = tmp_path / "killed.mcap"
+    killed.write_bytes((cut / "cut_0.mcap").read_bytes()[:-200])
+    assert read_recording(killed, salvage=True).missed == read_recording(cut).missed != {}
+
+
+@pytest.mark.parametrize("gone", [(5,), (5, -1), (0,), (-2,), tuple(range(1, 6))])
+def test_a_hole_is_refused_whatever_the_end_lacks(
+    bag: Path, tmp_path: Path, gone: tuple[int, ...]
+) -> None:
+    cut = rewrite(bag, tmp_path / "cut", without([SECTORS], *gone))
+    stamp = read_episode(bag).ticks[gone[0]].stamp_ns
+    for read in (read_recording, summarize):
+        with pytest.raises(BagError, match=f"cut: no sectors at stamp {stamp} ns; was the bag ed"):
+            read(cut)
+
+
+@pytest.mark.parametrize("before_the_end", [10, 2])
+def test_sectors_that_changed_places_are_no_hole(
+    bag: Path, tmp_path: Path, before_the_end: int
+) -> None:
+    whole = read_recording(bag)
+    index = len(whole.episodes[ALONE].ticks) - before_the_end
+    assert read_recording(rewrite(bag, tmp_path / "odd", swapped(SECTORS, index))) == whole
+
+
+def test_the_end_is_the_latest_stamp_not_the_last_message(bag: Path, tmp_path: Path) -> None:
+    """Of the last three sectors a, b, c there is c, then a: b lacks in the middle."""
+    ticks = read_episode(bag).ticks
+    edit = then(
+        swapped(SECTORS, len(ticks) - 2), swapped(SECTORS, len(ticks) - 3), without([SECTORS], -1)
+    )
+    with pytest.raises(BagError, match=f"no sectors at stamp {ticks[-2].stamp_ns} ns"):
+        read_recording(rewrite(bag, tmp_path / "cut", edit))
+
+
+def test_a_hole_of_one_robot_is_refused_though_another_s_end_lacks(
+    fleet: Path, tmp_path: Path
+) -> None:
+    both = then(without(["/a/sectors"], 3), without(of_c([SECTORS]), -1))
+    cut = rewrite(fleet, tmp_path / "cut", both)
+    with pytest.raises(BagError, match=r"cut: a: no sectors at stamp \d+ ns; was the bag edited"):
+        read_recording(cut)
+
+
+def test_a_bag_of_which_nothing_would_be_left_is_refused(bag: Path, tmp_path: Path) -> None:
+    """The only sectors are of a tick whose decision is not there."""
+    ticks = len(read_episode(bag).ticks)
+    edit = then(without(SENSOR, *range(1, ticks)), without([DECISION], 0))
+    cut = rewrite(bag, tmp_path / "cut", edit, configure=in_real_time)
+    for read in (read_recording, summarize):
+        with pytest.raises(BagError, match="no sectors at stamp"):
+            read(cut)
+    assert len([fault for fault in verify(cut).faults if ": no /sectors" in fault]) == ticks - 1
+
+
+def test_no_more_decisions_wait_for_the_end_than_can_be_held(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cut = rewrite(bag, tmp_path / "cut", without([SECTORS], *range(-6, 0)))
+    read_recording(cut)
+    monkeypatch.setattr(decisions, "REMEMBERED", 5)
+    with pytest.raises(BagError, match="no sectors at stamp"):
+        read_recording(cut)
+
+
+@pytest.mark.parametrize(
+    ("topics", "named"), [(SENSOR, SECTORS), ([ODOM], ODOM), ((ODOM, *SENSOR), "/sectors, /odom")]
+)
+@pytest.mark.parametrize("count", [1, 2])
+def test_verify_checks_what_is_left(
+    bag: Path, tmp_path: Path, topics: tuple[str, ...], named: str, count: int
+) -> None:
+    report = verify(rewrite(bag, tmp_path / "cut", without(topics, *range(-count, 0))))
+    whole = read_episode(bag)
+    assert (report.faults, report.divergence) == ((), None)
+    assert report.recorded == whole.ticks[:-count]
+    assert report.notes == (said_of(whole, count, named),)
+
+
+def test_verify_leaves_out_what_was_decided_on_a_scan_that_is_lost(tmp_path: Path) -> None:
+    lidar = replace(load_scenario("empty"), robot=Robot(lidar=Lidar(beams=36)))
+    whole = record(tmp_path / "bag", scenario_to_json(lidar), 2)
+
+    def tracking(content: Any) -> Any:
+        content["nodes"]["planner"] |= {"method": "predictive", "scan_radius_m": 0.4}
+        return content
+
+    for index, noted in ((-1, True), (9, False)):
+        cut = rewrite(
+            whole, tmp_path / f"cut{index}", without(["/scan"], index), configure=tracking
+        )
+        report = verify(cut)
+        assert any("left out the last 1 decisions" in note for note in report.notes) == noted
+        assert any(": no /scan" in fault for fault in report.faults) != noted
+
+
+def test_verify_of_a_run_in_real_time_names_a_hole(bag: Path, tmp_path: Path) -> None:
+    hole = rewrite(bag, tmp_path / "hole", without(SENSOR, 9), configure=in_real_time)
+    stamp = read_episode(bag).ticks[9].stamp_ns
+    assert verify(hole).faults == (f"stamp {stamp} ns: no /sectors",)
+    cut = rewrite(bag, tmp_path / "cut", without(SENSOR, -1), configure=in_real_time)
+    report = verify(cut)
+    assert report.is_identical
+    assert report.notes == (said_of(read_episode(bag), 1),)
+
+
+def said(capsys: Said, *args: str | Path) -> tuple[int, str, str]:
+    code = cli.main([str(arg) for arg in args])
+    return code, *capsys.readouterr()
+
+
+def test_every_command_says_what_is_left_out(bag: Path, tmp_path: Path, capsys: Said) -> None:
+    cut = rewrite(bag, tmp_path / "cut", without(SENSOR, -1))
+    whole = read_episode(bag)
+    rest, what = digest(whole.ticks[:-1]), said_of(whole, 1)
+    note, count = f"note: {cut}: {what}\n", len(whole.ticks) - 1
+    assert said(capsys, "digest", cut) == (0, f"{rest}  {cut}\n", note)
+    assert said(capsys, "verify", cut, "--closed-loop") == (
+        0,
+        f"note: {what}\nidentical, {count} decisions, digest {rest}\n"
+        f"closed loop: identical, {count} ticks\n",
+        "",
+    )
+    code, out, err = said(capsys, "info", cut)
+    assert (code, out.endswith(f"digest {rest}\n{note}"), err) == (0, True, "")
+    for command, file, more in (
+        ("export", "run.csv", f": {count} rows"),
+        ("picture", "run.png", ""),
+    ):
+        written = tmp_path / file
+        assert said(capsys, command, cut, written) == (0, f"{note}wrote {written}{more}\n", "")
+    for command, option, file in (("report", "--out", "x.html"), ("view", "--save", "x.rrd")):
+        code, out, err = said(capsys, command, cut, option, tmp_path / file)
+        assert (code, out, err) == (0, f"{note}wrote {tmp_path / file}\n", "")
+
+
+def test_commands_name_the_robot_of_a_fleet(fleet: Path, tmp_path: Path, capsys: Said) -> None:
+    cut = rewrite(fleet, tmp_path / "cut", without(of_c(SENSOR), -1))
+    whole = read_recording(fleet).episodes
+    what = said_of(whole["c"], 1)
+    assert said(capsys, "digest", cut)[2] == f"note: {cut}: c: {what}\n"
+    assert said(capsys, "digest", cut, "--robot", "a")[2] == ""
+    code, out, _ = said(capsys, "verify", cut, "--closed-loop")
+    assert code == 0
+    assert f"c: note: {what}\n" in out
+    assert f"c: closed loop: identical, {len(whole['c'].ticks) - 1} ticks\n" in out
+    rows = sum(len(episode.ticks) for episode in whole.values()) - 1
+    assert said(capsys, "export", cut, tmp_path / "all.csv")[1] == (
+        f"note: {cut}: c: {what}\nwrote {tmp_path / 'all.csv'}: {rows} rows\n"
+    )
+
+
+def attempt_at(out: Path, scenario: str) -> Attempt:
+    """A run of which only the bag lacks."""
+    order = read_order([scenario, "--no-picture", "--out", str(out)], "launcher")
+    return Attempt(order, RunDirectory(order.out), Screen(), StopRequest(1.0))
+
+
+def test_a_run_that_failed_says_it_and_beside_its_digest(
+    bag: Path, fleet: Path, tmp_path: Path, capsys: Said
+) -> None:
+    alone = attempt_at(tmp_path / "alone", "empty")
+    rewrite(bag, alone.directory.bag, without(SENSOR, -1))
+    conclude(alone, None, "virtual_sensor ended")
+    whole = read_episode(bag)
+    assert f"note: {alone.directory.bag}: {said_of(whole, 1)}\n" in capsys.readouterr().out
+    result = json.loads(alone.directory.result.read_text())
+    assert result["digest"] == digest(whole.ticks[:-1])
+    assert result["extra"]["left_out"] == said_of(whole, 1)
+
+    (tmp_path / "trio.json").write_text(scenario_to_json(TRIO))
+    three = attempt_at(tmp_path / "three", str(tmp_path / "trio.json"))
+    rewrite(fleet, three.directory.bag, without(of_c(SENSOR), -1))
+    conclude_fleet(three, "c/virtual_sensor ended")
+    what = said_of(read_recording(fleet).episodes["c"], 1)
+    assert f"note: {three.directory.bag}: c: {what}\n" in capsys.readouterr().out
+    extras = {n: json.loads((three.directory.path / f"{n}.json").read_text()) for n in "abc"}
+    assert extras["c"]["extra"]["left_out"] == what
+    assert not {"left_out"} & (extras["a"]["extra"].keys() | extras["b"]["extra"].keys())
+
+
+def test_diff_tells_a_bag_from_one_that_holds_as_much(
+    bag: Path, tmp_path: Path, capsys: Said
+) -> None:
+    """One ended there, the other had gone on: nobody knows whether it went the same way."""
+    cut = rewrite(bag, tmp_path / "cut", without(SENSOR, -1))
+    ended = rewrite(cut, tmp_path / "ended", without([DECISION], -1))
+    count = len(read_episode(bag).ticks) - 1
+    assert read_recording(ended).missed == {}
+    for left, right, code, how in (
+        (cut, ended, 1, "identical but for what is left out"),
+        (ended, cut, 1, "identical but for what is left out"),
+        (cut, cut, 0, "identical"),
+    ):
+        found, out, _ = said(capsys, "diff", left, right)
+        assert (found, f"\n{how}, {count} decisions, " in out) == (code, True)
+        assert out.startswith(f"note: {cut}: left out the last 1 decisions")
+    code, out, _ = said(capsys, "diff", cut, bag)
+    assert code == 1
+    assert "(ended before)" in out
