@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mfba_planner.core.digest import digest
@@ -220,6 +220,7 @@ def test_late_circles_are_moved_on() -> None:
     x=st.floats(-2.0, 2.0), y=st.floats(-2.0, 2.0), vx=st.floats(-0.5, 0.5),
     vy=st.floats(-0.5, 0.5), heading=st.floats(-math.pi, math.pi), t1=st.floats(0.1, 2.5),
 )  # fmt: skip
+@example(x=1.0, y=0.0, vx=0.4375, vy=0.0, heading=1.5, t1=0.5)
 @settings(max_examples=200)
 def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
     x: float, y: float, vx: float, vy: float, heading: float, t1: float
@@ -235,19 +236,22 @@ def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
     rest = distance(way, goal)
     length = 0.8 * t1 + rest
     smallest = surely = math.inf  # within tau, and so early within it that risk has not faded
+    moment = 0.0
     for t in np.linspace(0.0, risk.horizon_s, 3001).tolist():
         if t <= t1:
             here = (way[0] * t / t1, way[1] * t / t1)
         else:
             share = min(1.0, 0.8 * (t - t1) / rest)
             here = (way[0] + share * (goal[0] - way[0]), way[1] + share * (goal[1] - way[1]))
-        smallest = min(smallest, distance(here, (x + vx * t, y + vy * t)) - 0.6)
+        apart = distance(here, (x + vx * t, y + vy * t)) - 0.6
+        if apart < smallest:
+            smallest, moment = apart, t
         if t < 0.9 * risk.horizon_s:
             surely = smallest
     if smallest > margin + 1e-3:
         assert cost == pytest.approx(length)
-    elif surely < margin - 2e-3:
-        assert cost > length
+    elif smallest < margin - 2e-3 and moment < 0.9 * risk.horizon_s:
+        assert cost > length  # who still comes nearer then is weighed by later decisions
     if surely < -2e-3:
         assert cost > length + 1e-6
 
@@ -298,3 +302,85 @@ def test_a_contact_costs_by_what_is_driven_until_then_whichever_leg_it_is_on(
     expected = 5.0 + 3.0 * contact**2 + 100.0 * contact**8 + 0.3 * closest
     found = world.cost((waypoint_m, 0.0), waypoint_m, (5.0, 0.0), 1.0)
     assert found == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("waypoint_m", [2.15, 2.3, 2.5])
+def test_a_contact_comes_when_it_begins_wherever_in_it_the_leg_ends(waypoint_m: float) -> None:
+    risk = RiskParams(horizon_s=3.0, contact_m=3.0, urgent_m=100.0, close_m=0.3)
+    ahead = Circle(center_m=(2.6, 0.0), radius_m=0.5)
+    found = Prediction((0.0, 0.0), [ahead], risk, 0.1).cost(
+        (waypoint_m, 0.0), waypoint_m, (5.0, 0.0), 1.0
+    )
+    contact, end = 1.0 - 2.1 / 3.0, 1.0 - waypoint_m / 3.0
+    assert found == pytest.approx(5.0 + 3.0 * contact**2 + 100.0 * contact**8 + 0.3 * end)
+
+
+@given(
+    crowd=st.lists(
+        st.tuples(
+            st.floats(0.62, 2.0), st.floats(-math.pi, math.pi),
+            st.floats(-0.4, 0.4), st.floats(-0.4, 0.4),
+        ),
+        min_size=1, max_size=8,
+    ),
+    bound=st.one_of(st.just(math.inf), st.floats(5.0, 120.0)),
+    first=st.integers(0, 35),
+)  # fmt: skip
+@settings(max_examples=150)
+def test_the_cheapest_of_many_ways_is_found_without_weighing_all(
+    crowd: list[tuple[float, float, float, float]], bound: float, first: int
+) -> None:
+    circles = [
+        Circle(center_m=(r * math.cos(b), r * math.sin(b)), radius_m=0.6, velocity_mps=(vx, vy))
+        for r, b, vx, vy in crowd
+    ]
+    goal, speed, ways = (5.0, 1.0), 0.8, []
+    for k in range(12):
+        for length in (0.4, 1.0, 2.0):
+            q = (length * math.cos(k * math.pi / 6.0), length * math.sin(k * math.pi / 6.0))
+            ways.append((length + distance(q, goal), q, length / speed, k))
+    ways = [(-math.inf, *ways[first][1:3], -1), *sorted(ways[:first] + ways[first + 1 :])]
+    world = Prediction((0.0, 0.0), circles, RiskParams(), 0.1, speed)
+    costs = [world.cost(q, t1, goal, speed) for _, q, t1, _ in ways]
+    found = world.cheapest(ways, goal, speed, bound)
+    if found is None:
+        assert min(costs) >= bound
+    else:
+        way, t1, cost = found
+        assert cost == min(costs) < bound
+        assert costs[[(q, t) for _, q, t, _ in ways].index((way, t1))] == cost
+
+
+def test_a_longer_way_in_the_same_direction_may_be_the_better_one() -> None:
+    """Who comes nearer slowly is a lesser risk, the later the leg that it is near ends."""
+    beside = Circle(center_m=(0.0, 0.74), radius_m=0.6, velocity_mps=(0.8, -0.05))
+    world = Prediction((0.0, 0.0), [beside], RiskParams(), 0.1, 0.8)
+    ways = [(5.0, (1.0, 0.0), 1.25, 0), (5.0, (2.0, 0.0), 2.5, 0)]
+    found = world.cheapest(ways, (5.0, 0.0), 0.8, 5.06)
+    assert found is not None
+    assert found[0] == (2.0, 0.0)
+
+
+def test_who_is_met_at_the_far_end_of_a_way_is_not_left_out() -> None:
+    """A way beyond the goal and back, as near its bound as may be, and who stands behind it."""
+    behind = Circle(center_m=(2.05, 0.0), radius_m=0.6)
+    world = Prediction((0.0, 0.0), [behind], RiskParams(), 0.1, 0.8)
+    ways = [(-math.inf, (0.0, 2.0), 2.5, -1), (2.0, (1.5, 0.0), 1.875, 0)]
+    assert world.cheapest(ways, (1.0, 0.0), 0.8, 2.1) is None
+
+
+@pytest.mark.parametrize(
+    ("center", "velocity"),
+    [
+        ((-0.28421218099083234, -1.865418235683447), (-0.36571976703050657, -0.7115118073532948)),
+        ((-1.7917194255901954, -0.7333067010725125), (-0.7978479167438711, -0.058640444639045754)),
+        ((0.20929865995889174, 1.7257496037770959), (0.3645074657187967, 0.7121336303217678)),
+    ],
+)
+def test_who_is_grazed_to_the_last_bit_is_weighed_like_any_other(
+    center: Point, velocity: Point
+) -> None:
+    """Rounded one way the closest approach is a contact, rounded the other way it is none."""
+    world = Prediction((0.0, 0.0), [Circle(center_m=center, radius_m=0.6)], RiskParams(), 0.1)
+    way = (2.5 * velocity[0], 2.5 * velocity[1])
+    assert 2.0 < world.cost(way, 2.5, way, 0.8) < math.inf

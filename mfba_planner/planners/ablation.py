@@ -13,7 +13,7 @@ from ..core.geometry import Point, wrap_angle
 from ..core.planner import NANO, Circle, Event, Observation, PlannerParams
 from ..core.sensing import SensorParams
 from .memory import MemoryParams
-from .prediction import Prediction, RiskParams
+from .prediction import Prediction, RiskParams, Way
 from .predictive import Predictive, PredictiveParams
 from .steering import Move
 
@@ -67,12 +67,10 @@ class NoBats(Predictive):
 class NoWaiting(Predictive):
     """Always at full speed."""
 
-    def _waypoints(
-        self, gaps: list[int], to_goal: Point, left: float
-    ) -> list[tuple[float, Point, float]]:
+    def _waypoints(self, gaps: list[int], to_goal: Point, left: float) -> list[Way]:
         full = 0.999 * self.params.speed_mps
         ways = super()._waypoints(gaps, to_goal, left)
-        return [(lower, q, t) for lower, q, t in ways if math.hypot(*q) > full * t]
+        return [way for way in ways if math.hypot(*way[1]) > full * way[2]]
 
 
 class NoLastWaypoint(Predictive):

@@ -19,6 +19,7 @@ _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12
 _Row = tuple[float, float, float, float, float, float, float, float, float]
 _nearness = itemgetter(0)
+Way = tuple[float, Point, float, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +88,7 @@ class Prediction:
         # The nearest first: it refuses most. Of equally near ones the first told.
         self._rows.sort(key=_nearness)
         self._weighed = self._rows
+        self._shut = False
 
     def closed(self, ux: np.ndarray, uy: np.ndarray) -> np.ndarray:
         """Bits (m,): 1 where a robot with velocity (ux, uy) comes too close within tau."""
@@ -114,26 +116,30 @@ class Prediction:
         near: np.ndarray = (a < np.minimum(away, outer) * _ROUNDING).any(axis=0)
         return near.astype(int)
 
-    def narrow(self, to_goal: Point, bound: float) -> None:
-        """Leave out of cost() who is met by no way that costs less than the bound.
+    def cheapest(
+        self, ways: Sequence[Way], to_goal: Point, speed: float, bound: float
+    ) -> tuple[Point, float, float] | None:
+        """Waypoint, t1 and cost of the cheapest way if it costs less than the bound, else None.
 
-        Such a way stays where |p| + |p - goal| is less than the bound, hence the centres of
-        those it meets where it is less than the bound + 2 radii. That sum is convex in time,
-        so its tangent now tells how small it may become.
+        A way is what it costs at least, its waypoint, t1 and a number: ways of equal number have
+        the same velocity until t1. They are sorted; the first had better be a good one (at least
+        -inf, with a number of its own, any can be). Of equally cheap ones the first is taken.
+        Who is met by none that costs less is left out of cost() from then on.
         """
-        (gx, gy), tau, kept = to_goal, self.params.horizon_s, []
-        for row in self._weighed:
-            _, x, y, vx, vy, r, margin, _, _ = row
-            hx, hy = x - gx, y - gy
-            near = math.sqrt(x * x + y * y) or _TINY
-            far = math.sqrt(hx * hx + hy * hy) or _TINY
-            sum_now = near + far
-            change = (vx * x + vy * y) / near + (vx * hx + vy * hy) / far
-            if change < 0.0:
-                sum_now += change * tau
-            if sum_now < bound + 2.0 * (r + margin):
-                kept.append(row)
-        self._weighed = kept
+        found, shut = None, set[int]()
+        for k, (lower, way, t1, number) in enumerate(ways):
+            if lower >= bound:
+                break  # so are all that follow
+            if number in shut:
+                continue  # it meets whom a shorter one met, at the same moment, or is longer still
+            cost = self.cost(way, t1, to_goal, speed, bound)
+            if cost < bound:
+                found, bound = (way, t1, cost), cost
+            elif self._shut:
+                shut.add(number)
+            if k == 0:
+                self._narrow(to_goal, bound)
+        return found
 
     def cost(
         self, way: Point, t1: float, to_goal: Point, speed: float, bound: float = math.inf
@@ -161,6 +167,27 @@ class Prediction:
                 risk = later
         return total + risk
 
+    def _narrow(self, to_goal: Point, bound: float) -> None:
+        """Leave out of cost() who is met by no way that costs less than the bound.
+
+        Such a way stays where |p| + |p - goal| is less than the bound, hence the centres of
+        those it meets where it is less than the bound + 2 radii. That sum is convex in time,
+        so its tangent now tells how small it may become.
+        """
+        (gx, gy), tau, kept = to_goal, self.params.horizon_s, []
+        for row in self._weighed:
+            _, x, y, vx, vy, r, margin, _, _ = row
+            hx, hy = x - gx, y - gy
+            near = math.sqrt(x * x + y * y) or _TINY
+            far = math.sqrt(hx * hx + hy * hy) or _TINY
+            sum_now = near + far
+            change = (vx * x + vy * y) / near + (vx * hx + vy * hy) / far
+            if change < 0.0:
+                sum_now += change * tau
+            if sum_now < bound + 2.0 * (r + margin):
+                kept.append(row)
+        self._weighed = kept
+
     def _leg(
         self,
         qx: float,
@@ -174,10 +201,13 @@ class Prediction:
     ) -> float:
         """The worst risk of a leg that begins in (qx, qy) at t0; or one not below bound.
 
-        s0 of the way is driven before it. Who is within a margin already may leave it in any
-        direction, but not go deeper.
+        s0 of the way is driven before it. With x = 1 - s/tau, a contact after s of driving costs
+        contact_m x^2 + urgent_m x^8, a closest approach costs close_m x times the share of the
+        margin that is missing. Who is within a margin already may leave it in any direction, but
+        not go deeper.
         """
-        worst = 0.0
+        tau, close, contact, urgent = self._weights
+        worst, sqrt = 0.0, math.sqrt
         for _, x, y, vx, vy, r, margin, outer, away in self._weighed:
             if t0 > 0.0:
                 x = x + vx * t0 - qx
@@ -189,36 +219,26 @@ class Prediction:
             if b >= 0.0:
                 continue
             a = wx * wx + wy * wy
-            t = -b / a
-            if t > lasts:
-                t = lasts
+            nearest = -b / a
+            t = nearest if nearest < lasts else lasts
             c = (a * t + 2.0 * b) * t + away
             if c >= outer or c >= away * _ROUNDING:
                 continue
-            risk = self._risk(a, c, r, margin, t, s0)
+            missing = 1.0 - (sqrt(c) - r) / margin if c > 0.0 else 1.0
+            risk = (missing if missing < 1.0 else 1.0) * close * (1.0 - (s0 + t) / tau)
+            if c < r * r:
+                deepest = away + b * nearest  # if the leg lasted until then
+                met = nearest - sqrt((r * r - (deepest if deepest < c else c)) / a)
+                late = 1.0 - (s0 + met) / tau if met > 0.0 else 1.0 - s0 / tau
+                late *= late
+                risk += late * (contact + urgent * late * late * late)
             if risk > worst:
                 worst = risk
                 if worst >= bound:
+                    # However long the leg, a contact on it comes at the same moment.
+                    self._shut = t0 == 0.0 and worst - close >= bound
                     break
         return worst
-
-    def _risk(self, a: float, c: float, r: float, margin: float, t: float, s0: float) -> float:
-        """What the closest approach, sqrt(c) after t of a leg at a relative speed sqrt(a), costs.
-
-        With x = 1 - s/tau, a contact after s of driving costs contact_m x^2 + urgent_m x^8, a
-        closest approach costs close_m x times the share of the margin that is missing.
-        """
-        tau, close, contact, urgent = self._weights
-        missing = 1.0 - (math.sqrt(c) - r) / margin if c > 0.0 else 1.0
-        if missing > 1.0:
-            missing = 1.0
-        risk = missing * close * (1.0 - (s0 + t) / tau)
-        if c < r * r:
-            t -= math.sqrt((r * r - c) / a)
-            late = 1.0 - (s0 + t) / tau if t > 0.0 else 1.0 - s0 / tau
-            late *= late
-            risk += late * (contact + urgent * late * late * late)
-        return risk
 
 
 def moved(circles: Sequence[Circle], dt: float) -> Sequence[Circle]:

@@ -17,7 +17,7 @@ from ..core.region import Disc
 from ..core.sensing import Bits, SensorParams
 from ..core.streams import stream
 from .memory import Memory, MemoryParams
-from .prediction import Prediction, RiskParams, from_sectors, moved
+from .prediction import Prediction, RiskParams, Way, from_sectors, moved
 from .steering import Move, Steering
 from .surroundings import ROBOT_RADIUS_M
 from .tracking import Tracker, TrackingParams
@@ -27,6 +27,7 @@ WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, in full speeds; not 0, so that it has a direction
 SHUT = 12  # headings weighed when every one is closed
 _FREE_M = 1e-9
+_BEFORE = -1  # the last waypoint's number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +95,11 @@ class Predictive(Steering):
         n = self.options.headings
         angles = 2.0 * math.pi / n * np.arange(1, n + 1)
         self._cos, self._sin = np.cos(angles), np.sin(angles)
+        lengths = [share * self.options.reach_m for share in LENGTHS]
+        self._rays = [
+            [((c * first, s * first), first) for first in lengths]
+            for c, s in zip(self._cos.tolist(), self._sin.tolist())
+        ]
         self._waypoint: Point | None = None
         self._memory = Memory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
@@ -122,15 +128,10 @@ class Predictive(Steering):
         ways = self._waypoints(gaps, to_goal, left)
         if before is not None:  # likely to be the best still: it spares the others most
             q = (before[0] - x, before[1] - y)
-            ways.insert(0, (-math.inf, q, max(distance((0.0, 0.0), q) / speed, tick_s)))
-        for number, (lower, q, t1) in enumerate(ways):
-            if lower >= least:
-                break  # so are all that follow
-            cost = world.cost(q, t1, to_goal, speed, least)
-            if cost < least:
-                way, lasts, least = q, t1, cost
-            if number == 0:
-                world.narrow(to_goal, least)
+            ways.insert(0, (-math.inf, q, max(distance((0.0, 0.0), q) / speed, tick_s), _BEFORE))
+        found = world.cheapest(ways, to_goal, speed, direct)
+        if found is not None:
+            way, lasts, least = found
         swarm = self._fly(world, way, to_goal, least, obs.stamp_ns)
         if swarm.best_value < least:
             (qx, qy), least = swarm.best_x, swarm.best_value
@@ -179,40 +180,34 @@ class Predictive(Steering):
     def _nearest(self, closed: Bits, to_goal: Point) -> list[int]:
         """The free headings nearest to the goal's on either side; a few when none is free."""
         n = len(closed)
-        below = math.floor(math.atan2(to_goal[1], to_goal[0]) * n / (2.0 * math.pi)) - 1
-        right = next(((below - k) % n for k in range(n) if not closed[(below - k) % n]), None)
-        if right is None:
+        if 0 not in closed:
             return list(range(0, n, n // SHUT))
-        left = next((below + k) % n for k in range(1, n + 1) if not closed[(below + k) % n])
-        return [left, right] if left != right else [left]
+        above = math.floor(math.atan2(to_goal[1], to_goal[0]) * n / (2.0 * math.pi)) % n
+        around = closed[above:] + closed[:above]
+        left, right = around.index(0), n - 1 - around[::-1].index(0)
+        return [(above + k) % n for k in sorted({left, right})]
 
     def _gap(self, way: Point) -> int:
         """Number (from 1) of the heading nearest to a waypoint; the last one is +x."""
         n = self.options.headings
         return (round(math.atan2(way[1], way[0]) * n / (2.0 * math.pi)) - 1) % n + 1
 
-    def _waypoints(
-        self, gaps: list[int], to_goal: Point, left: float
-    ) -> list[tuple[float, Point, float]]:
-        """What waypoints cost at least, where they are and the time they are reached after.
+    def _waypoints(self, gaps: list[int], to_goal: Point, left: float) -> list[Way]:
+        """Waypoints to be weighed, numbered by heading, or from n on where they are waited for.
 
         The cheapest come first: most of the others need not be weighed then.
         """
-        speed, reach = self.params.speed_mps, self.options.reach_m
-        (gx, gy), ways = to_goal, []
+        speed, (gx, gy), ways = self.params.speed_mps, to_goal, []
         for k in gaps:
-            c, s = float(self._cos[k]), float(self._sin[k])
-            for share in LENGTHS:
-                first = share * reach
-                qx, qy = c * first, s * first
-                rx, ry = gx - qx, gy - qy
-                ways.append((first + math.sqrt(rx * rx + ry * ry), (qx, qy), first / speed))
+            for q, first in self._rays[k]:
+                rx, ry = gx - q[0], gy - q[1]
+                ways.append((first + math.sqrt(rx * rx + ry * ry), q, first / speed, k))
         ex, ey = gx / left * speed, gy / left * speed
         waiting = self.options.risk.waiting * speed
-        for share in SPEEDS:
+        for number, share in enumerate(SPEEDS, self.options.headings):
             for t in WAITS_S:
                 lower = left + waiting * t * (1.0 - share)
-                ways.append((lower - _FREE_M, (ex * share * t, ey * share * t), t))
+                ways.append((lower - _FREE_M, (ex * share * t, ey * share * t), t, number))
         ways.sort()
         return ways
 
