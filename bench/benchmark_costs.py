@@ -37,11 +37,17 @@ RATE_SUITE, RATE_ROUNDS = "random-10", 3
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """Microseconds of one decision, median, per planner and number of circles in range."""
+    """Microseconds of one decision, median, per planner and number of circles in range.
+
+    All in turn, as a robot's computer has other things to do between two decisions; and alone_us
+    with ten in range where `predictive` decides again and again, as loops that time one function
+    have it.
+    """
 
     counts: Sequence[int]
     median_us: Mapping[str, Sequence[float]]
     rounds: int
+    alone_us: float
 
     def at(self, name: str, count: int) -> float:
         """One of them."""
@@ -87,12 +93,20 @@ def _measure(rounds: int, _: None) -> Costs:
         taken: dict[str, list[int]] = {name: [] for name in NAMES}
         for k in range(max(FEWEST, min(rounds, 20 * rounds // count))):
             for name, once in subjects.items():
-                begin = time.process_time_ns()
-                once(100_000_000 * (k + 1))
-                taken[name].append(time.process_time_ns() - begin)
+                taken[name].append(_taken(once, k))
         for name in NAMES:
             median_us[name].append(statistics.median(taken[name][ARRANGEMENTS:]) / 1e3)
-    return Costs(COUNTS, median_us, rounds)
+    again, alone = _deciding(NAMES[0], 10), []
+    for k in range(max(FEWEST, 20 * rounds)):
+        alone.append(_taken(again, k))
+    return Costs(COUNTS, median_us, rounds, statistics.median(alone[ARRANGEMENTS:]) / 1e3)
+
+
+def _taken(once: Callable[[int], object], k: int) -> int:
+    """Nanoseconds of CPU time that the k-th decision takes."""
+    begin = time.process_time_ns()
+    once(100_000_000 * (k + 1))
+    return time.process_time_ns() - begin
 
 
 def _deciding(name: str, count: int) -> Callable[[int], object]:

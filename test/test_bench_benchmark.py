@@ -114,6 +114,18 @@ def test_episodes_per_minute_are_of_whole_sweeps(made: Path) -> None:
         assert "in 3 sweeps" in told
 
 
+def test_a_decision_is_timed_again_and_again_and_in_turn(made: Path) -> None:
+    page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    targets, costs = lines(page, "## Targets"), lines(page, "## What a decision costs")
+    alone = targets["median us of a predictive decision, 10 in range, again and again"]
+    turn = targets["the same in turn with the other planners"]
+    assert float(turn["found"]) == pytest.approx(float(costs["10"]["predictive, us"]), abs=0.5)
+    assert f"`predictive` takes {float(alone['found']):.0f} us with 10 in range" in page
+    for row in (alone, turn):
+        assert row["target"] == "<= 300"
+        assert row[""] == ("met" if float(row["found"]) <= 300.0 else "**missed**")
+
+
 def test_what_was_written_by_hand_stays_and_pictures_are_small(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     assert page.partition("<!-- generated")[0] == PAGE.partition("<!-- generated")[0]

@@ -78,8 +78,9 @@ def of_c(topics: Iterable[str]) -> list[str]:
 
 def said_of(whole: Episode, count: int, topics: str = SECTORS) -> str:
     stamp = whole.ticks[-count].stamp_ns
+    last = "decision" if count == 1 else f"{count} decisions"
     return (
-        f"left out the last {count} decisions, from stamp {stamp} ns on: {topics} ended before "
+        f"left out the last {last}, from stamp {stamp} ns on: {topics} ended before "
         "(a node that was killed?)"
     )
 
@@ -203,7 +204,7 @@ def test_verify_leaves_out_what_was_decided_on_a_scan_that_is_lost(tmp_path: Pat
             whole, tmp_path / f"cut{index}", without(["/scan"], index), configure=tracking
         )
         report = verify(cut)
-        assert any("left out the last 1 decisions" in note for note in report.notes) == noted
+        assert any("left out the last decision," in note for note in report.notes) == noted
         assert any(": no /scan" in fault for fault in report.faults) != noted
 
 
@@ -307,7 +308,7 @@ def test_diff_tells_a_bag_from_one_that_holds_as_much(
     ):
         found, out, _ = said(capsys, "diff", left, right)
         assert (found, f"\n{how}, {count} decisions, " in out) == (code, True)
-        assert out.startswith(f"note: {cut}: left out the last 1 decisions")
+        assert out.startswith(f"note: {cut}: left out the last decision,")
     code, out, _ = said(capsys, "diff", cut, bag)
     assert code == 1
     assert "(ended before)" in out

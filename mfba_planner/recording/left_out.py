@@ -18,8 +18,9 @@ from .robots import of_robot
 
 def left_out(stamps: Collection[int], topics: Collection[str]) -> str:
     """What is said of decisions under these stamps, in ns, that came after the topics' end."""
+    last = "decision" if len(stamps) == 1 else f"{len(stamps)} decisions"
     return (
-        f"left out the last {len(stamps)} decisions, from stamp {min(stamps)} ns on: "
+        f"left out the last {last}, from stamp {min(stamps)} ns on: "
         f"{', '.join(topics)} ended before (a node that was killed?)"
     )
 
