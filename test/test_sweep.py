@@ -459,3 +459,16 @@ def test_one_child_makes_one_part_after_the_other() -> None:
     second.run()
     assert keeper._LOCAL.keeper is child
     assert child.is_alive
+
+
+def test_a_planner_found_by_a_path_of_after_the_first_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "found_later.py").write_text(
+        "from mfba_planner.planners.straight import Straight as Later\n"
+    )
+    before = sweep(an_order(planners=("straight",)))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    after = sweep(an_order(planners=("found_later:Later",)))
+    same = [{**row, "planner": "straight"} for row in after.rows]
+    assert sorted_hash(same) == sorted_hash(before.rows)

@@ -46,7 +46,8 @@ def each(
 
 def _keeper() -> Keeper:
     found: Keeper | None = getattr(_LOCAL, "keeper", None)
-    if found is None or not found.is_alive:
+    # A planner of the user's own may be found by a path that was added since.
+    if found is None or not found.is_alive or found.paths != sys.path:
         found = _LOCAL.keeper = Keeper()
     return found
 
@@ -57,7 +58,8 @@ class Keeper:
     def __init__(self) -> None:
         """Start the child. Raises MfbaError when it does not start."""
         self._pipe, theirs = Pipe()
-        paths = os.pathsep.join(path for path in sys.path if path)
+        self.paths = list(sys.path)
+        paths = os.pathsep.join(path for path in self.paths if path)
         told = {"PYTHONPATH": paths, "MFBA_PARENT": str(os.getpid()), **_ONE_THREAD}
         with theirs:
             self._child = subprocess.Popen(
