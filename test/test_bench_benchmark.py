@@ -23,6 +23,7 @@ from mfba_planner.worlds import suite_names
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "bench" / "benchmark.py"
 PAGE = (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 SHOWN = shown.commands(PAGE)
 WHOLE, MADE_BY = (words for words in SHOWN if words[0] == "python")
 SMALL = shown.reduced(MADE_BY)[2:]
@@ -79,6 +80,18 @@ def test_the_tables_say_what_the_rows_say(made: Path) -> None:
             gaps = [row["length_m"] / optimum_m[row["world"]] - 1.0 for row in good]
             assert line["gap"].startswith(f"{100.0 * sum(gaps) / len(gaps):.2f} % ["), name
             assert line["time s"].startswith(f"{sum(r['time_s'] for r in good) / len(good):.2f} [")
+
+
+@pytest.mark.parametrize("count", [10, 20, 30])
+def test_the_readme_s_headline_is_the_page_s(count: int) -> None:
+    (row,) = re.findall(rf"^\| {count} obstacles.*$", README, re.MULTILINE)
+    found = lines(PAGE, f"### random-{count}")
+    expected = []
+    for name in ("paper", "predictive", "orca"):
+        assert found[name]["runs"] == "10000"
+        success, gap = (float(found[name][head].split()[0]) for head in ("success", "gap"))
+        expected.append(f"{success:.2f} %, {gap:.3g} %")
+    assert [cell.strip() for cell in row.split("|")[2:5]] == expected
 
 
 def test_paper_has_its_own_step_and_all_others_share_one(made: Path) -> None:
