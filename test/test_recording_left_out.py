@@ -30,6 +30,7 @@ from mfba_planner.scenarios import load_scenario, scenario_to_json
 from mfba_planner.verification.check import verify
 
 SECTORS, VECTOR, ODOM, DECISION = "/sectors", "/sensory_vector", "/odom", "/planner/decision"
+TWIST, STEP = "/cmd_vel", "/goal_step"
 SENSOR = (SECTORS, VECTOR)  # what virtual_sensor says of a tick
 Said = pytest.CaptureFixture[str]
 
@@ -312,3 +313,36 @@ def test_diff_tells_a_bag_from_one_that_holds_as_much(
     code, out, _ = said(capsys, "diff", cut, bag)
     assert code == 1
     assert "(ended before)" in out
+
+
+@pytest.mark.parametrize(
+    ("topic", "told"),
+    [
+        (VECTOR, f"{VECTOR}: 57 messages for 58 on {SECTORS}"),
+        (SECTORS, f"{VECTOR}: 58 messages for 57 on {SECTORS}"),
+        (TWIST, f"{TWIST}: 57 messages for 58 on {STEP}"),
+        (STEP, f"{TWIST}: 58 messages for 57 on {STEP}"),
+    ],
+)
+def test_verify_passes_over_the_half_of_a_pair_that_ends_a_bag(
+    bag: Path, tmp_path: Path, topic: str, told: str
+) -> None:
+    """What has no stamp is paired by its order: with one missing, all after it would be wrong."""
+    report = verify(rewrite(bag, tmp_path / "cut", without([topic], -1)))
+    assert report.is_identical
+    assert f"{told}, and the last one is alone (a node that was killed?)" in report.notes
+    for places in ([-2], [-2, -1], [9], [9, -1]):
+        edited = rewrite(bag, tmp_path / f"edited{places}", without([topic], *places))
+        assert not verify(edited).is_identical
+
+
+def test_verify_passes_over_what_a_node_did_not_say_before_the_last_tick_began(
+    bag: Path, tmp_path: Path
+) -> None:
+    planner = [DECISION, STEP, TWIST]
+    cut = without(planner, -2, -1)
+    assert verify(rewrite(bag, tmp_path / "cut", cut)).is_identical
+    for number, index in enumerate((9, -3)):
+        hole = without(planner, index, -1)
+        faults = verify(rewrite(bag, tmp_path / f"hole{number}", hole)).faults
+        assert [fault for fault in faults if "no /goal_step, /planner/decision, /cmd_vel" in fault]

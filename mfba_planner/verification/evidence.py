@@ -68,7 +68,9 @@ def gather(
     """
     heard: dict[str, list[Any]] = {name: [] for name in HEARD}
     found = Evidence(ticks=[], goals=[])
-    for message in messages:
+    latest: dict[str, int] = {}  # where in the bag each topic ends
+    for place, message in enumerate(messages):
+        latest[message.topic] = place
         if message.topic in (GOAL, WAYPOINTS):
             found.goals += _goals(message.topic, message.message, frame)
         else:
@@ -80,9 +82,9 @@ def gather(
         _join(found, ticks, topic, heard[topic], all_alike=all_alike)
     # No sensory vector follows where the sensor was blind.
     seen = [message for message in heard[SECTORS] if ranges_seen(message)]
-    _join_by_order(found, ticks, SECTORS, seen, VECTOR, heard[VECTOR])
-    alike = bool(tick_ns)
-    _join_by_order(found, ticks, STEP, heard[STEP], TWIST, heard[TWIST], all_alike=alike)
+    _join_by_order(found, ticks, latest, SECTORS, seen, VECTOR, heard[VECTOR])
+    steps, twists = heard[STEP], heard[TWIST]
+    _join_by_order(found, ticks, latest, STEP, steps, TWIST, twists, all_alike=bool(tick_ns))
     found.ticks = [ticks[stamp] for stamp in sorted(ticks)]
     _leave_out(found, inputs)
     if tick_ns:
@@ -134,6 +136,7 @@ def _content(topic: str, message: Any) -> str:
 def _join_by_order(
     found: Evidence,
     ticks: dict[int, Tick],
+    latest: dict[str, int],
     stamped: str,
     leaders: list[Any],
     topic: str,
@@ -141,15 +144,22 @@ def _join_by_order(
     *,
     all_alike: bool = True,
 ) -> None:
-    """Give messages without a stamp the one of the message that each of them followed."""
+    """Give messages without a stamp the one of the message that each of them followed.
+
+    A node that was killed between the two may have left one of them alone, at their end.
+    """
     if not leaders or not followers:
         return
     if hasattr(followers[0], "header"):
         _join(found, ticks, topic, followers, all_alike=all_alike)
         return
-    if len(leaders) != len(followers):
-        found.faults.append(f"{topic}: {len(followers)} messages for {len(leaders)} on {stamped}")
-        return
+    surplus = len(leaders) - len(followers)
+    if surplus:
+        said = f"{topic}: {len(followers)} messages for {len(leaders)} on {stamped}"
+        if surplus != (1 if latest[stamped] > latest[topic] else -1):
+            found.faults.append(said)
+            return
+        found.notes.append(f"{said}, and the last one is alone (a node that was killed?)")
     for leader, follower in zip(leaders, followers):
         stamp = stamp_ns(leader.header.stamp)
         first = ticks[stamp].said.setdefault(topic, follower)
@@ -186,7 +196,10 @@ def _look_for_gaps(found: Evidence, tick_ns: int, needed: tuple[str, ...]) -> No
             found.faults.append(
                 f"{missing - 1} ticks are missing between {a.stamp_ns} and {b.stamp_ns} ns"
             )
-    for tick in found.ticks[:-1]:  # the last one may have been cut off
-        absent = [topic for topic in needed if topic not in tick.said]
+    # The last tick may have been cut off, and the one before for those whose end it is.
+    going_on = found.ticks[-1].said
+    for tick, after in pairwise(found.ticks):
+        heard_of = going_on if after is found.ticks[-1] else needed
+        absent = [topic for topic in needed if topic in heard_of and topic not in tick.said]
         if absent and tick.stamp_ns not in found.left_out:
             found.faults.append(f"stamp {tick.stamp_ns} ns: no {', '.join(absent)}")
