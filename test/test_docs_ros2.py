@@ -3,7 +3,10 @@
 
 import re
 import shlex
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -81,6 +84,12 @@ def recorded(home: Path) -> list[Path]:
     return [path for path in (home / "runs").iterdir() if path.name != "mine"]
 
 
+def _is_kept(session: Session, bag: Path, home: Path, turns: Iterator[int]) -> bool:
+    """Whether what the planner says is recorded: it and the recorder may find each other late."""
+    session.prove()
+    return holds(bag, "/cmd_vel", home / f"saved{next(turns)}")
+
+
 @pytest.mark.parametrize("name", WITH_ROS2)
 def test_the_commands_of_a_page_do_what_it_says(name: str, home: Path, domain_id: int) -> None:
     bag = None
@@ -94,9 +103,6 @@ def test_the_commands_of_a_page_do_what_it_says(name: str, home: Path, domain_id
         if "recorder" in session.running:
             session.graph.until(lambda: bool(recorded(home)), SOON_S)  # a node is seen before that
             (bag,) = recorded(home)
-            for turn in range(100):  # its recorder and the others may find each other late
-                if holds(bag, "/cmd_vel", home / f"saved{turn}"):
-                    break
-                session.prove()
+            session.graph.until(partial(_is_kept, session, bag, home, count()), SOON_S)
         session.end()
     assert bag is None or holds(bag, "/cmd_vel", home / "saved")
