@@ -14,6 +14,7 @@ from nav_msgs.msg import Path as PathMsg
 
 from mfba_planner.recording.reader import BagReader
 from mfba_planner.recording.recover import recover
+from mfba_planner.recording.writer import CHUNK_BYTES
 from mfba_planner.ros import topics
 from mfba_planner.ros.convert import path_msg
 
@@ -140,9 +141,9 @@ def test_a_world_nobody_answers_gives_up_in_one_line(
 def test_a_full_disk_is_one_line_and_a_bag_that_can_be_recovered(
     graph: Graph, ros_env: dict[str, str], tmp_path: Path
 ) -> None:
-    """RLIMIT_FSIZE: the kernel refuses as it does on a full disk."""
+    """RLIMIT_FSIZE: the kernel refuses as it does on a full disk, which one chunk fits on."""
     told = parameters(f"output:={tmp_path / 'bag'}")
-    recorder = start("recorder", *told, env=ros_env, file_limit=100_000)
+    recorder = start("recorder", *told, env=ros_env, file_limit=CHUNK_BYTES + 200_000)
     plans = graph.writer(topics.PLAN)
     count = 0
 
