@@ -1,107 +1,70 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From an Order to its exit code: drive, read what was recorded, judge."""
+"""One attempt at a run: what was ordered, where it goes, how far and how fast it is."""
 
 from __future__ import annotations
 
-import sys
-from contextlib import closing, suppress
+import time
 
-from ..core.episode import Episode
-from ..core.errors import BagError, MfbaError
-from ..planners.method import simulate
-from ..run_config import Driver
-from .attempt import Attempt
-from .conclusion import conclude
+from ..core.episode import World
+from ..core.fleet import Fleet
 from .directory import RunDirectory
-from .fleet import conclude_fleet
 from .options import Order
 from .screen import Screen
 from .stop import StoppedError, StopRequest
 
 
-def run(order: Order) -> int:
-    """Make the run; return 0 for the goal without collision, 128 + number for a signal.
+class Attempt:
+    """What the three drivers are given."""
 
-    Raises MfbaError, in one line, for any other end. A run that never began leaves nothing
-    behind; of one that failed later there is whatever could be recorded.
-    """
-    episode: Episode | None = None
-    failure: MfbaError | StoppedError | None = None
-    with StopRequest(order.timeout_s) as stop, closing(Screen()) as screen:
-        attempt = Attempt(order, RunDirectory(order.out), screen, stop)
+    def __init__(
+        self, order: Order, directory: RunDirectory, screen: Screen, stop: StopRequest
+    ) -> None:
+        """Nothing has happened yet."""
+        self.order = order
+        self.directory = directory
+        self.screen = screen
+        self.stop = stop
+        self.stopped: StoppedError | None = None
+        self.wall_s: float | None = None  # of the loop, without starting and ending
+        self._began_at: float | None = None
+        self._shown = (0.0, 0)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the world was let go; before that there is nothing worth keeping."""
+        return self._began_at is not None
+
+    def begin(self) -> None:
+        """The world is let go; again changes nothing."""
+        if self._began_at is None:
+            self._began_at = time.monotonic()
+            self._shown = (self._began_at, 0)
+
+    def end(self) -> None:
+        """The world has come to its end."""
+        if self._began_at is not None:
+            self.wall_s = time.monotonic() - self._began_at
+
+    def go_on(self, world: World | Fleet) -> bool:
+        """For drivers that let the world be seen: show it, and say whether to go on."""
+        self.begin()
         try:
-            episode = _drive(attempt)
-            failure = attempt.stopped
-        except (MfbaError, StoppedError) as error:
-            failure = error
-        finally:
-            if not attempt.has_begun:
-                attempt.directory.discard()
-    if failure is None:
-        _conclude(attempt, episode)
-        return 0
-    if attempt.has_begun:
-        with suppress(BagError):  # nothing to tell of; the failure is told below
-            _conclude(attempt, episode, str(failure))
-    return _fail(failure, attempt)
+            self.stop.check()
+        except StoppedError as stopped:
+            self.stopped = stopped
+            return False
+        if self.screen.wants_progress():
+            self.show(world.tick, world.left_m)
+        return True
 
-
-def _conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> None:
-    """Leave what is left of a run; judge and show it unless it failed."""
-    if attempt.order.config.scenario.robots:
-        conclude_fleet(attempt, failure)
-        return
-    conclusion = conclude(attempt, episode, failure)
-    if failure:
-        return
-    if attempt.order.view:
-        from ..report.viewer import show
-
-        show([(conclusion.directory.name, conclusion.episode)])
-    conclusion.judge()
-
-
-def _drive(attempt: Attempt) -> Episode | None:
-    """Let the ordered driver make the run; return the episode where there is no bag."""
-    config = attempt.order.config
-    if config.driver is Driver.MULTI_PROCESS:
-        from .multi_process import run_multi_process
-
-        run_multi_process(attempt)
-        return None
-    if config.driver is Driver.IN_PROCESS:
-        _run_in_process(attempt)
-        return None
-    attempt.begin()
-    episode = simulate(
-        config.scenario,
-        planner=config.planner,
-        sensor=config.sensor,
-        seed=config.seed,
-        go_on=attempt.go_on,
-    )
-    attempt.end()
-    return episode
-
-
-def _run_in_process(attempt: Attempt) -> None:
-    from ..ros.in_process import run_in_process
-    from .domain import private_domain
-
-    with private_domain() as domain:
-        attempt.wall_s = run_in_process(
-            attempt.order.config,
-            attempt.directory.bag,
-            domain_id=domain,
-            timeout_s=attempt.order.timeout_s,
-            on_turn=attempt.go_on,
-        )
-
-
-def _fail(failure: MfbaError | StoppedError, attempt: Attempt) -> int:
-    """Say why in one line, and where to look; return the exit code unless it is 1."""
-    where = f"; what was recorded is in {attempt.directory.path}" if attempt.has_begun else ""
-    if isinstance(failure, StoppedError) and failure.exit_code != 1:
-        print(f"{failure}{where}", file=sys.stderr)
-        return failure.exit_code
-    raise MfbaError(f"{failure}{where}") from None
+    def show(self, tick: int, distance_m: float, mode: str = "") -> None:
+        """Show how far the run is."""
+        now, (then, before) = time.monotonic(), self._shown
+        self._shown = (now, tick)
+        parts = [
+            f"tick {tick}",
+            f"{distance_m:.2f} m to the goal",
+            mode.replace("_", " "),
+            f"{(tick - before) / (now - then):.0f} ticks/s" if now > then else "",
+        ]
+        self.screen.progress(", ".join(part for part in parts if part))

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What nodes exchange: topics and QoS, parameters, conversions, health."""
