@@ -41,7 +41,7 @@ setup(
         (f"{SHARE}/layout", glob("layout/*")),
     ],
     entry_points={
-        "console_scripts": [f"{program} = {NAME}.entry:{program}" for program in PROGRAMS],
+        "console_scripts": [f"{program} = {NAME}.entry_points:{program}" for program in PROGRAMS],
     },
     python_requires=">=3.10",
     # Each has its line in docs/dependencies.md. rclpy and the messages are not here: a sourced

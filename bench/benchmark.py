@@ -24,9 +24,9 @@ from benchmark_page import PER_MINUTE, render
 from benchmark_pictures import write_pictures
 from benchmark_runs import HEADLINE, Counts, Results, say
 
-from mfba_planner.outputs import new_run_directory
-from mfba_planner.study.compute import belong_to_the_parent
-from mfba_planner.worlds import suite_names
+from mfba_planner.core.outputs import new_run_directory
+from mfba_planner.evaluation.study.compute_chunks import belong_to_the_parent
+from mfba_planner.evaluation.suites import suite_names
 
 ROOT = Path(__file__).parents[1]
 RATE_WORLDS = 2000  # runs by which episodes per minute are measured

@@ -24,7 +24,10 @@ from benchmark_runs import (
     Results,
 )
 
-from mfba_planner.report.sweep import (
+from mfba_planner.evaluation.statistics import Interval
+from mfba_planner.evaluation.sweep.summary import Standing
+from mfba_planner.evaluation.sweep.table import sorted_hash
+from mfba_planner.report.sweep_tables import (
     NOTE,
     VERSUS_NOTE,
     markdown,
@@ -32,9 +35,6 @@ from mfba_planner.report.sweep import (
     standing_table,
     versus_table,
 )
-from mfba_planner.statistics import Interval
-from mfba_planner.sweep.summary import Standing
-from mfba_planner.sweep.table import sorted_hash
 
 PAPER, PREDICTIVE, ORCA = LEAD
 SUCCESS = {"random-10": 0.999, "random-20": 0.999, "random-30": 0.995, "adversarial": 0.99}

@@ -14,15 +14,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
+from mfba_planner.evaluation.statistics import Interval
+from mfba_planner.evaluation.sweep.columns import Row
+from mfba_planner.evaluation.sweep.explain_run import contact_index, explain
+from mfba_planner.evaluation.sweep.single_run import play
+from mfba_planner.evaluation.sweep.sweep_spec import Run
 from mfba_planner.report import style
-from mfba_planner.report.figure import run_figure
-from mfba_planner.report.moment import moment_png
-from mfba_planner.report.sheet import EDGE, Sheet, to_bytes
-from mfba_planner.statistics import Interval
-from mfba_planner.sweep.columns import Row
-from mfba_planner.sweep.explain import contact_index, explain
-from mfba_planner.sweep.order import Run
-from mfba_planner.sweep.play import play
+from mfba_planner.report.figure_canvas import EDGE, Sheet, to_bytes
+from mfba_planner.report.run_figure import run_figure
+from mfba_planner.report.tick_figure import moment_png
 
 PAPER, PREDICTIVE, ORCA = LEAD
 LOOKS: dict[str, dict[str, Any]] = {

@@ -9,17 +9,17 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.planners.predictive import preset
-from mfba_planner.study.compute import compute
-from mfba_planner.study.store import Store
-from mfba_planner.sweep.columns import Row, judged
-from mfba_planner.sweep.order import Order, Setting
-from mfba_planner.sweep.parts import Optima, parts_of
-from mfba_planner.sweep.run import open_store, sweep
-from mfba_planner.sweep.summary import Standing, Versus, standings, versus
-from mfba_planner.worlds import suite as suite_of
-from mfba_planner.worlds.suites import SPEED_MPS
+from mfba_planner.evaluation.study.chunk_store import Store
+from mfba_planner.evaluation.study.compute_chunks import compute
+from mfba_planner.evaluation.suites import suite as suite_of
+from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
+from mfba_planner.evaluation.sweep.chunks import Optima, parts_of
+from mfba_planner.evaluation.sweep.columns import Row, judged
+from mfba_planner.evaluation.sweep.run_sweep import open_store, sweep
+from mfba_planner.evaluation.sweep.summary import Standing, Versus, standings, versus
+from mfba_planner.evaluation.sweep.sweep_spec import Order, Setting
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.predictive import preset
 
 ORACLE = ("core", "oracle", "worlds")  # their code decides the optima
 HEADLINE = ("random-10", "random-20", "random-30", "adversarial")  # suites with --worlds
@@ -49,7 +49,7 @@ def _seen(perception: str, noise_m: float = 0.0, latency_ticks: int = 0) -> Sett
 
 
 def _without(name: str) -> str:
-    return f"mfba_planner.planners.ablation:{name}"
+    return f"mfba_planner.planning.peers.ablation:{name}"
 
 
 LEAD = (Entry("paper", "paper", PAPER), Entry("predictive", "predictive"), Entry("orca", "orca"))

@@ -10,11 +10,16 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from mfba_planner.launcher.crew import Crew
-from mfba_planner.launcher.domain import private_domain
-from mfba_planner.launcher.monitor import Monitor
-from mfba_planner.ros import topics
-from mfba_planner.run_config import NODES, RunConfig, node_parameters, recorder_parameters
+from mfba_planner.launcher.graph_monitor import Monitor
+from mfba_planner.launcher.node_processes import Crew
+from mfba_planner.launcher.ros_domain import private_domain
+from mfba_planner.ros.interface import topics
+from mfba_planner.scenarios.run_config import (
+    NODES,
+    RunConfig,
+    node_parameters,
+    recorder_parameters,
+)
 
 TIMEOUT_S = 180.0
 ALL = (topics.RECORDER, *NODES)

@@ -17,12 +17,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mfba_planner.core.bat import BatParams
-from mfba_planner.core.episode import run
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner import Mode, Observation, Planner, PlannerParams
-from mfba_planner.core.streams import stream
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.core.random_streams import stream
+from mfba_planner.planning.algorithm_1 import Mode, Observation, Planner, PlannerParams
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import run
+from mfba_planner.swarm.bat_swarm import BatParams
 
 BUDGET_US = 200.0
 RUN_BUDGET_MS = 50.0

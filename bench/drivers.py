@@ -14,12 +14,12 @@ import tempfile
 from itertools import product
 from pathlib import Path
 
-from mfba_planner.core.episode import Episode, run
-from mfba_planner.core.metrics import evaluate
 from mfba_planner.core.options import override
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Episode, run
 
 MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
 

@@ -19,15 +19,15 @@ import numpy as np
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import LaserScan
 
-from mfba_planner.core.episode import run
 from mfba_planner.core.options import flatten
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.core.sensing import SensorParams
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.configuration import attach_configuration
-from mfba_planner.recording.writer import BagWriter
-from mfba_planner.ros.convert import decision_msg, sectors_msg, set_stamp
-from mfba_planner.run_config import RunConfig, node_parameters
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.ros.interface.conversions import decision_msg, sectors_msg, set_stamp
+from mfba_planner.scenarios.run_config import RunConfig, node_parameters
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import run
 
 MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
 

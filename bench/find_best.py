@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 
-from mfba_planner.core.bat import BatParams
-from mfba_planner.core.batch import CACHED_BATS, minimize_batch
-from mfba_planner.core.region import Box
 from mfba_planner.paper.readings import SWARMS
+from mfba_planner.swarm.bat_swarm import BatParams
+from mfba_planner.swarm.batched_swarms import CACHED_BATS, minimize_batch
+from mfba_planner.swarm.search_region import Box
 
 Array = np.ndarray
 Setting = dict[str, Any]

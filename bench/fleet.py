@@ -16,18 +16,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mfba_planner.core.episode import Look, Outcome, look, look_at_scan
-from mfba_planner.core.fleet import MakeBrain, run_fleet
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.planner import Planner, PlannerParams
-from mfba_planner.core.robot import Lidar, Robot
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Member, Scenario
-from mfba_planner.planners.orca import Orca
-from mfba_planner.planners.perception import Perception
-from mfba_planner.planners.prediction import RiskParams
-from mfba_planner.planners.predictive import Predictive, PredictiveParams, preset
-from mfba_planner.statistics import share_interval
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.evaluation.statistics import share_interval
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Planner, PlannerParams
+from mfba_planner.planning.peers.orca import Orca
+from mfba_planner.planning.predictive import Predictive, PredictiveParams, preset
+from mfba_planner.planning.trajectory_cost import RiskParams
+from mfba_planner.simulation.episode import Look, Outcome, look, look_at_scan
+from mfba_planner.simulation.fleet import MakeBrain, run_fleet
+from mfba_planner.simulation.planner_observations import Perception
+from mfba_planner.simulation.robot_model import Lidar, Robot
+from mfba_planner.simulation.scenario import Member, Scenario
 
 JITTER_DEG = 8.0  # of 36 between two robots
 JITTER_STREAM = 7  # spawn key of the places' SeedSequence children

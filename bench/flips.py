@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from mfba_planner.core.planner import Mode
-from mfba_planner.verification.check import verify
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.verification.verify_bag import verify
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "test"))
 from edited_bags import one_changed, record, rewrite, set_field

@@ -30,8 +30,8 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 
-from mfba_planner.ros.runtime import make_executor
-from mfba_planner.ros.topics import TICK_QOS
+from mfba_planner.ros.interface.topics import TICK_QOS
+from mfba_planner.ros.runtime.node_runtime import make_executor
 
 HOPS = ("world", "sensor", "planner")
 TICKS = 500

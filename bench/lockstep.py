@@ -27,17 +27,17 @@ from pathlib import Path
 import numpy as np
 from by_hand import ALL, ByHand
 
-from mfba_planner.core.digest import digest
 from mfba_planner.core.options import override
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Obstacle, Scenario, Walls
-from mfba_planner.launcher.domain import private_domain
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings
-from mfba_planner.planners.method import simulate
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import Driver, RunConfig
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.verification.check import verify
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.scenarios.run_config import Driver, RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.scenario import Obstacle, Scenario, Walls
+from mfba_planner.verification.verify_bag import verify
 
 
 def random_world(rng: np.random.Generator) -> Scenario:

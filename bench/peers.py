@@ -31,11 +31,11 @@ from niapy.problems import Problem
 from niapy.task import Task
 from numpy.random import PCG64, Generator
 
-from mfba_planner.core.bat import Algorithm, BatParams, minimize
-from mfba_planner.core.batch import minimize_batch
-from mfba_planner.core.region import Box
 from mfba_planner.paper.functions import FUNCTIONS, Function
 from mfba_planner.paper.readings import SWARMS
+from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, minimize
+from mfba_planner.swarm.batched_swarms import minimize_batch
+from mfba_planner.swarm.search_region import Box
 
 Array = np.ndarray
 POPULATION, ITERATIONS, DIMENSION = 40, 200, 2

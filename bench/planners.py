@@ -18,9 +18,9 @@ import numpy as np
 from decision import FREE, decisions, measure
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner import Circle, Mode, Observation, PlannerParams
-from mfba_planner.planners.predictive import preset
-from mfba_planner.planners.registry import make
+from mfba_planner.planning.algorithm_1 import Circle, Mode, Observation, PlannerParams
+from mfba_planner.planning.planner_registry import make
+from mfba_planner.planning.predictive import preset
 
 COUNTS = (1, 3, 10, 30, 100, 300, 1000)
 RADIUS_M, SR_M = 0.6, 0.8

@@ -22,10 +22,10 @@ from pybag.mcap_reader import McapFileReader
 from rosbags.highlevel import AnyReader
 
 from mfba_planner.core.errors import BagError
-from mfba_planner.recording.qos import OfferedQos
-from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.bag_writer import BagWriter
+from mfba_planner.recording.qos_profiles import OfferedQos
 from mfba_planner.recording.recover import recover
-from mfba_planner.recording.writer import BagWriter
 
 MAX_LOSS_S = 1.0
 TIMER_NS = 250_000_000  # as the recorder node's

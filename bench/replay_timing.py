@@ -24,12 +24,12 @@ from typing import Any
 
 import rclpy
 
-from mfba_planner.launcher.domain import private_domain
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.ros.runtime import make_executor
-from mfba_planner.run_config import RunConfig
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.ros_domain import private_domain
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.ros.runtime.node_runtime import make_executor
+from mfba_planner.scenarios.run_config import RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 ROOT = Path(__file__).parents[1]
 FOREIGN = ROOT / "test/data/rosbag2_foreign_scan"

@@ -15,17 +15,17 @@ from pathlib import Path
 
 from rclpy.context import Context
 
-from mfba_planner.core.digest import digest
 from mfba_planner.core.options import flatten, override
-from mfba_planner.launcher.crew import parameters_yaml
-from mfba_planner.launcher.domain import private_domain
-from mfba_planner.messages import decision, stamp_ns
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.node_processes import parameters_yaml
+from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.ros import topics
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import RunConfig
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.recording.messages import decision, stamp_ns
+from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.ros.interface import topics
+from mfba_planner.scenarios.run_config import RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.decision_digest import digest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "test"))
 from graph import Graph

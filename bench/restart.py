@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from by_hand import ByHand
 
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import run
-from mfba_planner.core.planner import PlannerParams
 from mfba_planner.paper import readings
-from mfba_planner.run_config import RunConfig
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.verification.check import verify
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.scenarios.run_config import RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import run
+from mfba_planner.verification.verify_bag import verify
 
 
 def interrupted_run(config: RunConfig, kill_at: int, bag: Path) -> None:

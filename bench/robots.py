@@ -12,17 +12,17 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
-from mfba_planner.core.drive import SUBTICK_NS, Speeds, command, obey
-from mfba_planner.core.episode import Episode, Outcome
-from mfba_planner.core.planner import NANO, Method, PlannerParams
-from mfba_planner.core.robot import Drive, Lidar, Noise, Robot
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Scenario, step_clearances
-from mfba_planner.planners.method import simulate
-from mfba_planner.planners.predictive import preset
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.statistics import share_interval
-from mfba_planner.worlds.suites import suite
+from mfba_planner.evaluation.statistics import share_interval
+from mfba_planner.evaluation.suites.named_suites import suite
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import NANO, Method, PlannerParams
+from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.planning.predictive import preset
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.differential_drive import SUBTICK_NS, Speeds, command, obey
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.scenario import Scenario, step_clearances
 
 CASES = ("case1", "case2")
 SECTORS = replace(preset(), method=Method.PREDICTIVE)

@@ -28,8 +28,8 @@ from typing import NamedTuple
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 from mfba_planner.core.errors import MfbaError
-from mfba_planner.launcher.domain import private_domain
-from mfba_planner.recording.reader import BagReader
+from mfba_planner.launcher.ros_domain import private_domain
+from mfba_planner.recording.bag_reader import BagReader
 
 ROOT = Path(__file__).resolve().parents[1]
 FOREIGN_BAG = ROOT / "test" / "data" / "rosbag2_foreign_scan"
@@ -115,8 +115,8 @@ def traffic(domain: int) -> Iterator[None]:
     from rclpy.context import Context
 
     from mfba_planner.core.geometry import Pose2D
-    from mfba_planner.core.sensing import SensorParams
-    from mfba_planner.ros import convert, topics
+    from mfba_planner.perception.sensory_vector import SensorParams
+    from mfba_planner.ros.interface import conversions, topics
 
     context = Context()
     context.init(domain_id=domain)
@@ -130,11 +130,11 @@ def traffic(domain: int) -> Iterator[None]:
             now = time.monotonic_ns()
             pose = Pose2D(0.0, 0.0)
             odom, obstacles, sectors, goal = writers
-            odom.publish(convert.odometry_msg(pose, (0.0, 0.0), now, "odom", "base_link"))
-            obstacles.publish(convert.obstacles_msg([(1.0, 1.0)], now, "odom"))
-            sectors.publish(convert.sectors_msg((9.0,) * 12, SensorParams(), 0.3, now, "odom"))
+            odom.publish(conversions.odometry_msg(pose, (0.0, 0.0), now, "odom", "base_link"))
+            obstacles.publish(conversions.obstacles_msg([(1.0, 1.0)], now, "odom"))
+            sectors.publish(conversions.sectors_msg((9.0,) * 12, SensorParams(), 0.3, now, "odom"))
             if now // 10_000_000 % 100 == 0:
-                goal.publish(convert.pose_stamped_msg((5.0, 5.0), now, "odom"))
+                goal.publish(conversions.pose_stamped_msg((5.0, 5.0), now, "odom"))
 
     thread = threading.Thread(target=publish)
     thread.start()

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """`dwa` as tutorials (PythonRobotics) have it: one velocity after the other, step by step.
 
-A peer of the measurement of cost alone: it samples, judges and chooses as planners/dwa.py does.
+A peer of the measurement of cost alone: it samples, judges and chooses as
+planning/peers/dwa.py does.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from mfba_planner.planners.dwa import HORIZON_S, DynamicWindow
+from mfba_planner.planning.peers.dwa import HORIZON_S, DynamicWindow
 
 STEP_S = 0.1  # the tutorial's, too
 

@@ -11,12 +11,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.launcher.domain import private_domain
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import RunConfig
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.verification.check import verify
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.ros_domain import private_domain
+from mfba_planner.scenarios.run_config import RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.verification.verify_bag import verify
 
 MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from launch.launch_description import LaunchDescription
 
-from mfba_planner.launcher.launch_files import describe
-from mfba_planner.launcher.robot_by_launch import REPLAY_ARGUMENTS, replayed
+from mfba_planner.launcher.launch_actions import describe
+from mfba_planner.launcher.robot_launch import REPLAY_ARGUMENTS, replayed
 
 
 def generate_launch_description() -> LaunchDescription:

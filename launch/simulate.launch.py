@@ -10,9 +10,9 @@ from collections.abc import Mapping
 
 from launch.launch_description import LaunchDescription
 
-from mfba_planner.launcher.by_launch import ARGUMENTS, told_by_launch
-from mfba_planner.launcher.launch_files import describe
-from mfba_planner.launcher.robot_by_launch import Start
+from mfba_planner.launcher.launch_actions import describe
+from mfba_planner.launcher.robot_launch import Start
+from mfba_planner.launcher.simulate_launch import ARGUMENTS, told_by_launch
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -99,7 +99,7 @@ def _node(name: str) -> int:
     """Run a node, which ends with 0 on SIGINT and SIGTERM; its runtime takes both over."""
     _start(on_sigint=0, on_sigterm=0)
     code = guarded_main(
-        lambda: int(import_module(f"mfba_planner.ros.{name}").main(sys.argv[1:])),
+        lambda: int(import_module(f"mfba_planner.ros.nodes.{name}").main(sys.argv[1:])),
         name,
         interrupted=0,
     )

@@ -5,7 +5,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from mfba_planner.core.bat import (
+from mfba_planner.swarm.bat_swarm import (
     Acceptance,
     Algorithm,
     BatParams,

@@ -8,17 +8,17 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message, serialize_message
 
-from mfba_planner.launcher.domain import claim_domain
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.ros_domain import claim_domain
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.configuration import attach_configuration, read_configuration
-from mfba_planner.recording.merge import RawMessage
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.writer import BagWriter
-from mfba_planner.ros import topics
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.ros.qos import offered
-from mfba_planner.ros.serialized import type_name
-from mfba_planner.run_config import Driver, RunConfig
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.recording.merge_by_time import RawMessage
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.qos_conversion import offered
+from mfba_planner.ros.interface.serialized_message import type_name
+from mfba_planner.scenarios.run_config import Driver, RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 
 def record(directory: Path, scenario: str, seed: int) -> Path:

@@ -7,9 +7,9 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from mfba_planner.core.planner import Decision, Observation, PlannerParams
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.planners.straight import Straight
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Decision, Observation, PlannerParams
+from mfba_planner.planning.peers.straight_line import Straight
 
 GOOD_TICKS = 5
 

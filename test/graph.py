@@ -12,8 +12,8 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
-from mfba_planner.ros.runtime import GraphNode, make_executor
-from mfba_planner.ros.topics import Topic
+from mfba_planner.ros.interface.topics import Topic
+from mfba_planner.ros.runtime.node_runtime import GraphNode, make_executor
 
 N = TypeVar("N", bound=GraphNode)
 SETTLE_TURNS = 40  # delivery within a process is synchronous: two turns bring one message

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 # The launcher's own: tests and runs must not meet in a domain.
-from mfba_planner.launcher.domain import claim_domain as claim_domain
+from mfba_planner.launcher.ros_domain import claim_domain as claim_domain
 
 
 def spin_until(executor: Any, condition: Callable[[], bool], timeout_s: float = 30.0) -> None:

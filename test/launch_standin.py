@@ -104,7 +104,7 @@ _NAMES: dict[str, dict[str, Any]] = {
     "launch_ros.actions": {"Node": Node},
     "launch_ros.parameter_descriptions": {"ParameterValue": _Value},
 }
-_OURS = "mfba_planner.launcher.launch_files"
+_OURS = "mfba_planner.launcher.launch_actions"
 
 
 @contextmanager

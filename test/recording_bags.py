@@ -19,9 +19,9 @@ from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float64MultiArray, String
 
-from mfba_planner.recording.qos import OfferedQos
-from mfba_planner.recording.schemas import definition_of
-from mfba_planner.recording.writer import BagWriter
+from mfba_planner.recording.bag_writer import BagWriter
+from mfba_planner.recording.message_definitions import definition_of
+from mfba_planner.recording.qos_profiles import OfferedQos
 
 FOREIGN = Path(__file__).parent / "data" / "rosbag2_foreign_scan"
 SECOND = 1_000_000_000

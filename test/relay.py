@@ -6,11 +6,11 @@ from typing import Any
 
 from graph import Graph
 
-from mfba_planner.messages import stamp_ns
-from mfba_planner.ros import topics
-from mfba_planner.ros.planner import PlannerNode
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.ros.world_sim import WorldSim
+from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.nodes.world_sim import WorldSim
 
 TICK_NS = 100_000_000
 SPEED_FACTOR = 0.25  # slow motion: a busy machine must not look like a fault

@@ -20,10 +20,10 @@ from rclpy.context import Context
 from talk import INF, goal, odom
 
 from mfba_planner.core.errors import MfbaError
-from mfba_planner.messages import decision
-from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.messages import decision
 from mfba_planner.recording.recover import recover
-from mfba_planner.ros import topics
+from mfba_planner.ros.interface import topics
 
 PACKAGE = "mfba_planner"
 SOON_S = 60.0  # a busy machine is not a failure

@@ -10,11 +10,11 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner import Mode
-from mfba_planner.core.sensing import Ranges, SensorParams
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import odometry_msg, pose_stamped_msg, sectors_msg
-from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.perception.sensory_vector import Ranges, SensorParams
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import odometry_msg, pose_stamped_msg, sectors_msg
+from mfba_planner.ros.nodes.planner import PlannerNode
 
 INF, NAN = math.inf, math.nan
 FREE: Ranges = (INF,) * 12

@@ -4,7 +4,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.ros.answers import Answers
+from mfba_planner.ros.runtime.command_matching import Answers
 
 
 def test_a_twist_belongs_to_the_goal_step_before_it() -> None:

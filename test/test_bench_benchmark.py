@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 import shown
 
-from mfba_planner.planners.dwa import DynamicWindow
-from mfba_planner.report.sweep import HEAD
-from mfba_planner.statistics import Interval
-from mfba_planner.sweep.read import read_sweep
-from mfba_planner.worlds import suite_names
+from mfba_planner.evaluation.statistics import Interval
+from mfba_planner.evaluation.suites import suite_names
+from mfba_planner.evaluation.sweep.read_sweep import read_sweep
+from mfba_planner.planning.peers.dwa import DynamicWindow
+from mfba_planner.report.sweep_tables import HEAD
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "bench" / "benchmark.py"

@@ -13,9 +13,9 @@ import pytest
 from launching import PROGRAM, ROOT, complete
 
 from mfba_planner import __version__, cli
-from mfba_planner.core.episode import run
-from mfba_planner.entry import guarded_main
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.entry_points import guarded_main
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import run
 
 Said = pytest.CaptureFixture[str]
 

@@ -11,10 +11,10 @@ from edited_bags import one_changed, record, rewrite
 from pyarrow import parquet
 
 from mfba_planner import cli
-from mfba_planner.core import episode
 from mfba_planner.core.errors import BagError, ConfigError, OutputError
-from mfba_planner.recording.table import COLUMNS
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.recording.tick_table import COLUMNS
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation import episode
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from mfba_planner import cli
-from mfba_planner.core.episode import Episode, run
-from mfba_planner.entry import guarded_main
-from mfba_planner.report.result import result_to_dict, write_result
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.entry_points import guarded_main
+from mfba_planner.report.result_json import result_to_dict, write_result
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Episode, run
 
 Said = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parents[1]

@@ -14,14 +14,14 @@ from launching import Program, complete
 
 from mfba_planner import cli
 from mfba_planner.cli.sweep import command
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.entry import guarded_main
-from mfba_planner.planners.predictive import preset
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.sweep import parts
-from mfba_planner.sweep.order import Order, Setting
-from mfba_planner.sweep.run import sweep
-from mfba_planner.worlds.suites import SPEED_MPS
+from mfba_planner.entry_points import guarded_main
+from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
+from mfba_planner.evaluation.sweep import chunks as parts
+from mfba_planner.evaluation.sweep.run_sweep import sweep
+from mfba_planner.evaluation.sweep.sweep_spec import Order, Setting
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.predictive import preset
+from mfba_planner.recording.read_episode import read_episode
 
 Said = pytest.CaptureFixture[str]
 HASH = re.compile(r"^sorted hash ([0-9a-f]{64})$", re.MULTILINE)
@@ -132,7 +132,7 @@ def test_mistakes_cost_one_line(args: list[str], reason: str, capsys: Said) -> N
 def test_a_scheduler_that_is_not_there_costs_one_line(
     capsys: Said, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mfba_planner.sweep.run.CONNECT_S", 1)
+    monkeypatch.setattr("mfba_planner.evaluation.sweep.run_sweep.CONNECT_S", 1)
     monkeypatch.chdir(tmp_path)
     assert mfba("sweep", "paper", "--scheduler", "tcp://127.0.0.1:9") == 1
     assert "--scheduler tcp://127.0.0.1:9: cannot be reached" in capsys.readouterr().err

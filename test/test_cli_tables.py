@@ -23,7 +23,7 @@ from helpers import wait_until
 from launching import PROGRAM, Program, complete
 
 from mfba_planner import __version__, cli
-from mfba_planner.entry import guarded_main
+from mfba_planner.entry_points import guarded_main
 from mfba_planner.paper import doubts, published
 from mfba_planner.paper.readings import PLANNERS
 from mfba_planner.paper.tables.model import Verdict

@@ -8,11 +8,11 @@ import pytest
 from edited_bags import last_bit, one_changed, record, rewrite, set_field
 
 from mfba_planner import cli
-from mfba_planner.core import episode
-from mfba_planner.core.digest import digest
 from mfba_planner.core.errors import BagError, ConfigError, OutputError
-from mfba_planner.report.result import result_to_dict, write_result
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.report.result_json import result_to_dict, write_result
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation import episode
+from mfba_planner.simulation.decision_digest import digest
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_closed_loop_finds_a_world_that_was_not_simulated(
     bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Each decision is what the planner decides, but the robot did not go there."""
-    from mfba_planner.recording.reader import BagReader
+    from mfba_planner.recording.bag_reader import BagReader
 
     with BagReader(bag) as reader:
         end = reader.end_ns or 0

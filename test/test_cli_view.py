@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from mfba_planner import cli
-from mfba_planner.core.episode import Episode, run
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
-from mfba_planner.launcher.options import read_order
+from mfba_planner.launcher.run_arguments import read_order
 from mfba_planner.report.html.data import clearances
-from mfba_planner.report.viewer import save
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.report.rerun_viewer import save
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Episode, run
 
 RERUN = Path(sys.executable).parent / "rerun"
 ROWS = re.compile(r"^Chunk\(\w+\) with (\d+) rows .*? - (/\S+)", re.MULTILINE)

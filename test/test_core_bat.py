@@ -15,8 +15,9 @@ from any_bats import ANY_READING, OURS, READINGS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core import bat
-from mfba_planner.core.bat import (
+from mfba_planner.core.errors import ConfigError, InputError
+from mfba_planner.swarm import bat_swarm
+from mfba_planner.swarm.bat_swarm import (
     Acceptance,
     Algorithm,
     BatParams,
@@ -35,8 +36,7 @@ from mfba_planner.core.bat import (
     Walk,
     minimize,
 )
-from mfba_planner.core.errors import ConfigError, InputError
-from mfba_planner.core.flight import Law
+from mfba_planner.swarm.swarm_iteration import Law
 
 Values = list[float]
 BOX = Box((-1.0, 10.0), (3.0, 12.0))
@@ -406,7 +406,7 @@ def test_drawing_ahead_changes_nothing(p: BatParams, seed: int) -> None:
     assert (ahead.best_x, ahead.candidates) == (swarm.best_x, swarm.candidates)
     assert rng.random() == other.random(), "nothing is drawn in vain"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bat, "DRAWN_AHEAD", 50)
+        patch.setattr(bat_swarm, "DRAWN_AHEAD", 50)
         assert minimize(sphere, BOX, p, generator(seed)).candidates == swarm.candidates
 
 

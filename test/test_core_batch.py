@@ -10,10 +10,19 @@ from any_bats import ANY_READING
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core import batch
-from mfba_planner.core.bat import Algorithm, BatParams, BatSwarm, Box, Disc, Vector, Walk, minimize
-from mfba_planner.core.batch import minimize_batch
 from mfba_planner.core.errors import InputError
+from mfba_planner.swarm import batched_swarms
+from mfba_planner.swarm.bat_swarm import (
+    Algorithm,
+    BatParams,
+    BatSwarm,
+    Box,
+    Disc,
+    Vector,
+    Walk,
+    minimize,
+)
+from mfba_planner.swarm.batched_swarms import minimize_batch
 
 BOX = Box((-1.0, -2.0), (3.0, 0.5))
 BOXES = st.lists(
@@ -82,8 +91,8 @@ def test_loud_and_quiet_bats_walk_as_far_as_in_the_single_engine(a0: float) -> N
 def test_long_runs_in_pieces_are_the_same_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     p = BatParams(population=8, iterations=40, f_max=1.5)
     whole = minimize_batch(bowls, BOX, p, generators(9))
-    monkeypatch.setattr(batch, "CACHED_BATS", 16)  # two runs at once
-    monkeypatch.setattr(batch, "DRAWN", 500)  # six iterations drawn at once
+    monkeypatch.setattr(batched_swarms, "CACHED_BATS", 16)  # two runs at once
+    monkeypatch.setattr(batched_swarms, "DRAWN", 500)  # six iterations drawn at once
     pieces = minimize_batch(bowls, BOX, p, generators(9))
     for name in ("best_value", "best_x", "history", "failures"):
         assert np.array_equal(getattr(whole, name), getattr(pieces, name)), name

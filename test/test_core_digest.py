@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core import episode
-from mfba_planner.core.digest import HEAD, canonical, digest
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner import Decision, Mode
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.planning.algorithm_1 import Decision, Mode
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation import episode
+from mfba_planner.simulation.decision_digest import HEAD, canonical, digest
 
 SAMPLE = Decision(
     stamp_ns=5,

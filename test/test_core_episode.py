@@ -8,23 +8,15 @@ from typing import Any
 import pytest
 from trips import post, trip
 
-from mfba_planner.core.bat import Algorithm, BatParams
-from mfba_planner.core.episode import (
-    Episode,
-    Outcome,
-    World,
-    advance,
-    run,
-    sense,
-    stamp_of,
-)
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.metrics import Result, evaluate, tick_clearances
-from mfba_planner.core.planner import Method, Mode, Observation, Planner, PlannerParams
-from mfba_planner.core.sensing import SensorParams, sense_circles
-from mfba_planner.core.world import Obstacle, Scenario
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.evaluation.metrics import Result, evaluate, tick_clearances
+from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
+from mfba_planner.planning.algorithm_1 import Method, Mode, Observation, Planner, PlannerParams
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Episode, Outcome, World, advance, run, sense, stamp_of
+from mfba_planner.simulation.scenario import Obstacle, Scenario
+from mfba_planner.swarm.bat_swarm import Algorithm, BatParams
 
 STRAIGHT = 12.0 * math.sqrt(2.0)  # 16.9706 m
 TASK: dict[str, Any] = {"name": "x", "start_m": (0.0, 0.0), "goal_m": (4.0, 0.0)}

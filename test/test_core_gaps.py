@@ -5,8 +5,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from mfba_planner.core.gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
-from mfba_planner.core.sensing import Bits
+from mfba_planner.perception.sensory_vector import Bits
+from mfba_planner.planning.gap_vector import GapHeading, gap_heading, gap_vector, nearest_free_gap
 
 BITS = st.lists(st.integers(0, 1), min_size=3, max_size=40).map(tuple)
 ANGLES = st.floats(-10.0, 10.0)

@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from mfba_planner.core.episode import World
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D, distance
-from mfba_planner.core.nearby import FEW
-from mfba_planner.core.sensing import SensorParams, sense_circles
-from mfba_planner.worlds import suite
+from mfba_planner.evaluation.suites import suite
+from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
+from mfba_planner.simulation.episode import World
+from mfba_planner.simulation.nearby_obstacles import FEW
 
 SR_M = 0.8
 

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core import errors
-from mfba_planner.core.bat import Algorithm, BatParams, Bounds
 from mfba_planner.core.errors import ConfigError, MfbaError
 from mfba_planner.core.options import Spec, check, did_you_mean, flatten, option, override, walk
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.core.sensing import SensorParams
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, Bounds
 
 
 class Colour(Enum):

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from mfba_planner.core.bat import Algorithm, BatParams, Bounds, Schedule
-from mfba_planner.core.episode import Outcome, World, run, sense
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.planner import (
+from mfba_planner.core.random_streams import stream
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.paper import readings
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import (
     Decision,
     Event,
     Mode,
@@ -26,11 +27,10 @@ from mfba_planner.core.planner import (
     decide,
     transition,
 )
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.streams import stream
-from mfba_planner.core.world import Scenario
-from mfba_planner.paper import readings
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Outcome, World, run, sense
+from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, Bounds, Schedule
 
 FREE = (math.inf,) * 12
 GOAL = (12.0, 12.0)

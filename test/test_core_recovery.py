@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core.caution import CautionParams, allowed_share
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
-from mfba_planner.core.guarded import Guarded
 from mfba_planner.core.options import override
-from mfba_planner.core.planner import Decision, Mode, Observation, Planner, PlannerParams
-from mfba_planner.core.recovery import (
+from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
+from mfba_planner.planning.algorithm_1 import Decision, Mode, Observation, Planner, PlannerParams
+from mfba_planner.planning.planner_factory import brain
+from mfba_planner.planning.recovery import (
     Phase,
     Recovery,
     RecoveryParams,
@@ -22,8 +22,8 @@ from mfba_planner.core.recovery import (
     longest_s,
     most_room,
 )
-from mfba_planner.core.sensing import SensorParams, sense_circles
-from mfba_planner.planners.method import brain
+from mfba_planner.planning.speed_limit import CautionParams, allowed_share
+from mfba_planner.planning.supervised_planner import Guarded
 
 S = 1_000_000_000
 INF = math.inf

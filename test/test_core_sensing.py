@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Point, towards
-from mfba_planner.core.sensing import (
+from mfba_planner.perception.sensory_vector import (
     Scan,
     SensorParams,
     longest_range_m,

@@ -10,12 +10,19 @@ from any_bats import ANY_READING
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core import planner as module
-from mfba_planner.core.bat import BatParams, Bounds, Disc, Schedule, minimize
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.planner import FEW, Observation, Planner, PlannerParams, Swarm, fly_together
-from mfba_planner.core.steps import Start, Step, fresh_step, fresh_steps
-from mfba_planner.core.streams import stream
+from mfba_planner.core.random_streams import stream
+from mfba_planner.planning import algorithm_1 as module
+from mfba_planner.planning.algorithm_1 import (
+    FEW,
+    Observation,
+    Planner,
+    PlannerParams,
+    Swarm,
+    fly_together,
+)
+from mfba_planner.planning.path_generation import Start, Step, fresh_step, fresh_steps
+from mfba_planner.swarm.bat_swarm import BatParams, Bounds, Disc, Schedule, minimize
 
 FREE = (math.inf,) * 12
 GOAL = (12.0, 12.0)

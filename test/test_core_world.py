@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point
-from mfba_planner.core.world import (
+from mfba_planner.simulation.scenario import (
     Obstacle,
     Scenario,
     Turn,

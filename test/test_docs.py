@@ -10,7 +10,8 @@ import pytest
 import shown
 from shown import ROOT
 
-from mfba_planner import cli, scenario_model
+from mfba_planner import cli
+from mfba_planner.scenarios import yaml_schema
 
 DOCS = ROOT / "docs"
 PAGES = {name[len("docs/") :]: page for name, page in shown.PAGES.items() if "docs/" in name}
@@ -48,7 +49,7 @@ def test_the_reference_holds_every_command_and_every_key(built: Path) -> None:
         assert f"mfba {name}<" in commands
     assert commands.count("usage: ") >= len(cli.COMMANDS)
     keys = (built / "reference/scenario.html").read_text(encoding="utf-8")
-    schema = scenario_model.schema()
+    schema = yaml_schema.schema()
     for part in (schema, *schema["$defs"].values()):
         for key, entry in part["properties"].items():
             assert f">{key}<" in keys

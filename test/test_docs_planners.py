@@ -8,7 +8,7 @@ import pytest
 import shown
 
 from mfba_planner import cli
-from mfba_planner.planners.registry import PLANNERS
+from mfba_planner.planning.planner_registry import PLANNERS
 
 PAGE = (Path(__file__).parents[1] / "docs/planners.md").read_text(encoding="utf-8")
 

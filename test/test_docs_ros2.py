@@ -15,9 +15,9 @@ import yaml
 from ros2_session import KINDS, SOON_S, Session, holds, kind_of
 from shown import PAGES, ROOT
 
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import RunConfig
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.scenarios.run_config import RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 # Other people's programs, and who holds us to what is said of them.
 MENTIONED = {

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core.drive import Speeds, arc, brake, command, obey, track
-from mfba_planner.core.episode import Outcome, World, run
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, carried, distance
-from mfba_planner.core.planner import Decision, Mode, PlannerParams
-from mfba_planner.core.robot import Base, Drive, Lidar, Noise, Robot
-from mfba_planner.core.world import Scenario
-from mfba_planner.scenarios import load_scenario, parse_scenario, scenario_to_json
+from mfba_planner.planning.algorithm_1 import Decision, Mode, PlannerParams
+from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario, scenario_to_json
+from mfba_planner.simulation.differential_drive import Speeds, arc, brake, command, obey, track
+from mfba_planner.simulation.episode import Outcome, World, run
+from mfba_planner.simulation.robot_model import Base, Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.scenario import Scenario
 
 TICK_NS = 100_000_000
 ORIGIN = Pose2D(0.0, 0.0)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mfba_planner.core.errors import BagError
-from mfba_planner.entry import guarded_main
+from mfba_planner.entry_points import guarded_main
 
 ROOT = Path(__file__).parents[1]
 

@@ -13,25 +13,32 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner import cli
-from mfba_planner.core.caution import CautionParams
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Outcome, World, run
 from mfba_planner.core.errors import BagError, ConfigError
-from mfba_planner.core.fleet import Fleet, alone, run_fleet, seed_of, way
 from mfba_planner.core.geometry import Point, Pose2D, closest_approach, distance
-from mfba_planner.core.metrics import evaluate, tick_clearances
-from mfba_planner.core.planner import Decision, Method, Mode, Observation, PlannerParams
-from mfba_planner.core.robot import Drive, Lidar, Robot
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Kidnapping, Member, Obstacle, Scenario, Walls, center_at
-from mfba_planner.planners.method import simulate_fleet
-from mfba_planner.planners.perception import Perception
-from mfba_planner.planners.predictive import preset
-from mfba_planner.planners.registry import make
-from mfba_planner.recording.episode import read_episode, read_recording
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.report.result import read_result
-from mfba_planner.scenarios import load_scenario, scenario_to_json
+from mfba_planner.evaluation.metrics import evaluate, tick_clearances
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Decision, Method, Mode, Observation, PlannerParams
+from mfba_planner.planning.planner_factory import simulate_fleet
+from mfba_planner.planning.planner_registry import make
+from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.speed_limit import CautionParams
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.read_episode import read_episode, read_recording
+from mfba_planner.report.result_json import read_result
+from mfba_planner.scenarios.scenario_files import load_scenario, scenario_to_json
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Outcome, World, run
+from mfba_planner.simulation.fleet import Fleet, alone, run_fleet, seed_of, way
+from mfba_planner.simulation.planner_observations import Perception
+from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
+from mfba_planner.simulation.scenario import (
+    Kidnapping,
+    Member,
+    Obstacle,
+    Scenario,
+    Walls,
+    center_at,
+)
 
 TICK_NS = PlannerParams().tick_ns
 

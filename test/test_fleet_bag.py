@@ -16,18 +16,18 @@ from test_cli_report import data_of
 from test_cli_view import rows_of
 
 from mfba_planner import cli
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Episode
 from mfba_planner.core.errors import BagError, ConfigError, InputError
-from mfba_planner.core.fleet import run_fleet
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.robot import Noise, Robot
-from mfba_planner.core.world import Member, Obstacle, Scenario, center_at
-from mfba_planner.recording.episode import read_episode, read_recording
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.scenarios import scenario_to_json
-from mfba_planner.verification.check import verify
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.read_episode import read_episode, read_recording
+from mfba_planner.scenarios.scenario_files import scenario_to_json
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.fleet import run_fleet
+from mfba_planner.simulation.robot_model import Noise, Robot
+from mfba_planner.simulation.scenario import Member, Obstacle, Scenario, center_at
+from mfba_planner.verification.verify_bag import verify
 
 # b has arrived long before the others; odometry errs, so that truth is recorded as well.
 TRIO = Scenario(

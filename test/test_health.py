@@ -3,12 +3,12 @@
 
 import pytest
 
-from mfba_planner.core.recovery import Phase
-from mfba_planner.node_settings import WorldSimSettings
-from mfba_planner.ros.deadman import Deadman
-from mfba_planner.ros.errands import Errands
-from mfba_planner.ros.health import Health, Level, Pulse, driving
-from mfba_planner.ros.inputs import watch_period_s
+from mfba_planner.planning.recovery import Phase
+from mfba_planner.ros.interface.health import Health, Level, Pulse, driving
+from mfba_planner.ros.interface.node_parameters import WorldSimSettings
+from mfba_planner.ros.runtime.command_timeout import Deadman
+from mfba_planner.ros.runtime.goal_queue import Errands
+from mfba_planner.ros.runtime.stale_inputs import watch_period_s
 
 
 def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:

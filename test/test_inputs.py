@@ -7,7 +7,7 @@ import pytest
 
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.ros.inputs import Lockstep, Newest, Ready
+from mfba_planner.ros.runtime.stale_inputs import Lockstep, Newest, Ready
 
 HERE, THERE = Pose2D(1.0, 2.0), Pose2D(3.0, 4.0)
 FREE = (math.inf,) * 12

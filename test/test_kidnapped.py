@@ -12,27 +12,27 @@ from graph import Graph
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mfba_planner.core.episode import Episode, Outcome, run
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, distance
-from mfba_planner.core.jump import carried_off
-from mfba_planner.core.metrics import assess, evaluate, tick_clearances
-from mfba_planner.core.planner import Method, Mode, Planner, PlannerParams, Swarm, observe
-from mfba_planner.core.robot import Drive
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Kidnapping, Obstacle, Scenario
-from mfba_planner.planners.method import brain, simulate
-from mfba_planner.planners.predictive import preset
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import pose_msg
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.ros.planner import PlannerNode
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.ros.world_sim import WorldSim
-from mfba_planner.run_config import Driver, RunConfig, node_parameters
-from mfba_planner.scenarios import load_scenario, parse_scenario, scenario_to_json
-from mfba_planner.verification.check import verify
+from mfba_planner.evaluation.metrics import assess, evaluate, tick_clearances
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Method, Mode, Planner, PlannerParams, Swarm, observe
+from mfba_planner.planning.odometry_jump import carried_off
+from mfba_planner.planning.planner_factory import brain, simulate
+from mfba_planner.planning.predictive import preset
+from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import pose_msg
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.nodes.world_sim import WorldSim
+from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario, scenario_to_json
+from mfba_planner.simulation.episode import Episode, Outcome, run
+from mfba_planner.simulation.robot_model import Drive
+from mfba_planner.simulation.scenario import Kidnapping, Obstacle, Scenario
+from mfba_planner.verification.verify_bag import verify
 
 KIDNAPPED = load_scenario("kidnapped")
 FREE = (float("inf"),) * 12

@@ -15,21 +15,16 @@ from launch_standin import declared, launched
 
 from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.core.options import flatten
-from mfba_planner.core.planner import Method, PlannerParams
-from mfba_planner.launcher.by_launch import ARGUMENTS, told_by_launch
-from mfba_planner.launcher.robot_by_launch import (
-    PLANNER_ARGUMENTS,
-    REPLAY_ARGUMENTS,
-    replayed,
-    robot,
-)
-from mfba_planner.node_settings import Source
-from mfba_planner.planners.predictive import preset
-from mfba_planner.ros.planner import PlannerNode
-from mfba_planner.ros.replay_args import parse
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.run_config import NODES, OF_ROBOT, RunConfig, node_parameters
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, REPLAY_ARGUMENTS, replayed, robot
+from mfba_planner.launcher.simulate_launch import ARGUMENTS, told_by_launch
+from mfba_planner.planning.algorithm_1 import Method, PlannerParams
+from mfba_planner.planning.predictive import preset
+from mfba_planner.ros.interface.node_parameters import Source
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.replaying.replay_arguments import parse
+from mfba_planner.scenarios.run_config import NODES, OF_ROBOT, RunConfig, node_parameters
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 LAUNCH = Path(__file__).parents[1] / "launch"
 

@@ -12,10 +12,10 @@ from helpers import wait_until
 from launching import LONG, Program, complete
 
 from mfba_planner import launcher
-from mfba_planner.core.episode import Outcome
-from mfba_planner.entry import guarded_main
-from mfba_planner.recording.episode import read_episode
+from mfba_planner.entry_points import guarded_main
+from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.recording.recover import recover
+from mfba_planner.simulation.episode import Outcome
 
 
 def only_line(program: Program) -> str:

@@ -12,20 +12,20 @@ import pytest
 from helpers import wait_until
 from launching import Program, complete
 
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Outcome
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.core.fleet import run_fleet
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Member, Obstacle, Scenario
-from mfba_planner.launcher import crew
-from mfba_planner.launcher.options import MOST_ROBOTS, read_order
-from mfba_planner.planners.method import simulate_fleet
+from mfba_planner.launcher import node_processes
+from mfba_planner.launcher.run_arguments import MOST_ROBOTS, read_order
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.planner_factory import simulate_fleet
+from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
-from mfba_planner.recording.episode import read_recording
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.run_config import OF_ROBOT, Parameters
-from mfba_planner.scenarios import scenario_to_json
+from mfba_planner.recording.read_episode import read_recording
+from mfba_planner.scenarios.run_config import OF_ROBOT, Parameters
+from mfba_planner.scenarios.scenario_files import scenario_to_json
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.fleet import run_fleet
+from mfba_planner.simulation.scenario import Member, Obstacle, Scenario
 
 PROCESSES = ["--driver", "multi-process", "--no-picture", "--out", "run"]
 PAPER = ["--planner", "paper"]
@@ -80,16 +80,16 @@ def test_whoever_starts_first(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The launcher's own order is one of many; the recorder may come last, too."""
-    start = crew.Crew.start
+    start = node_processes.Crew.start
     told_in: list[list[str]] = []
 
-    def shuffled(self: crew.Crew, told: Parameters, more: dict[str, list[str]]) -> None:
+    def shuffled(self: node_processes.Crew, told: Parameters, more: dict[str, list[str]]) -> None:
         names = list(told)
         random.Random(len(told_in)).shuffle(names)
         told_in.append(names)
         start(self, {name: told[name] for name in names}, more)
 
-    monkeypatch.setattr(crew.Crew, "start", shuffled)
+    monkeypatch.setattr(node_processes.Crew, "start", shuffled)
     monkeypatch.chdir(here)
     from mfba_planner import launcher
 

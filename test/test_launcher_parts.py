@@ -17,23 +17,23 @@ from hypothesis import strategies as st
 from rclpy.context import Context
 from rclpy.node import Node
 
-from mfba_planner.core.bat import Algorithm
 from mfba_planner.core.errors import GraphError, OutputError
 from mfba_planner.core.options import flatten
-from mfba_planner.core.planner import Method, PlannerParams
-from mfba_planner.launcher import child as child_module
-from mfba_planner.launcher.child import Child
-from mfba_planner.launcher.crew import Crew, parameters_yaml
-from mfba_planner.launcher.directory import RunDirectory
-from mfba_planner.launcher.domain import DOMAINS, claim_domain, private_domain, require_network
-from mfba_planner.launcher.options import read_order
-from mfba_planner.launcher.screen import Screen
-from mfba_planner.launcher.settings import option_rows
-from mfba_planner.launcher.stop import StoppedError, StopRequest
+from mfba_planner.launcher import node_process as child_module
+from mfba_planner.launcher.console import Screen
+from mfba_planner.launcher.node_process import Child
+from mfba_planner.launcher.node_processes import Crew, parameters_yaml
+from mfba_planner.launcher.ros_domain import DOMAINS, claim_domain, private_domain, require_network
+from mfba_planner.launcher.run_arguments import read_order
+from mfba_planner.launcher.run_directory import RunDirectory
+from mfba_planner.launcher.set_option import option_rows
+from mfba_planner.launcher.stop_request import StoppedError, StopRequest
 from mfba_planner.paper import readings
-from mfba_planner.planners.predictive import preset
-from mfba_planner.run_config import Driver, RunConfig, node_parameters
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.planning.algorithm_1 import Method, PlannerParams
+from mfba_planner.planning.predictive import preset
+from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.swarm.bat_swarm import Algorithm
 
 
 def test_order_without_arguments_is_case_study_1() -> None:
@@ -198,7 +198,7 @@ def test_domains_are_held_once_and_given_back(monkeypatch: pytest.MonkeyPatch) -
 
 def test_domain_is_free_again_after_kill_9() -> None:
     program = (
-        "import os, signal; from mfba_planner.launcher.domain import claim_domain;"
+        "import os, signal; from mfba_planner.launcher.ros_domain import claim_domain;"
         "print(claim_domain()[0], flush=True); os.kill(os.getpid(), signal.SIGKILL)"
     )
     done = subprocess.run(
@@ -281,7 +281,7 @@ def test_child_says_everything_and_how_it_ended() -> None:
 
 @pytest.mark.usefixtures("programs")
 def test_crew_ends_even_those_who_do_not_listen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mfba_planner.launcher.crew.GRACE_S", 0.2)
+    monkeypatch.setattr("mfba_planner.launcher.node_processes.GRACE_S", 0.2)
     lines = Lines()
     crew = Crew(lines, lambda: False)
     crew.start({"deaf": {}, "patient": {}}, {})

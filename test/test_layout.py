@@ -14,8 +14,8 @@ from graph import Graph
 from std_srvs.srv import Trigger
 from talk import LOCKSTEP, Talk
 
-from mfba_planner.ros import topics
-from mfba_planner.ros.serialized import type_name
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.serialized_message import type_name
 
 LAYOUT = Path(__file__).parents[1] / "layout"
 GRAPH = {f"/{topic.name.lstrip('/')}": topic for topic in topics.GRAPH}

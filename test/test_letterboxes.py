@@ -10,8 +10,8 @@ from graph import Graph
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from mfba_planner.ros import letterboxes
-from mfba_planner.ros.letterboxes import Letterboxes
+from mfba_planner.ros.runtime import polled_subscriptions
+from mfba_planner.ros.runtime.polled_subscriptions import Letterboxes
 
 Post = Callable[[str, str], None]
 
@@ -67,7 +67,7 @@ def test_what_was_sent_after_a_round_began_waits_for_the_next(
     until_heard(boxes, heard, 1)
     post("early", "second")
     with monkeypatch.context() as patch:
-        patch.setattr(letterboxes.time, "time_ns", lambda: 0)
+        patch.setattr(polled_subscriptions.time, "time_ns", lambda: 0)
         boxes.empty()
         assert heard == ["first"]
         boxes.empty()

@@ -24,12 +24,12 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import LaserScan
 
-from mfba_planner import messages
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D, wrap_angle
-from mfba_planner.core.planner import Decision, Mode
-from mfba_planner.core.sensing import SensorParams, sensory_vector
-from mfba_planner.ros import convert
+from mfba_planner.perception.sensory_vector import SensorParams, sensory_vector
+from mfba_planner.planning.algorithm_1 import Decision, Mode
+from mfba_planner.recording import messages
+from mfba_planner.ros.interface import conversions
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 moderate = st.floats(-1e6, 1e6)
@@ -77,8 +77,8 @@ def bits(*numbers: float) -> bytes:
 
 @given(stamps)
 def test_stamps_come_back(stamp_ns: int) -> None:
-    assert messages.stamp_ns(sent(convert.time_msg(stamp_ns))) == stamp_ns
-    assert messages.stamp_ns(sent(convert.clock_msg(stamp_ns)).clock) == stamp_ns
+    assert messages.stamp_ns(sent(conversions.time_msg(stamp_ns))) == stamp_ns
+    assert messages.stamp_ns(sent(conversions.clock_msg(stamp_ns)).clock) == stamp_ns
 
 
 @given(finite, finite, angles, points, stamps)
@@ -86,7 +86,7 @@ def test_odometry_comes_back(
     x: float, y: float, yaw: float, velocity: tuple[float, float], stamp_ns: int
 ) -> None:
     message = sent(
-        convert.odometry_msg(Pose2D(x, y, yaw), velocity, stamp_ns, "odom", "base_link")
+        conversions.odometry_msg(Pose2D(x, y, yaw), velocity, stamp_ns, "odom", "base_link")
     )
     pose = messages.robot_pose(message)
     assert bits(*pose.position) == bits(x, y)
@@ -97,7 +97,7 @@ def test_odometry_comes_back(
 
 @given(points)
 def test_a_robot_that_looks_along_x_loses_no_bit(velocity: tuple[float, float]) -> None:
-    message = sent(convert.odometry_msg(Pose2D(0.0, 0.0), velocity, 1, "odom", "base_link"))
+    message = sent(conversions.odometry_msg(Pose2D(0.0, 0.0), velocity, 1, "odom", "base_link"))
     assert messages.robot_pose(message).yaw == 0.0
     linear = message.twist.twist.linear
     assert bits(linear.x, linear.y) == bits(*velocity)
@@ -105,28 +105,28 @@ def test_a_robot_that_looks_along_x_loses_no_bit(velocity: tuple[float, float]) 
 
 def test_odometry_gives_the_velocity_in_the_body_frame() -> None:
     """REP-105: a robot that looks north and moves east moves to its right, which is -y."""
-    message = convert.odometry_msg(Pose2D(0.0, 0.0, NORTH), (1.0, 0.0), 1, "odom", "base_link")
+    message = conversions.odometry_msg(Pose2D(0.0, 0.0, NORTH), (1.0, 0.0), 1, "odom", "base_link")
     linear = message.twist.twist.linear
     assert (linear.x, linear.y) == pytest.approx((0.0, -1.0))
 
 
 @given(st.lists(points, max_size=12), stamps)
 def test_obstacles_come_back_in_order(centers: list[tuple[float, float]], stamp_ns: int) -> None:
-    message = sent(convert.obstacles_msg(centers, stamp_ns, "odom"))
+    message = sent(conversions.obstacles_msg(centers, stamp_ns, "odom"))
     assert messages.obstacle_centers(message) == centers
     assert messages.stamp_ns(message.header.stamp) == stamp_ns
 
 
 @given(points, stamps)
 def test_a_goal_comes_back(goal: tuple[float, float], stamp_ns: int) -> None:
-    message = sent(convert.pose_stamped_msg(goal, stamp_ns, "odom"))
+    message = sent(conversions.pose_stamped_msg(goal, stamp_ns, "odom"))
     assert bits(*messages.goal_point(message)) == bits(*goal)
 
 
 @given(ranges, st.floats(0.01, 1000.0))
 def test_sectors_come_back(seen: tuple[float, ...], sensing_range_m: float) -> None:
     params = SensorParams(sectors=len(seen), sensing_range_m=sensing_range_m)
-    message = sent(convert.sectors_msg(seen, params, 0.3, 1, "odom"))
+    message = sent(conversions.sectors_msg(seen, params, 0.3, 1, "odom"))
     assert messages.sector_ranges(message) == seen
     assert tuple(message.intensities) == sensory_vector(seen)
     # What LaserScan's own rules ask for: every finite range within its limits, a full ring.
@@ -138,14 +138,14 @@ def test_sectors_come_back(seen: tuple[float, ...], sensing_range_m: float) -> N
 
 
 def test_the_first_beam_looks_through_the_middle_of_sector_1() -> None:
-    message = convert.sectors_msg((math.inf,) * 12, SensorParams(), 0.3, 1, "odom")
+    message = conversions.sectors_msg((math.inf,) * 12, SensorParams(), 0.3, 1, "odom")
     assert math.degrees(message.angle_min) == pytest.approx(15.0)
     assert math.degrees(message.angle_increment) == pytest.approx(30.0)
 
 
 @given(st.lists(st.integers(0, 1), min_size=3).map(tuple))
 def test_the_sensory_vector_says_what_it_is(vs: tuple[int, ...]) -> None:
-    message = sent(convert.sensory_vector_msg(vs))
+    message = sent(conversions.sensory_vector_msg(vs))
     assert tuple(message.data) == vs
     (dimension,) = message.layout.dim
     assert (dimension.label, dimension.size, dimension.stride) == ("sector", len(vs), len(vs))
@@ -154,13 +154,13 @@ def test_the_sensory_vector_says_what_it_is(vs: tuple[int, ...]) -> None:
 @settings(max_examples=50)
 @given(decisions())
 def test_a_decision_comes_back_whole(decision: Decision) -> None:
-    message = sent(convert.decision_msg(decision, "mfba", 3, "/planner"))
+    message = sent(conversions.decision_msg(decision, "mfba", 3, "/planner"))
     assert messages.decision(message, decision.ranges_m) == decision
 
 
 def test_a_decision_tells_people_how_bad_it_is() -> None:
     def level(mode: Mode) -> bytes:
-        message = convert.decision_msg(a_decision(mode=mode), "ba", 7, "/robot1/planner")
+        message = conversions.decision_msg(a_decision(mode=mode), "ba", 7, "/robot1/planner")
         status = message.status[0]
         found = {item.key: item.value for item in status.values}
         assert (found["algorithm"], found["refused_inputs"]) == ("ba", "7")
@@ -202,7 +202,7 @@ def a_decision(**changes: Any) -> Decision:
 def test_the_plan_leads_from_here_over_the_step_to_the_goal(
     changes: dict[str, Any], expected: list[tuple[float, float]]
 ) -> None:
-    plan = sent(convert.plan_msg(a_decision(**changes), "odom"))
+    plan = sent(conversions.plan_msg(a_decision(**changes), "odom"))
     assert [(p.pose.position.x, p.pose.position.y) for p in plan.poses] == expected
     assert all(p.header == plan.header for p in plan.poses)
 
@@ -212,7 +212,10 @@ def test_the_twist_is_the_decision_in_the_body_frame(
     velocity: tuple[float, float], yaw: float
 ) -> None:
     decision = a_decision(velocity=velocity, pose=Pose2D(0.0, 0.0, yaw))
-    for message in (convert.twist_msg(decision), convert.twist_stamped_msg(decision, "base_link")):
+    for message in (
+        conversions.twist_msg(decision),
+        conversions.twist_stamped_msg(decision, "base_link"),
+    ):
         vx, vy, wz = messages.velocity(sent(message))
         assert wz == 0.0
         back = messages.rotated((vx, vy), yaw)
@@ -223,7 +226,7 @@ def test_the_twist_is_the_decision_in_the_body_frame(
 
 
 def test_the_stamped_twist_names_frame_and_stamp() -> None:
-    header = convert.twist_stamped_msg(a_decision(stamp_ns=5), "base_link").header
+    header = conversions.twist_stamped_msg(a_decision(stamp_ns=5), "base_link").header
     assert (messages.stamp_ns(header.stamp), header.frame_id) == (5, "base_link")
 
 
@@ -309,7 +312,7 @@ def test_fewer_than_three_sectors_are_refused(count: int) -> None:
 @pytest.mark.parametrize("key", ["mode", "vs", "gap", "pose", "waypoint", "candidates"])
 @pytest.mark.parametrize("value", [None, "garbage"])
 def test_a_garbled_decision_is_refused(key: str, value: str | None) -> None:
-    message = convert.decision_msg(a_decision(), "mfba", 0, "/planner")
+    message = conversions.decision_msg(a_decision(), "mfba", 0, "/planner")
     status = message.status[0]
     kept = [item for item in status.values if item.key != key or value is not None]
     for item in kept:
@@ -321,7 +324,7 @@ def test_a_garbled_decision_is_refused(key: str, value: str | None) -> None:
 
 
 def test_an_empty_diagnostic_is_no_decision() -> None:
-    message = convert.decision_msg(a_decision(), "mfba", 0, "/planner")
+    message = conversions.decision_msg(a_decision(), "mfba", 0, "/planner")
     message.status = []
     with pytest.raises(InputError, match="lacks or garbles"):
         messages.decision(message, ())

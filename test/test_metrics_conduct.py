@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trips import SECOND, post, trip
 
-from mfba_planner.core import metrics
-from mfba_planner.core.episode import Episode, run
-from mfba_planner.core.metrics import Tally, assess, conduct, evaluate
-from mfba_planner.core.planner import Mode, PlannerParams
-from mfba_planner.core.world import Obstacle, Scenario
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.evaluation import metrics
+from mfba_planner.evaluation.metrics import Tally, assess, conduct, evaluate
+from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Episode, run
+from mfba_planner.simulation.scenario import Obstacle, Scenario
 
 
 def mover(center: tuple[float, float], degrees: float, speed: float = 1.0) -> Obstacle:

@@ -8,8 +8,15 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mfba_planner.core.motion import Motion
-from mfba_planner.core.world import Obstacle, Scenario, Turn, Walls, center_at, step_clearances
+from mfba_planner.simulation.batched_motion import Motion
+from mfba_planner.simulation.scenario import (
+    Obstacle,
+    Scenario,
+    Turn,
+    Walls,
+    center_at,
+    step_clearances,
+)
 
 ROOM = Walls(lower_m=(-2.0, 1.0), upper_m=(4.0, 6.0))
 SPEEDS, HEADINGS = st.floats(0.0, 3.0), st.floats(-10.0, 10.0)

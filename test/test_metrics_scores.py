@@ -6,9 +6,9 @@ import math
 import pytest
 from trips import trip
 
-from mfba_planner.core.episode import Outcome
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.scores import barn_score, optimality_gap, spl, time_to_goal_s
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.evaluation.scores import barn_score, optimality_gap, spl, time_to_goal_s
+from mfba_planner.simulation.episode import Outcome
 
 
 def test_gap_of_a_run_that_is_a_tenth_too_long() -> None:

@@ -14,16 +14,16 @@ from std_srvs.srv import Trigger
 from talk import FREE, GOAL, LOCKSTEP, NAN, Talk, fields, goal, mode, odom, sectors
 
 from mfba_planner.core.options import override
-from mfba_planner.core.planner import Mode
-from mfba_planner.launcher.domain import private_domain
-from mfba_planner.messages import decision as read_decision
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import path_msg
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import Driver, RunConfig
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.verification.check import verify
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.recording.messages import decision as read_decision
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import path_msg
+from mfba_planner.scenarios.run_config import Driver, RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.verification.verify_bag import verify
 
 A, B, C = (1.0, 0.0), (1.0, 1.0), (3.0, 1.0)
 

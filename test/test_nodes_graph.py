@@ -9,16 +9,16 @@ from graph import Graph
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
-from mfba_planner.core.episode import run
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import pose_stamped_msg
-from mfba_planner.ros.planner import PlannerNode
-from mfba_planner.ros.recorder import Recorder
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.ros.world_sim import WorldSim
-from mfba_planner.run_config import NODES, RunConfig, node_parameters
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import pose_stamped_msg
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.recorder import Recorder
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.nodes.world_sim import WorldSim
+from mfba_planner.scenarios.run_config import NODES, RunConfig, node_parameters
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import run
 
 # The table of the design: name, type, who writes, who reads (besides the recorder), latched.
 TABLE = [

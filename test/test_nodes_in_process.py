@@ -10,27 +10,27 @@ import pytest
 from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
 from graph import Graph
 
-from mfba_planner.core import episode
-from mfba_planner.core.episode import Outcome, World
 from mfba_planner.core.errors import GraphError
-from mfba_planner.core.metrics import evaluate
 from mfba_planner.core.options import override
-from mfba_planner.core.planner import NANO, Method, Mode, PlannerParams
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.messages import stamp_ns
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.paper import readings
-from mfba_planner.planners.method import simulate
-from mfba_planner.planners.predictive import preset
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import pose_msg
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.ros.planner import PlannerNode
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.ros.world_sim import WorldSim
-from mfba_planner.run_config import Driver, RunConfig, node_parameters
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.verification.check import verify
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import NANO, Method, Mode, PlannerParams
+from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.planning.predictive import preset
+from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import pose_msg
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.nodes.world_sim import WorldSim
+from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation import episode
+from mfba_planner.simulation.episode import Outcome, World
+from mfba_planner.verification.verify_bag import verify
 
 
 def config(

@@ -10,10 +10,10 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from std_srvs.srv import Trigger
 from talk import FREE, GOAL, LOCKSTEP, Talk, fields, goal, mode, odom, sectors
 
-from mfba_planner.core.planner import Mode
-from mfba_planner.messages import decision as read_decision
-from mfba_planner.ros import topics
-from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.recording.messages import decision as read_decision
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.nodes.planner import PlannerNode
 
 OUTPUTS = (topics.GOAL_STEP, topics.CMD_VEL, topics.PLAN, topics.DECISION, topics.MARKERS)
 NAMES = {

@@ -27,10 +27,9 @@ from talk import (
     sectors,
 )
 
-from mfba_planner.core.bat import Algorithm
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
-from mfba_planner.core.planner import (
+from mfba_planner.planning.algorithm_1 import (
     NANO,
     Decision,
     Mode,
@@ -39,11 +38,12 @@ from mfba_planner.core.planner import (
     PlannerParams,
     Swarm,
 )
-from mfba_planner.messages import decision as read_decision
-from mfba_planner.messages import stamp_ns
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import time_msg
-from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.recording.messages import decision as read_decision
+from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import time_msg
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.swarm.bat_swarm import Algorithm
 
 
 def test_the_method_can_be_changed_while_it_drives(graph: Graph) -> None:

@@ -12,11 +12,11 @@ from graph import Graph
 from launching import PROGRAM, ROOT
 from nav_msgs.msg import Path as PathMsg
 
-from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.bag_writer import CHUNK_BYTES
 from mfba_planner.recording.recover import recover
-from mfba_planner.recording.writer import CHUNK_BYTES
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import path_msg
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import path_msg
 
 PARAMS_FILE = "/**: {ros__parameters: {bat.population: 1}}\n"
 

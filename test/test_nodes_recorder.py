@@ -16,25 +16,32 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from mfba_planner.core import episode
 from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.options import flatten
-from mfba_planner.core.planner import Mode, PlannerParams
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.messages import stamp_ns
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.schemas import definition_of
-from mfba_planner.ros import params, topics
-from mfba_planner.ros.convert import clock_msg, odometry_msg, path_msg, pose_stamped_msg, time_msg
-from mfba_planner.ros.planner import PlannerNode
-from mfba_planner.ros.qos import offered
-from mfba_planner.ros.recorder import Recorder
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.ros.world_sim import WorldSim
-from mfba_planner.run_config import NODES
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.recording.message_definitions import definition_of
+from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.ros.interface import parameters as params
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import (
+    clock_msg,
+    odometry_msg,
+    path_msg,
+    pose_stamped_msg,
+    time_msg,
+)
+from mfba_planner.ros.interface.qos_conversion import offered
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.recorder import Recorder
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.nodes.world_sim import WorldSim
+from mfba_planner.scenarios.run_config import NODES
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation import episode
 
 
 @pytest.fixture(scope="module")

@@ -14,12 +14,12 @@ from relay import SPEED_FACTOR, TIMEOUT_S, Tamper, Wired
 from std_srvs.srv import SetBool
 
 from mfba_planner.core.options import flatten
-from mfba_planner.core.recovery import RecoveryParams, longest_s
-from mfba_planner.messages import stamp_ns
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import pose_stamped_msg
-from mfba_planner.ros.diagnostic_topic import DiagnosticTopic
-from mfba_planner.ros.planner import PlannerNode
+from mfba_planner.planning.recovery import RecoveryParams, longest_s
+from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import pose_stamped_msg
+from mfba_planner.ros.interface.diagnostics_publisher import DiagnosticTopic
+from mfba_planner.ros.nodes.planner import PlannerNode
 
 INF, NAN = math.inf, math.nan
 FAR = json.dumps(

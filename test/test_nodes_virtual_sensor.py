@@ -16,17 +16,17 @@ from std_msgs.msg import Header
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.sensing import (
+from mfba_planner.perception.sensory_vector import (
     Scan,
     SensorParams,
     sense_circles,
     sense_scan,
     sensory_vector,
 )
-from mfba_planner.messages import stamp_ns
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import obstacles_msg, odometry_msg, time_msg
-from mfba_planner.ros.virtual_sensor import VirtualSensor
+from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import obstacles_msg, odometry_msg, time_msg
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 
 RADII = [0.3, 0.5, 0.2, 0.7, 1.0]
 ROBOT_RADIUS_M = 0.3

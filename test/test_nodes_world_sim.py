@@ -18,13 +18,13 @@ from graph import Graph
 from std_srvs.srv import SetBool, Trigger
 
 from mfba_planner.core.errors import ConfigError, GraphError
-from mfba_planner.core.planner import NANO, PlannerParams
-from mfba_planner.messages import robot_pose, stamp_ns, velocity
-from mfba_planner.ros import topics
-from mfba_planner.ros.convert import pose_msg, pose_stamped_msg, set_header
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.ros.world_sim import WorldSim
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.planning.algorithm_1 import NANO, PlannerParams
+from mfba_planner.recording.messages import robot_pose, stamp_ns, velocity
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import pose_msg, pose_stamped_msg, set_header
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.nodes.world_sim import WorldSim
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 TICK_NS = PlannerParams().tick_ns
 LOCKSTEP = {"lockstep": True, "answer_timeout_s": 60.0}

@@ -9,23 +9,35 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mfba_planner.core.episode import Outcome, run
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point
-from mfba_planner.core.legs import uniform_legs
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.core.world import Obstacle, Scenario, Turn, Walls, center_at, step_clearances
-from mfba_planner.oracle import Certificate, Solution, inspect, solve
-from mfba_planner.oracle.check import clearance, pieces
-from mfba_planner.oracle.lattice import LatticeParams, _free, _free_steps, lattice_ways
-from mfba_planner.oracle.polyline import FAR_M, gaps, lengths, one_way_gaps, pair_gaps
-from mfba_planner.oracle.reach import ReachParams, unreachable
-from mfba_planner.oracle.refine import refine
-from mfba_planner.oracle.solution import Waypoint
-from mfba_planner.oracle.tangents import SearchParams
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.worlds import suite
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.evaluation.oracle import Certificate, Solution, inspect, solve
+from mfba_planner.evaluation.oracle.independent_check import clearance, pieces
+from mfba_planner.evaluation.oracle.infeasibility_proof import ReachParams, unreachable
+from mfba_planner.evaluation.oracle.lattice_search import (
+    LatticeParams,
+    _free,
+    _free_steps,
+    lattice_ways,
+)
+from mfba_planner.evaluation.oracle.path_refinement import refine
+from mfba_planner.evaluation.oracle.polyline import FAR_M, gaps, lengths, one_way_gaps, pair_gaps
+from mfba_planner.evaluation.oracle.solution import Waypoint
+from mfba_planner.evaluation.oracle.tangent_search import SearchParams
+from mfba_planner.evaluation.suites import suite
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Outcome, run
+from mfba_planner.simulation.scenario import (
+    Obstacle,
+    Scenario,
+    Turn,
+    Walls,
+    center_at,
+    step_clearances,
+)
+from mfba_planner.simulation.uniform_segments import uniform_legs
 
 ROOM = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 12.0))
 V = 0.8

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from mfba_planner.core.errors import GraphError
-from mfba_planner.node_settings import WorldSimSettings
-from mfba_planner.ros.pace import Pace
+from mfba_planner.ros.interface.node_parameters import WorldSimSettings
+from mfba_planner.ros.runtime.tick_control import Pace
 
 
 def pace(**settings: Any) -> Pace:

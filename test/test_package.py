@@ -17,8 +17,9 @@ from typing import Any
 import pytest
 import yaml
 
-from mfba_planner import __version__, resources
+from mfba_planner import __version__
 from mfba_planner.cli import COMMANDS as COMMANDS_OF_MFBA
+from mfba_planner.core import resources
 from mfba_planner.core.errors import InputError
 
 ROOT = Path(__file__).parents[1]
@@ -277,13 +278,13 @@ def test_installs_every_shipped_file_in_its_place(distribution: Any) -> None:
 
 
 def test_programs_lead_to_a_main(distribution: Any) -> None:
-    from mfba_planner import entry
+    from mfba_planner import entry_points
 
     scripts = dict(line.split(" = ") for line in distribution.entry_points["console_scripts"])
     assert sorted(scripts) == sorted(NODES + COMMANDS)
     for name, target in scripts.items():
-        assert target == f"mfba_planner.entry:{name}"
-        assert callable(getattr(entry, name))
+        assert target == f"mfba_planner.entry_points:{name}"
+        assert callable(getattr(entry_points, name))
     for module in (*(f"ros/{name}" for name in NODES), "launcher", "cli"):
         path = PACKAGE / f"{module}.py"
         path = path if path.exists() else PACKAGE / module / "__init__.py"

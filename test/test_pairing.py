@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_state_machine_as_test
 
 from mfba_planner.core.errors import InputError
-from mfba_planner.ros import pairing
-from mfba_planner.ros.pairing import StampPairs
+from mfba_planner.ros.runtime import stamp_pairing
+from mfba_planner.ros.runtime.stamp_pairing import StampPairs
 
 Pairs = StampPairs[str, str]
 
@@ -114,20 +114,20 @@ class BoundedMemory(RuleBasedStateMachine):
 
     @invariant()
     def nothing_piles_up(self) -> None:
-        limit = pairing.WAITING_LIMIT
+        limit = stamp_pairing.WAITING_LIMIT
         assert len(self.pairs._a) <= limit
         assert len(self.pairs._b) <= limit
 
 
 def test_memory_is_bounded_whatever_comes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pairing, "WAITING_LIMIT", 4)
+    monkeypatch.setattr(stamp_pairing, "WAITING_LIMIT", 4)
     run_state_machine_as_test(
         BoundedMemory, settings=settings(max_examples=30, stateful_step_count=40)
     )
 
 
 def test_a_stream_without_partner_forgets_its_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pairing, "WAITING_LIMIT", 3)
+    monkeypatch.setattr(stamp_pairing, "WAITING_LIMIT", 3)
     pairs = Pairs()
     for stamp in range(10):
         assert add(pairs, "a", stamp) is None

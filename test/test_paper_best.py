@@ -4,11 +4,11 @@
 import numpy as np
 import pytest
 
-from mfba_planner.core.bat import BatParams
-from mfba_planner.core.batch import minimize_batch
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.paper import readings
 from mfba_planner.paper.functions import FUNCTIONS
+from mfba_planner.swarm.bat_swarm import BatParams
+from mfba_planner.swarm.batched_swarms import minimize_batch
 
 # Means of F1-F6, population 40, 200 iterations, d = 2.
 OTHERS = {

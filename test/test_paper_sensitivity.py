@@ -12,22 +12,22 @@ import numpy as np
 import pytest
 
 from mfba_planner import cli
-from mfba_planner.core.episode import run
 from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.metrics import evaluate
 from mfba_planner.core.options import flatten
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.core.sensing import SensorParams, sense_circles, sensory_vector
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.paper import sensitivity
 from mfba_planner.paper.sensitivity import CASES, Reading, Row, Variation, turned
 from mfba_planner.paper.study.run import Sample
+from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
+from mfba_planner.planning.algorithm_1 import PlannerParams
 from mfba_planner.report import style
+from mfba_planner.report.figure_canvas import to_bytes
 from mfba_planner.report.figures.sensitivity import draw
-from mfba_planner.report.sensitivity import to_csv, to_markdown, to_table
-from mfba_planner.report.sheet import to_bytes
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.statistics import Interval
+from mfba_planner.report.sensitivity_table import to_csv, to_markdown, to_table
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import run
 
 SCENARIOS = {case: load_scenario(case) for case in CASES}
 BASE, *OTHERS = sensitivity.all_readings()

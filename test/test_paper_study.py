@@ -11,25 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mfba_planner.core.bat import Algorithm, BatParams, minimize
-from mfba_planner.core.episode import run
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.metrics import conduct, evaluate
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.core.world import Scenario
+from mfba_planner.evaluation.metrics import conduct, evaluate
+from mfba_planner.evaluation.study import chunk_store as storing
 from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.readings import PLANNERS
-from mfba_planner.paper.study.chunk import (
-    BENCHMARK_STREAM,
-    Benchmark,
-    Chunk,
-    Trips,
-    chunks,
-)
+from mfba_planner.paper.study.chunk import BENCHMARK_STREAM, Benchmark, Chunk, Trips, chunks
 from mfba_planner.paper.study.plan import FULL, QUICK, benchmark_plan, trip_plan
 from mfba_planner.paper.study.run import open_store, run_plan
-from mfba_planner.study import store as storing
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, minimize
 
 NEAR = Scenario(name="near", start_m=(0.0, 0.0), goal_m=(1.5, 1.0))
 SWARM = BatParams(population=6, iterations=10)

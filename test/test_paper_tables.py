@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.core.world import Scenario
+from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.paper import published
 from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.published import BENCHMARK_COLUMNS, BY_KEY
@@ -25,8 +25,8 @@ from mfba_planner.paper.tables.build import build, check_sections
 from mfba_planner.paper.tables.claims import claim_section
 from mfba_planner.paper.tables.model import Entry, Grid, Ours, Section, Verdict, inside
 from mfba_planner.paper.tables.trips import fitting_columns, printed_lengths, trip_section
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.statistics import Interval
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.scenario import Scenario
 
 RUNS = 60
 Samples = dict[str, Mapping[str, Any]]

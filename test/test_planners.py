@@ -9,19 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Outcome, World, run
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
-from mfba_planner.core.lidar import cast_rays
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.planner import Mode, Observation, PlannerParams
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Obstacle, Scenario, Walls, center_at, velocity_at
-from mfba_planner.planners.perception import Perception
-from mfba_planner.planners.registry import PLANNERS, make
-from mfba_planner.planners.straight import Straight
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Mode, Observation, PlannerParams
+from mfba_planner.planning.peers.straight_line import Straight
+from mfba_planner.planning.planner_registry import PLANNERS, make
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Outcome, World, run
+from mfba_planner.simulation.planner_observations import Perception
+from mfba_planner.simulation.scenario import Obstacle, Scenario, Walls, center_at, velocity_at
+from mfba_planner.simulation.simulated_lidar import cast_rays
 
 PARAMS = PlannerParams(speed_mps=0.8, step_length_m=0.2)
 SENSOR = SensorParams()

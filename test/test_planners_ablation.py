@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
-from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.planner import Circle, Mode, Observation, PlannerParams
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.planners import ablation
-from mfba_planner.planners.predictive import Predictive, preset
-from mfba_planner.sweep.order import Run, Setting
-from mfba_planner.sweep.play import play
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.evaluation.sweep.single_run import play
+from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Circle, Mode, Observation, PlannerParams
+from mfba_planner.planning.peers import ablation
+from mfba_planner.planning.predictive import Predictive, preset
+from mfba_planner.simulation.episode import Episode, Outcome
 
 SETTING = Setting(params=preset(PlannerParams(speed_mps=0.8)))
 NAMES = (

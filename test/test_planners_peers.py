@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mfba_planner.core.episode import run
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.planner import Circle, Mode, Observation, PlannerParams
-from mfba_planner.core.sensing import Scan, SensorParams
-from mfba_planner.core.world import Obstacle, Scenario
-from mfba_planner.planners import apf
-from mfba_planner.planners.perception import Perception
-from mfba_planner.planners.registry import make
-from mfba_planner.planners.surroundings import discs
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.perception.sensory_vector import Scan, SensorParams
+from mfba_planner.planning.algorithm_1 import Circle, Mode, Observation, PlannerParams
+from mfba_planner.planning.peers import apf
+from mfba_planner.planning.peers.observed_circles import discs
+from mfba_planner.planning.planner_registry import make
+from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.planner_observations import Perception
+from mfba_planner.simulation.scenario import Obstacle, Scenario
 
 PEERS = ("apf", "vfh", "dwa", "orca")
 PARAMS = PlannerParams(speed_mps=0.8)

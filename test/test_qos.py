@@ -7,9 +7,9 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
-from mfba_planner.recording.qos import OfferedQos
-from mfba_planner.ros import topics
-from mfba_planner.ros.qos import DEPTH, offered, profile
+from mfba_planner.recording.qos_profiles import OfferedQos
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.qos_conversion import DEPTH, offered, profile
 
 
 def facts(qos: QoSProfile) -> tuple[object, ...]:

@@ -7,13 +7,13 @@ import pytest
 from recording_bags import FOREIGN
 
 from mfba_planner.core.errors import BagError, OutputError
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.configuration import (
     ATTACHMENT_NAME,
     attach_configuration,
     read_configuration,
 )
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.writer import BagWriter
 
 CONFIGURATION = {
     "scenario": {"name": "case1", "goal": [10.0, 10.0]},

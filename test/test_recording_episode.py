@@ -10,12 +10,12 @@ import pytest
 from edited_bags import each_changed, record, rewrite, swapped
 from recording_bags import FOREIGN
 
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Outcome, run
 from mfba_planner.core.errors import BagError
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.recording.episode import read_episode, summarize
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.recording.read_episode import read_episode, summarize
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Outcome, run
 
 Change = Callable[[str, Any], Any]  # (topic, message) -> message, or None to leave it out
 

@@ -6,9 +6,9 @@ import pytest
 from recording_bags import FOREIGN, START_NS, foreign_mcap, numbers, write_bag
 
 from mfba_planner.core.errors import BagError
-from mfba_planner.recording.info import describe, format_info
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.writer import BagWriter
+from mfba_planner.recording.bag_info import describe, format_info
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.bag_writer import BagWriter
 
 
 def test_our_bag(tmp_path: Path) -> None:

@@ -12,22 +12,22 @@ from edited_bags import Edit, record, rewrite, swapped
 from test_fleet_bag import TRIO
 
 from mfba_planner import cli
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.errors import BagError
-from mfba_planner.core.robot import Lidar, Robot
-from mfba_planner.launcher.attempt import Attempt
-from mfba_planner.launcher.conclusion import conclude
-from mfba_planner.launcher.directory import RunDirectory
-from mfba_planner.launcher.fleet import conclude_fleet
-from mfba_planner.launcher.options import read_order
-from mfba_planner.launcher.screen import Screen
-from mfba_planner.launcher.stop import StopRequest
+from mfba_planner.launcher.console import Screen
+from mfba_planner.launcher.fleet_result import conclude_fleet
+from mfba_planner.launcher.run import Attempt
+from mfba_planner.launcher.run_arguments import read_order
+from mfba_planner.launcher.run_directory import RunDirectory
+from mfba_planner.launcher.run_result import conclude
+from mfba_planner.launcher.stop_request import StopRequest
 from mfba_planner.recording import decisions
-from mfba_planner.recording.episode import read_episode, read_recording, summaries, summarize
-from mfba_planner.recording.robots import ALONE
-from mfba_planner.scenarios import load_scenario, scenario_to_json
-from mfba_planner.verification.check import verify
+from mfba_planner.recording.read_episode import read_episode, read_recording, summaries, summarize
+from mfba_planner.recording.robot_topics import ALONE
+from mfba_planner.scenarios.scenario_files import load_scenario, scenario_to_json
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.robot_model import Lidar, Robot
+from mfba_planner.verification.verify_bag import verify
 
 SECTORS, VECTOR, ODOM, DECISION = "/sectors", "/sensory_vector", "/odom", "/planner/decision"
 TWIST, STEP = "/cmd_vel", "/goal_step"

@@ -7,7 +7,7 @@ import yaml
 from recording_bags import FOREIGN, LATCHED, SECOND, SENSOR, START_NS, write_bag
 
 from mfba_planner.core.errors import BagError
-from mfba_planner.recording.metadata import (
+from mfba_planner.recording.bag_metadata import (
     BagFile,
     BagMetadata,
     BagTopic,
@@ -15,9 +15,9 @@ from mfba_planner.recording.metadata import (
     dump_record,
     load_file,
 )
-from mfba_planner.recording.qos import OfferedQos, from_list
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.schemas import definition_of
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.message_definitions import definition_of
+from mfba_planner.recording.qos_profiles import OfferedQos, from_list
 
 ROOT = "rosbag2_bagfile_information"
 

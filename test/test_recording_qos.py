@@ -9,7 +9,7 @@ from recording_bags import FOREIGN
 from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9, parse_qos
 
 from mfba_planner.core.errors import BagError
-from mfba_planner.recording.qos import (
+from mfba_planner.recording.qos_profiles import (
     DURABILITY,
     HISTORY,
     INFINITE_NS,

@@ -24,10 +24,10 @@ from recording_bags import (
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.recording import mcap_walk
-from mfba_planner.recording.merge import RawMessage, Source, in_time_order
-from mfba_planner.recording.metadata import BagFile, BagMetadata, dump_file
-from mfba_planner.recording.qos import INFINITE_NS, OfferedQos
-from mfba_planner.recording.reader import BagReader
+from mfba_planner.recording.bag_metadata import BagFile, BagMetadata, dump_file
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.merge_by_time import RawMessage, Source, in_time_order
+from mfba_planner.recording.qos_profiles import INFINITE_NS, OfferedQos
 
 FOREIGN_COUNTS = {"/scan": 133, "/odom": 133, "/chatter": 13, "/goal_pose": 1, "/tf_static": 1}
 

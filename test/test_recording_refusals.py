@@ -15,8 +15,8 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from recording_bags import FOREIGN, foreign_mcap, write_bag
 
 from mfba_planner.core.errors import BagError
+from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.mcap_index import open_file
-from mfba_planner.recording.reader import BagReader
 
 
 def read_all(path: Path) -> int:

@@ -9,8 +9,8 @@ from recording_bags import FOREIGN
 from rosbags.typesys import get_types_from_msg
 
 from mfba_planner.core.errors import InputError
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.schemas import definition_of
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.message_definitions import definition_of
 
 INSTALLED = sorted(
     f"{file.parts[-3]}/msg/{file.stem}" for file in Path(sys.prefix).glob("share/*/msg/*.msg")

@@ -4,7 +4,12 @@
 import pytest
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.ros.replay_args import CLOCK_HZ, ReplaySettings, parse, split_ros_args
+from mfba_planner.ros.replaying.replay_arguments import (
+    CLOCK_HZ,
+    ReplaySettings,
+    parse,
+    split_ros_args,
+)
 
 
 def test_everything_can_be_said() -> None:

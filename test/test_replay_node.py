@@ -19,21 +19,27 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 
-from mfba_planner.core.digest import digest
 from mfba_planner.core.errors import BagError, ConfigError, GraphError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner import Mode, PlannerParams
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.messages import decision, sector_ranges
-from mfba_planner.recording.qos import OfferedQos
-from mfba_planner.recording.writer import BagWriter
-from mfba_planner.ros import player, topics
-from mfba_planner.ros.convert import clock_msg, odometry_msg, pose_stamped_msg, sectors_msg
-from mfba_planner.ros.planner import PlannerNode
-from mfba_planner.ros.replay import Replay
-from mfba_planner.ros.replay_args import parse
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.verification.scratch import Robot, decide_from_scratch
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.recording.bag_writer import BagWriter
+from mfba_planner.recording.messages import decision, sector_ranges
+from mfba_planner.recording.qos_profiles import OfferedQos
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.conversions import (
+    clock_msg,
+    odometry_msg,
+    pose_stamped_msg,
+    sectors_msg,
+)
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.replay import Replay
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.replaying import bag_player
+from mfba_planner.ros.replaying.replay_arguments import parse
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.verification.redecide import Robot, decide_from_scratch
 
 COUNT = 40
 LATCHED_QOS = topics.LATCHED_QOS
@@ -177,7 +183,7 @@ def test_a_pause_shifts_what_follows(
 ) -> None:
     """To the nanosecond: nothing is poured out, skipped or late, on a machine of any speed."""
     clock = StandingClock()
-    monkeypatch.setattr(player, "time", clock)
+    monkeypatch.setattr(bag_player, "time", clock)
     odoms = hear(graph, Odometry, "odom")
     replay = start(graph, bag, "--topics odom --rate 2")
     played, period_ns = replay.player.counts, SECOND // 100 // 2

@@ -15,13 +15,13 @@ from nav_msgs.msg import Odometry
 from recording_bags import FOREIGN, odometry, scan, write_bag
 from sensor_msgs.msg import LaserScan
 
-from mfba_planner.core.planner import Decision, Mode
-from mfba_planner.messages import decision
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.ros import topics
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.run_config import RunConfig
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.planning.algorithm_1 import Decision, Mode
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.messages import decision
+from mfba_planner.ros.interface import topics
+from mfba_planner.scenarios.run_config import RunConfig
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 DEFAULT_DEPTH = 10  # of a subscription in ROS 2
 FAST = ["--as-fast-as-possible", "--wait-timeout", "30"]

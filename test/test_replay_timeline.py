@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from recording_bags import FOREIGN, LATCHED, SECOND, SENSOR, START_NS, text
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.recording.qos import OfferedQos
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.timeline import Schedule, begin_ns, due_messages, offer
-from mfba_planner.recording.writer import BagWriter
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.bag_writer import BagWriter
+from mfba_planner.recording.qos_profiles import OfferedQos
+from mfba_planner.recording.replay_schedule import Schedule, begin_ns, due_messages, offer
 
 S = SECOND
 STRING = "std_msgs/msg/String"

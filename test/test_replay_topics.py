@@ -9,12 +9,12 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from recording_bags import FOREIGN, LATCHED, SENSOR
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.recording.metadata import BagTopic
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.schemas import definition_of
-from mfba_planner.ros import topics as graph
-from mfba_planner.ros.replay_args import parse
-from mfba_planner.ros.replay_topics import PlayedTopic, awaited, choose
+from mfba_planner.recording.bag_metadata import BagTopic
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.message_definitions import definition_of
+from mfba_planner.ros.interface import topics as graph
+from mfba_planner.ros.replaying.replay_arguments import parse
+from mfba_planner.ros.replaying.topic_selection import PlayedTopic, awaited, choose
 
 PLANNER_TOPICS = ("/cmd_vel", "/goal_step", "/plan", "/planner/decision")
 

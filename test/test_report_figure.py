@@ -22,16 +22,16 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from mfba_planner.core.episode import Episode, Outcome, run
 from mfba_planner.core.errors import OutputError
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.planner import Mode, PlannerParams
-from mfba_planner.core.world import Obstacle, Scenario, Walls, center_at
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
 from mfba_planner.report import style
-from mfba_planner.report.figure import draw_run, png_bytes, run_figure
-from mfba_planner.report.moments import closest_passes
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.report.run_events import closest_passes
+from mfba_planner.report.run_figure import draw_run, png_bytes, run_figure
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Episode, Outcome, run
+from mfba_planner.simulation.scenario import Obstacle, Scenario, Walls, center_at
 
 
 def _still(x: float, y: float, radius: float = 0.3) -> Obstacle:
@@ -472,14 +472,14 @@ def _modules_after(code: str) -> set[str]:
 
 def test_matplotlib_is_loaded_for_figures_only_and_pyplot_never() -> None:
     light = _modules_after(
-        "import mfba_planner.report, mfba_planner.report.result, mfba_planner.report.table"
+        "import mfba_planner.report.result_json, mfba_planner.report.result_table"
     )
-    assert "mfba_planner.report.table" in light
+    assert "mfba_planner.report.result_table" in light
     assert "matplotlib" not in light
     heavy = _modules_after(
-        "from mfba_planner.report.figure import png_bytes\n"
-        "from mfba_planner.core.episode import run\n"
-        "from mfba_planner.scenarios import load_scenario\n"
+        "from mfba_planner.report.run_figure import png_bytes\n"
+        "from mfba_planner.simulation.episode import run\n"
+        "from mfba_planner.scenarios.scenario_files import load_scenario\n"
         "png_bytes(run(load_scenario('case1')))"
     )
     assert "matplotlib.backends.backend_agg" in heavy

@@ -12,18 +12,26 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from mfba_planner import cli, figures
-from mfba_planner.core.bat import Algorithm, Schedule
+from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, InputError, OutputError
-from mfba_planner.core.gaps import gap_vector
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.metrics import evaluate, within_range
-from mfba_planner.core.planner import Mode
+from mfba_planner.evaluation.metrics import evaluate, within_range
 from mfba_planner.paper import convergence, published
 from mfba_planner.paper.functions import FUNCTIONS
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.planning.gap_vector import gap_vector
 from mfba_planner.report import style
-from mfba_planner.report.figures import beta, enlargement, gaps, sectors, sketch, trips
-from mfba_planner.report.sheet import Sheet, to_bytes
+from mfba_planner.report.figure_canvas import Sheet, to_bytes
+from mfba_planner.report.figures import (
+    beta,
+    enlargement,
+    gaps,
+    paper_figures,
+    sectors,
+    sketch,
+    trips,
+)
+from mfba_planner.swarm.bat_swarm import Algorithm, Schedule
 
 SKETCHES = {"fig2": beta.draw, "fig4": enlargement.draw, "fig5": sectors.draw, "fig6": gaps.draw}
 TRIPS = ("fig7", "fig8")
@@ -35,7 +43,7 @@ def figure_of(name: str) -> Figure:
     with style.context():
         if name in SKETCHES:
             return SKETCHES[name]()
-        return trips.draw(figures.figure_run(name), name)
+        return trips.draw(paper_figures.figure_run(name), name)
 
 
 @pytest.mark.parametrize("name", [*SKETCHES, *TRIPS])
@@ -70,10 +78,10 @@ def drawn_texts(figure: Figure) -> list[Text]:
 
 
 @pytest.mark.parametrize("name", ["fig5", "fig7"])
-@pytest.mark.parametrize("form", figures.FORMATS)
+@pytest.mark.parametrize("form", paper_figures.FORMATS)
 def test_equal_bytes_without_a_date(name: str, form: str) -> None:
-    data = figures.render(name, (form,))[form]
-    assert data == figures.render(name, (form,))[form]
+    data = paper_figures.render(name, (form,))[form]
+    assert data == paper_figures.render(name, (form,))[form]
     assert not re.search(rb"20\d\d-\d\d-\d\d|<dc:date>|matplotlib v", data, re.IGNORECASE)
 
 
@@ -110,13 +118,15 @@ def test_fig_6_takes_the_gap_nearest_to_the_goal() -> None:
 
 @pytest.mark.parametrize("name", TRIPS)
 def test_the_runs_of_fig_7_and_8_have_the_printed_lengths(name: str) -> None:
-    result = evaluate(figures.figure_run(name))
+    result = evaluate(paper_figures.figure_run(name))
     assert result.success
     assert result.length_m == pytest.approx(PRINTED_M[name], abs=0.0015)
 
 
 def test_the_moments_are_those_of_the_papers_captions() -> None:
-    words = {name: [s.caption for s in trips.scenes(figures.figure_run(name))] for name in TRIPS}
+    words = {
+        name: [s.caption for s in trips.scenes(paper_figures.figure_run(name))] for name in TRIPS
+    }
     assert words == {
         "fig7": [
             "nothing within SR",
@@ -136,7 +146,7 @@ def test_the_moments_are_those_of_the_papers_captions() -> None:
 
 @pytest.mark.parametrize("name", TRIPS)
 def test_the_moments_are_what_they_are_called(name: str) -> None:
-    episode = figures.figure_run(name)
+    episode = paper_figures.figure_run(name)
     for scene in trips.scenes(episode):
         tick = episode.ticks[scene.index]
         near = within_range(episode, tick)
@@ -146,7 +156,7 @@ def test_the_moments_are_what_they_are_called(name: str) -> None:
 
 
 def test_a_run_that_avoids_nothing_has_no_such_figure() -> None:
-    episode = figures.figure_run("fig7")
+    episode = paper_figures.figure_run("fig7")
     free = replace(episode, ticks=episode.ticks[:3])
     with pytest.raises(InputError, match="avoids no obstacle"):
         trips.scenes(free)

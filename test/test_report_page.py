@@ -16,25 +16,25 @@ from helpers import wait_until
 from launching import complete
 from selenium.webdriver.common.keys import Keys
 
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Episode, run
 from mfba_planner.core.errors import InputError, OutputError
-from mfba_planner.core.fleet import run_fleet
-from mfba_planner.core.gaps import gap_heading
-from mfba_planner.core.metrics import evaluate, tick_clearances
-from mfba_planner.core.planner import Method, Mode, PlannerParams
-from mfba_planner.core.robot import Noise
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.planners.method import simulate
-from mfba_planner.planners.predictive import preset
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.report import words
+from mfba_planner.evaluation.metrics import evaluate, tick_clearances
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Method, Mode, PlannerParams
+from mfba_planner.planning.gap_vector import gap_heading
+from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.planning.predictive import preset
+from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.report import format_values
 from mfba_planner.report.html.charts import look
 from mfba_planner.report.html.data import MOST_ROBOTS, MOST_RUNS, clearances
 from mfba_planner.report.html.page import as_json, page, write_page
-from mfba_planner.report.moments import closest_passes
-from mfba_planner.report.table import result_rows
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.report.result_table import result_rows
+from mfba_planner.report.run_events import closest_passes
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Episode, run
+from mfba_planner.simulation.fleet import run_fleet
+from mfba_planner.simulation.robot_model import Noise
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,7 @@ def test_every_tick_shows_what_the_bag_holds(
         scrub(browser, k)
         seen.add(decision.mode)
         assert field(browser, "tick") == f"{k} of {len(episode.ticks) - 1}"
-        assert field(browser, "mode") == words.MODES[decision.mode]
+        assert field(browser, "mode") == format_values.MODES[decision.mode]
         assert field(browser, "reason") == decision.reason
         assert bits(browser, "vs") == "".join(map(str, decision.vs))
         assert bits(browser, "vg") == "".join(map(str, decision.vg))
@@ -574,7 +574,7 @@ def test_names_are_text_and_never_markup(browser: Browser, tmp_path: Path) -> No
     write_page([(hostile, replace(episode, ticks=ticks))], path)
     browser.open(path)
     assert browser.said() == []
-    assert browser.run("return document.title") == words.one_line(hostile, 80)
+    assert browser.run("return document.title") == format_values.one_line(hostile, 80)
     assert browser.run("return document.querySelectorAll('img').length") == 0
     assert field(browser, "reason") == hostile
     assert browser.run("return document.querySelector('.card .run').textContent") == hostile

@@ -17,16 +17,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner import __version__
-from mfba_planner.core.bat import Algorithm, BatParams
-from mfba_planner.core.episode import Episode, Outcome, run
 from mfba_planner.core.errors import InputError, OutputError
-from mfba_planner.core.metrics import Result, evaluate
 from mfba_planner.core.options import override
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.outputs import write_new
-from mfba_planner.report.result import read_result, result_to_dict, write_result
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.core.outputs import write_new
+from mfba_planner.evaluation.metrics import Result, evaluate
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.report.result_json import read_result, result_to_dict, write_result
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Episode, Outcome, run
+from mfba_planner.swarm.bat_swarm import Algorithm, BatParams
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from mfba_planner.core.episode import Episode, Outcome, run
-from mfba_planner.core.metrics import Result, evaluate
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.core.world import Obstacle, Scenario
-from mfba_planner.report.table import print_result, result_rows, result_text
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.evaluation.metrics import Result, evaluate
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.report.result_table import print_result, result_rows, result_text
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.episode import Episode, Outcome, run
+from mfba_planner.simulation.scenario import Obstacle, Scenario
 
 Rows = dict[str, tuple[str, str]]
 

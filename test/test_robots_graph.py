@@ -10,24 +10,24 @@ import pytest
 from edited_bags import rewrite
 from graph import Graph
 
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Outcome
-from mfba_planner.core.planner import Method, PlannerParams
-from mfba_planner.core.robot import Drive, Lidar, Noise, Robot
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.core.world import Scenario
-from mfba_planner.messages import laser_scan, robot_pose
-from mfba_planner.planners.method import simulate
-from mfba_planner.planners.predictive import preset
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.ros import topics
-from mfba_planner.ros.in_process import run_in_process
-from mfba_planner.ros.planner import PlannerNode
-from mfba_planner.ros.virtual_sensor import VirtualSensor
-from mfba_planner.ros.world_sim import WorldSim
-from mfba_planner.run_config import Driver, RunConfig, node_parameters
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.verification.check import verify
+from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import Method, PlannerParams
+from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.planning.predictive import preset
+from mfba_planner.recording.messages import laser_scan, robot_pose
+from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.nodes.world_sim import WorldSim
+from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.verification.verify_bag import verify
 
 PAPER = PlannerParams(goal_tolerance_m=0.05)
 AHEAD = replace(preset(PAPER), method=Method.PREDICTIVE)

@@ -7,12 +7,12 @@ import pytest
 from edited_bags import record
 from recording_bags import count_with_all
 
-from mfba_planner.core.metrics import evaluate
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
-from mfba_planner.recording.episode import read_episode
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.ros import topics
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.ros.interface import topics
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 # Nobody publishes them in a simulation of the paper's robot, which has no lidar and never errs.
 NEVER = {"ground_truth", "initialpose", "scan", "waypoints"}

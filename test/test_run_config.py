@@ -5,9 +5,9 @@ import pytest
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.options import flatten
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.run_config import NODES, RunConfig, node_parameters
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.scenarios.run_config import NODES, RunConfig, node_parameters
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 CASE1 = load_scenario("case1")
 

@@ -13,17 +13,17 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from mfba_planner.core.episode import Outcome, run
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.world import Obstacle, Scenario, Turn, Walls
-from mfba_planner.scenario_model import checked
-from mfba_planner.scenarios import (
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.scenarios.scenario_files import (
     load_scenario,
     parse_scenario,
     scenario_to_dict,
     scenario_to_json,
 )
+from mfba_planner.scenarios.yaml_schema import checked
+from mfba_planner.simulation.episode import Outcome, run
+from mfba_planner.simulation.scenario import Obstacle, Scenario, Turn, Walls
 
 EXAMPLE = "compare config/scenarios/case1.yaml"
 TASK = "name: x\nstart_m: [0, 0]\ngoal_m: [5, 5]\n"
@@ -516,7 +516,7 @@ def test_what_is_not_as_programs_write_it_is_judged_by_the_long_way(
 def test_what_explains_mistakes_is_not_loaded_for_what_programs_write() -> None:
     text = scenario_to_json(load_scenario("case2"))
     code = (
-        "import sys\nfrom mfba_planner.scenarios import load_scenario\n"
+        "import sys\nfrom mfba_planner.scenarios.scenario_files import load_scenario\n"
         "load_scenario(sys.argv[1])\nassert not {'pydantic', 'yaml'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code, text], check=True)

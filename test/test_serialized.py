@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from nav_msgs.msg import Path
 from rclpy.serialization import serialize_message
 
-from mfba_planner.messages import stamp_ns
-from mfba_planner.ros import topics
-from mfba_planner.ros.serialized import has_header, header_stamp_ns
+from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.serialized_message import has_header, header_stamp_ns
 
 
 @given(st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**32 - 1))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner import statistics as stats
+from mfba_planner.evaluation import statistics as stats
 
 NAMES = ("best", "worst", "mean", "sd")
 

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from mfba_planner.core.errors import ConfigError, MfbaError
-from mfba_planner.study.compute import TRIES, compute
-from mfba_planner.study.store import Store
+from mfba_planner.evaluation.study.chunk_store import Store
+from mfba_planner.evaluation.study.compute_chunks import TRIES, compute
 
 
 @dataclass(frozen=True)

@@ -15,23 +15,23 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
-from mfba_planner.core.episode import run
 from mfba_planner.core.errors import ConfigError, OutputError
-from mfba_planner.core.metrics import assess
-from mfba_planner.core.planner import Observation, Planner, PlannerParams, Swarm
-from mfba_planner.oracle import solve
-from mfba_planner.sweep import keeper, parts
-from mfba_planner.sweep import play as play_module
-from mfba_planner.sweep.columns import COLUMNS, TIMINGS, Row
-from mfba_planner.sweep.keeper import Keeper, Lost, each
-from mfba_planner.sweep.order import Order, Run, Setting, read_run
-from mfba_planner.sweep.parts import make, parts_of
-from mfba_planner.sweep.play import flies_together, play, play_together
-from mfba_planner.sweep.run import Swept, dask_executor, open_store, sweep
-from mfba_planner.sweep.summary import comparisons, standings, versus
-from mfba_planner.sweep.table import sorted_hash, to_csv, to_parquet, write
-from mfba_planner.worlds import suite
-from mfba_planner.worlds.difficulty import survivability
+from mfba_planner.evaluation.metrics import assess
+from mfba_planner.evaluation.oracle import solve
+from mfba_planner.evaluation.suites import suite
+from mfba_planner.evaluation.suites.survivability import survivability
+from mfba_planner.evaluation.sweep import chunks, worker
+from mfba_planner.evaluation.sweep import single_run as play_module
+from mfba_planner.evaluation.sweep.chunks import make, parts_of
+from mfba_planner.evaluation.sweep.columns import COLUMNS, TIMINGS, Row
+from mfba_planner.evaluation.sweep.run_sweep import Swept, dask_executor, open_store, sweep
+from mfba_planner.evaluation.sweep.single_run import flies_together, play, play_together
+from mfba_planner.evaluation.sweep.summary import comparisons, standings, versus
+from mfba_planner.evaluation.sweep.sweep_spec import Order, Run, Setting, read_run
+from mfba_planner.evaluation.sweep.table import sorted_hash, to_csv, to_parquet, write
+from mfba_planner.evaluation.sweep.worker import Keeper, Lost, each
+from mfba_planner.planning.algorithm_1 import Observation, Planner, PlannerParams, Swarm
+from mfba_planner.simulation.episode import run
 
 
 def an_order(**changes: Any) -> Order:
@@ -50,8 +50,8 @@ def small() -> Swept:
 @pytest.fixture
 def tiny_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many parts of few runs; it is the parent who cuts."""
-    monkeypatch.setattr(parts, "RUNS_AT_ONCE", 2)
-    monkeypatch.setattr(parts, "WORLDS_AT_ONCE", 2)
+    monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 2)
+    monkeypatch.setattr(chunks, "WORLDS_AT_ONCE", 2)
 
 
 def test_every_run_is_there_once_in_order(small: Swept) -> None:
@@ -126,7 +126,7 @@ def test_only_fresh_bats_of_ours_fly_together() -> None:
     persistent = Setting(params=PlannerParams(swarm=Swarm.PERSISTENT))
     assert not flies_together("paper", persistent)
     assert not flies_together("predictive", Setting())
-    assert not flies_together("mfba_planner.planners.registry:make", Setting())
+    assert not flies_together("mfba_planner.planning.planner_registry:make", Setting())
 
 
 def dies_among_others(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
@@ -148,7 +148,7 @@ def test_runs_that_are_lost_together_are_made_one_by_one(
     monkeypatch: pytest.MonkeyPatch, lost: Any
 ) -> None:
     plain = sweep(an_order(planners=("paper",)))
-    monkeypatch.setattr(parts, "make", lost)
+    monkeypatch.setattr(chunks, "make", lost)
     again = sweep(an_order(planners=("paper",), setting=Setting(patience_s=4.0)))
     assert again.hash == plain.hash
     assert all(row["decision_us"] > 0.0 for row in again.timings), "each was made alone"
@@ -251,7 +251,7 @@ def test_a_planner_that_cannot_be_made_fails() -> None:
 def test_one_that_hangs_or_dies_costs_its_run(
     planner: str, failure: str, workers: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parts, "RUNS_AT_ONCE", 4)
+    monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 4)
     order = an_order(
         planners=(f"faulty_planners:{planner}",),
         worlds=2,
@@ -455,9 +455,9 @@ def test_work_is_done_by_one_thread_whatever_the_workers_are_told(
 def test_one_child_makes_one_part_after_the_other() -> None:
     first, second = parts_of(an_order())
     first.run()
-    child = keeper._LOCAL.keeper
+    child = worker._LOCAL.keeper
     second.run()
-    assert keeper._LOCAL.keeper is child
+    assert worker._LOCAL.keeper is child
     assert child.is_alive
 
 
@@ -465,7 +465,7 @@ def test_a_planner_found_by_a_path_of_after_the_first_sweep(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "found_later.py").write_text(
-        "from mfba_planner.planners.straight import Straight as Later\n"
+        "from mfba_planner.planning.peers.straight_line import Straight as Later\n"
     )
     before = sweep(an_order(planners=("straight",)))
     monkeypatch.syspath_prepend(str(tmp_path))

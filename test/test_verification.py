@@ -19,14 +19,14 @@ from edited_bags import (
     swapped,
 )
 
-from mfba_planner.core import episode
-from mfba_planner.core.digest import digest
 from mfba_planner.core.errors import BagError
-from mfba_planner.core.planner import Mode
-from mfba_planner.messages import stamp_ns
-from mfba_planner.recording.integrity import check_data
-from mfba_planner.scenarios import load_scenario
-from mfba_planner.verification.check import verify
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.recording.file_integrity import check_data
+from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation import episode
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.verification.verify_bag import verify
 
 DECISION = "/planner/decision"
 

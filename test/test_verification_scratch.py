@@ -18,11 +18,11 @@ from sensor_msgs.msg import LaserScan
 
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, MfbaError
-from mfba_planner.core.planner import Mode
-from mfba_planner.recording.reader import BagReader
-from mfba_planner.recording.writer import BagWriter
-from mfba_planner.ros.serialized import type_name
-from mfba_planner.verification.scratch import Robot, decide_from_scratch
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.recording.bag_reader import BagReader
+from mfba_planner.recording.bag_writer import BagWriter
+from mfba_planner.ros.interface.serialized_message import type_name
+from mfba_planner.verification.redecide import Robot, decide_from_scratch
 
 ROBOT = Robot(robot_radius_m=0.3)
 TICK_NS = SECOND // 10

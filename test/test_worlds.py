@@ -12,14 +12,21 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.legs import uniform_legs
-from mfba_planner.core.world import Obstacle, Scenario, Turn, Walls, center_at, step_clearances
-from mfba_planner.scenarios import load_scenario, scenario_to_json
-from mfba_planner.worlds import suite, suite_names
-from mfba_planner.worlds.adversarial import FAMILIES, hostile
-from mfba_planner.worlds.crowd import CrowdParams, Motion, crowd
-from mfba_planner.worlds.difficulty import first_contact_s, survivability
-from mfba_planner.worlds.trip import Trip
+from mfba_planner.evaluation.suites import suite, suite_names
+from mfba_planner.evaluation.suites.adversarial_worlds import FAMILIES, hostile
+from mfba_planner.evaluation.suites.random_crowds import CrowdParams, Motion, crowd
+from mfba_planner.evaluation.suites.survivability import first_contact_s, survivability
+from mfba_planner.evaluation.suites.trip import Trip
+from mfba_planner.scenarios.scenario_files import load_scenario, scenario_to_json
+from mfba_planner.simulation.scenario import (
+    Obstacle,
+    Scenario,
+    Turn,
+    Walls,
+    center_at,
+    step_clearances,
+)
+from mfba_planner.simulation.uniform_segments import uniform_legs
 
 # centre, speed and heading of the first obstacle of random-10, world 0
 GOLDEN = (7.269229725556283, 2.5850024987816624, 0.2851093287992198, -3.0053334499216913)

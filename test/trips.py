@@ -3,10 +3,10 @@
 
 from typing import Any
 
-from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.planner import Decision, Mode, PlannerParams
-from mfba_planner.core.world import Obstacle, Scenario
+from mfba_planner.planning.algorithm_1 import Decision, Mode, PlannerParams
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.scenario import Obstacle, Scenario
 
 # One metre, one second per tick.
 SECOND = PlannerParams(speed_mps=1.0, step_length_m=1.0)

@@ -37,10 +37,10 @@ import os
 from ament_index_python import get_package_prefix, get_package_share_directory
 
 import mfba_planner
-from mfba_planner.core.episode import run
+from mfba_planner.simulation.episode import run
 from mfba_planner.report.html.page import page
-from mfba_planner.resources import scenario_names
-from mfba_planner.scenarios import load_scenario
+from mfba_planner.core.resources import scenario_names
+from mfba_planner.scenarios.scenario_files import load_scenario
 
 assert mfba_planner.__file__.startswith(os.environ["BASE"]), mfba_planner.__file__
 assert get_package_prefix("mfba_planner") == os.environ["PREFIX"]

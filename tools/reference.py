@@ -20,15 +20,16 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from mfba_planner import cli, scenario_model
-from mfba_planner import node_settings as settings
+from mfba_planner import cli
 from mfba_planner.core.options import override, walk
-from mfba_planner.core.planner import PlannerParams
-from mfba_planner.core.robot import Robot
-from mfba_planner.core.sensing import SensorParams
-from mfba_planner.planners.method import USUAL
-from mfba_planner.planners.predictive import preset
-from mfba_planner.ros import topics
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_factory import USUAL
+from mfba_planner.planning.predictive import preset
+from mfba_planner.ros.interface import node_parameters as settings
+from mfba_planner.ros.interface import topics
+from mfba_planner.scenarios import yaml_schema
+from mfba_planner.simulation.robot_model import Robot
 
 README = Path(__file__).resolve().parent.parent / "README.md"
 
@@ -174,7 +175,7 @@ def _help(command: list[str]) -> str:
 
 def scenario_keys() -> str:
     """Every key of a scenario file: type and range, default, meaning."""
-    schema = scenario_model.schema()
+    schema = yaml_schema.schema()
     parts = [("The file", schema), *sorted(schema["$defs"].items())]
     return "\n\n".join(f"## {_title(name)}\n\n{_keys(part)}" for name, part in parts)
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 
 import argparse
 
-from ..arguments import Parser
-from ..core.digest import digest
-from ..core.episode import Episode
+from ..core.argument_parser import Parser
 from ..core.errors import BagError
-from ..core.metrics import evaluate
 from ..core.options import flatten
-from ..outputs import bag_in
-from ..recording.episode import Recording, read_recording
-from ..recording.left_out import tell
-from ..recording.robots import of_robot
-from ..report.table import comparison_text
-from ..verification.compare import first_divergence, side_by_side
+from ..core.outputs import bag_in
+from ..evaluation.metrics import evaluate
+from ..recording.omitted_decisions import tell
+from ..recording.read_episode import Recording, read_recording
+from ..recording.robot_topics import of_robot
+from ..report.result_table import comparison_text
+from ..simulation.decision_digest import digest
+from ..simulation.episode import Episode
+from ..verification.compare_decisions import first_divergence, side_by_side
 
 
 def main(args: list[str]) -> int:

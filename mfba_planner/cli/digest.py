@@ -6,12 +6,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from ..arguments import Parser
-from ..outputs import bag_in
-from ..recording.episode import summaries
-from ..recording.left_out import tell
-from ..recording.robots import ALONE, chosen
-from ..report.result import read_result
+from ..core.argument_parser import Parser
+from ..core.outputs import bag_in
+from ..recording.omitted_decisions import tell
+from ..recording.read_episode import summaries
+from ..recording.robot_topics import ALONE, chosen
+from ..report.result_json import read_result
 
 
 def main(args: list[str]) -> int:

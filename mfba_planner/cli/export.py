@@ -10,14 +10,14 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..arguments import Parser
+from ..core.argument_parser import Parser
 from ..core.errors import BagError, ConfigError
-from ..outputs import bag_in, new_file
+from ..core.outputs import bag_in, new_file
+from ..recording.bag_reader import BagReader
 from ..recording.decisions import deciders
-from ..recording.left_out import tell
-from ..recording.reader import BagReader
-from ..recording.robots import chosen
-from ..recording.table import COLUMNS, Row, read_rows
+from ..recording.omitted_decisions import tell
+from ..recording.robot_topics import chosen
+from ..recording.tick_table import COLUMNS, Row, read_rows
 
 BATCH = 5000  # rows that are held at a time
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from ..arguments import Parser
+from ..core.argument_parser import Parser
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
-from ..figures import FIGURES, FORMATS, render
-from ..outputs import new_run_directory, refuse_existing, write_new
+from ..core.outputs import new_run_directory, refuse_existing, write_new
+from ..report.figures.paper_figures import FIGURES, FORMATS, render
 
 _DESCRIPTION = "Draw the paper's figures again; the same version draws the same bytes."
 

@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..core.episode import Episode, Outcome
 from ..core.errors import ConfigError, MfbaError
-from ..core.metrics import Result, evaluate
-from ..planners.method import simulate_fleet
-from ..report.roster import fleet_text, why_no_success
-from ..run_config import RunConfig
+from ..evaluation.metrics import Result, evaluate
+from ..planning.planner_factory import simulate_fleet
+from ..report.fleet_table import fleet_text, why_no_success
+from ..scenarios.run_config import RunConfig
+from ..simulation.episode import Episode, Outcome
 
 _SEED_HEAD = "    seed  at the goal   longest     last  clearance  collisions"
 _SEED_ROW = "{:>8}  {:>4} of {:<4}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"

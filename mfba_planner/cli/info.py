@@ -3,16 +3,16 @@
 
 from __future__ import annotations
 
-from ..arguments import Parser
+from ..core.argument_parser import Parser
 from ..core.errors import BagError
-from ..launcher.conclusion import show
-from ..outputs import bag_in
+from ..core.outputs import bag_in
+from ..launcher.run_result import show
+from ..recording.bag_info import describe, format_info
 from ..recording.configuration import ATTACHMENT_NAME
-from ..recording.episode import Summary, summaries
-from ..recording.info import describe, format_info
-from ..recording.left_out import tell
-from ..recording.robots import ALONE
-from ..report.roster import fleet_text
+from ..recording.omitted_decisions import tell
+from ..recording.read_episode import Summary, summaries
+from ..recording.robot_topics import ALONE
+from ..report.fleet_table import fleet_text
 
 
 def main(args: list[str]) -> int:

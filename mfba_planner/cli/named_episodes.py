@@ -12,22 +12,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..arguments import Parser
-from ..core.digest import digest
-from ..core.episode import Episode
+from ..core.argument_parser import Parser
 from ..core.errors import ConfigError, InputError
 from ..core.options import override
-from ..core.planner import PlannerParams
-from ..core.sensing import SensorParams
-from ..core.world import Scenario
-from ..outputs import bag_in
-from ..planners.method import simulate
-from ..recording.episode import Recording, read_recording
-from ..recording.left_out import tell
-from ..recording.robots import ALONE, chosen
-from ..report.result import read_result
-from ..resources import scenario_names
-from ..scenarios import load_scenario
+from ..core.outputs import bag_in
+from ..core.resources import scenario_names
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import PlannerParams
+from ..planning.planner_factory import simulate
+from ..recording.omitted_decisions import tell
+from ..recording.read_episode import Recording, read_recording
+from ..recording.robot_topics import ALONE, chosen
+from ..report.result_json import read_result
+from ..scenarios.scenario_files import load_scenario
+from ..simulation.decision_digest import digest
+from ..simulation.episode import Episode
+from ..simulation.scenario import Scenario
 
 _RESULT = "result.json"
 

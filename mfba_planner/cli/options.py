@@ -6,11 +6,11 @@ from __future__ import annotations
 from enum import Enum
 from typing import Any
 
-from ..arguments import Parser
+from ..core.argument_parser import Parser
 from ..core.options import Spec, flatten
-from ..core.planner import PlannerParams
-from ..launcher.settings import option_rows
-from ..planners.method import named
+from ..launcher.set_option import option_rows
+from ..planning.algorithm_1 import PlannerParams
+from ..planning.planner_factory import named
 
 
 def main(args: list[str]) -> int:

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..arguments import Parser
-from ..outputs import bag_in
-from ..recording.episode import read_recording
-from ..recording.left_out import tell
+from ..core.argument_parser import Parser
+from ..core.outputs import bag_in
+from ..recording.omitted_decisions import tell
+from ..recording.read_episode import read_recording
 
 
 def main(args: list[str]) -> int:
@@ -25,12 +25,12 @@ def main(args: list[str]) -> int:
     tell(bag, missed)
     # What draws takes its time: only where there is something to draw.
     if len(runs) == 1:
-        from ..report.figure import draw_run
+        from ..report.run_figure import draw_run
 
         (episode,) = runs.values()
         draw_run(episode, found.png)
     else:
-        from ..report.fleet import draw_fleet
+        from ..report.fleet_figure import draw_fleet
 
         draw_fleet(scenario, seed, runs, found.png)
     print(f"wrote {found.png}")

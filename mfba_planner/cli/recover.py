@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..arguments import Parser
-from ..outputs import bag_in
+from ..core.argument_parser import Parser
+from ..core.outputs import bag_in
 from ..recording.recover import recover
 
 

@@ -8,5 +8,5 @@ from importlib import import_module
 
 def main(args: list[str]) -> int:
     """Play a bag."""
-    code: int = import_module("mfba_planner.ros.replay").main(args)
+    code: int = import_module("mfba_planner.ros.nodes.replay").main(args)
     return code

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..arguments import Parser
-from ..outputs import refuse_existing
-from .episodes import add_paths, named_episodes
+from ..core.argument_parser import Parser
+from ..core.outputs import refuse_existing
+from .named_episodes import add_paths, named_episodes
 
 _DESCRIPTION = """Write runs as one HTML file that needs nothing else: no network, no ROS.
 

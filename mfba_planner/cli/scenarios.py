@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from ..arguments import Parser
-from ..resources import scenario_names, share_dir
-from ..scenarios import load_scenario
+from ..core.argument_parser import Parser
+from ..core.resources import scenario_names, share_dir
+from ..scenarios.scenario_files import load_scenario
 
 
 def main(args: list[str]) -> int:

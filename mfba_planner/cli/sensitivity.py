@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..arguments import Parser
-from ..figures import FORMATS
-from ..outputs import new_run_directory, write_same
+from ..core.argument_parser import Parser
+from ..core.outputs import new_run_directory, write_same
 from ..paper import sensitivity
 from ..paper.study.run import open_store
-from ..scenarios import load_scenario
-from ..watched import add_arguments, check, run_watched
+from ..report.figures.paper_figures import FORMATS
+from ..scenarios.scenario_files import load_scenario
+from .study_progress import add_arguments, check, run_watched
 
 _DESCRIPTION = """Change what section 6.2 leaves open, one thing at a time, and see what becomes of
 the printed path lengths and of whom the robot meets: a table, CSV, Markdown and a heat-map.
@@ -43,9 +43,9 @@ def main(args: list[str]) -> int:
 def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
     """CSV, Markdown and heat-map; what is there already must be the same."""
     from ..report import style
+    from ..report.figure_canvas import to_bytes
     from ..report.figures.sensitivity import draw
-    from ..report.sensitivity import to_csv, to_markdown
-    from ..report.sheet import to_bytes
+    from ..report.sensitivity_table import to_csv, to_markdown
 
     files = {
         "sensitivity.csv": to_csv(rows).encode(),
@@ -62,8 +62,8 @@ def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
 def _show(rows: Sequence[sensitivity.Row], title: str) -> None:
     from rich.console import Console
 
-    from ..report.console import print_encodable
-    from ..report.sensitivity import to_table
+    from ..report.sensitivity_table import to_table
+    from ..report.terminal_output import print_encodable
 
     console = Console()
     table = to_table(rows, title, console.width)

@@ -10,16 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..arguments import Parser
+from ..core.argument_parser import Parser
 from ..core.errors import InputError
-from ..oracle import solve
-from ..outputs import new_run_directory, refuse_existing, write_new
-from ..sweep.columns import Row, made_row
-from ..sweep.explain import contact_index, explain
-from ..sweep.guard import HungError
-from ..sweep.order import Order, Run, Setting, own_preset, read_run
-from ..sweep.play import Played, play
-from ..sweep.read import ReadSweep, read_sweep
+from ..core.outputs import new_run_directory, refuse_existing, write_new
+from ..evaluation.oracle import solve
+from ..evaluation.sweep.columns import Row, made_row
+from ..evaluation.sweep.explain_run import contact_index, explain
+from ..evaluation.sweep.planner_sandbox import HungError
+from ..evaluation.sweep.read_sweep import ReadSweep, read_sweep
+from ..evaluation.sweep.single_run import Played, play
+from ..evaluation.sweep.sweep_spec import Order, Run, Setting, own_preset, read_run
 
 _DESCRIPTION = """Make a run of a sweep again and tell what became of it, and why.
 
@@ -139,8 +139,8 @@ def _write(directory: Path, run: Run, played: Played, lines: list[str], *, bag: 
     write_new(directory / names[0], ("\n".join(lines) + "\n").encode())
     if not episode.ticks:
         return names
-    from ..report.figure import draw_run
-    from ..report.moment import moment_png
+    from ..report.run_figure import draw_run
+    from ..report.tick_figure import moment_png
 
     draw_run(episode, directory / "run.png")
     index = contact_index(episode)
@@ -148,7 +148,7 @@ def _write(directory: Path, run: Run, played: Played, lines: list[str], *, bag: 
     write_new(directory / "moment.png", moment_png(episode, index, str(run), lines[1:2]))
     names += ["run.png", "moment.png"]
     if bag:
-        from ..ros.episode_bag import write_episode_bag
+        from ..ros.interface.episode_to_bag import write_episode_bag
 
         write_episode_bag(episode, directory / "bag", {"planner": run.planner})
         names.append("bag")

@@ -8,13 +8,13 @@ import statistics
 from dataclasses import replace
 from pathlib import Path
 
-from ..arguments import Parser
+from ..core.argument_parser import Parser
 from ..core.errors import ConfigError, MfbaError
-from ..core.metrics import Result, evaluate
-from ..launcher.conclusion import show, why_no_success
-from ..launcher.options import Order, add_world_arguments, read_config
-from ..planners.method import simulate
-from ..run_config import Driver, RunConfig
+from ..evaluation.metrics import Result, evaluate
+from ..launcher.run_arguments import Order, add_world_arguments, read_config
+from ..launcher.run_result import show, why_no_success
+from ..planning.planner_factory import simulate
+from ..scenarios.run_config import Driver, RunConfig
 
 _DESCRIPTION = "Simulate episodes without ROS: the decisions of `mfba run`, but no bag."
 _HEAD = "    seed  outcome       length     time  clearance  collisions"
@@ -39,7 +39,7 @@ def main(args: list[str]) -> int:
 
         return fleet.simulate(config, found.seeds, found.out)
     if found.out is not None:
-        from ..launcher.run import run as launch
+        from ..launcher.execute_run import run as launch
 
         return launch(Order(config=config, out=found.out, node_args={}))
     if found.seeds == 1:

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from .core.errors import ConfigError
-from .paper.study.chunk import Chunk
-from .paper.study.run import Sample, run_plan
-from .study.compute import check_workers
-from .study.part import Part
-from .study.store import Store
+from ..core.errors import ConfigError
+from ..evaluation.study.chunk import Part
+from ..evaluation.study.chunk_store import Store
+from ..evaluation.study.compute_chunks import check_workers
+from ..paper.study.chunk import Chunk
+from ..paper.study.run import Sample, run_plan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

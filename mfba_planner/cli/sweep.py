@@ -11,24 +11,24 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..arguments import Parser
+from ..core.argument_parser import Parser
 from ..core.options import Scalar, flatten
-from ..core.planner import PlannerParams
-from ..core.sensing import SensorParams
-from ..launcher.settings import add_set_argument, with_settings
-from ..outputs import new_run_directory, write_same
-from ..planners.method import USUAL
-from ..planners.perception import NAMES as PERCEPTIONS
-from ..planners.registry import PLANNERS
-from ..study.compute import check_workers
-from ..sweep.columns import COLUMNS, TIMINGS
-from ..sweep.order import PATIENCE_S, Order, Setting, own_preset
-from ..sweep.parts import parts_of
-from ..sweep.run import Swept, dask_executor, open_store, sweep
-from ..sweep.table import write
-from ..watched import add_work_arguments, progress, say
-from ..worlds import suite_names
-from ..worlds.suites import SPEED_MPS
+from ..core.outputs import new_run_directory, write_same
+from ..evaluation.study.compute_chunks import check_workers
+from ..evaluation.suites import suite_names
+from ..evaluation.suites.named_suites import SPEED_MPS
+from ..evaluation.sweep.chunks import parts_of
+from ..evaluation.sweep.columns import COLUMNS, TIMINGS
+from ..evaluation.sweep.run_sweep import Swept, dask_executor, open_store, sweep
+from ..evaluation.sweep.sweep_spec import PATIENCE_S, Order, Setting, own_preset
+from ..evaluation.sweep.table import write
+from ..launcher.set_option import add_set_argument, with_settings
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import PlannerParams
+from ..planning.planner_factory import USUAL
+from ..planning.planner_registry import PLANNERS
+from ..simulation.planner_observations import NAMES as PERCEPTIONS
+from .study_progress import add_work_arguments, progress, say
 
 _DESCRIPTION = """Run planners in the worlds of a suite and tell how good they are.
 
@@ -180,9 +180,9 @@ def _changed(one: Any, plain: Any) -> Iterator[tuple[str, Scalar]]:
 def _report(swept: Swept, directory: Path) -> None:
     from rich.console import Console
 
-    from ..report.console import print_encodable
-    from ..report.sweep import tables, to_markdown
-    from ..sweep.summary import comparisons, standings
+    from ..evaluation.sweep.summary import comparisons, standings
+    from ..report.sweep_tables import tables, to_markdown
+    from ..report.terminal_output import print_encodable
 
     order = swept.order
     found, pairs = standings(swept.rows, swept.timings), comparisons(swept.rows)

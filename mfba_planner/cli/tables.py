@@ -8,18 +8,18 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..arguments import Parser
+from ..core.argument_parser import Parser
 from ..core.errors import InputError, OutputError
-from ..figures import FIGURES, render
-from ..outputs import new_run_directory, write_new, write_same
+from ..core.outputs import new_run_directory, write_new, write_same
 from ..paper.study.plan import FULL, QUICK
 from ..paper.study.run import open_store
 from ..paper.tables.build import SECTIONS, build, check_sections, plan
 from ..paper.tables.model import Section
+from ..report.figures.paper_figures import FIGURES, render
 from ..report.tables import data, html, markdown
 from ..report.tables.text import Origin
-from ..scenarios import load_scenario
-from ..watched import add_arguments, check, run_watched
+from ..scenarios.scenario_files import load_scenario
+from .study_progress import add_arguments, check, run_watched
 
 _DESCRIPTION = """Run what Tables 1 to 7 need and hold each printed number against ours.
 

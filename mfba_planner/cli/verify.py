@@ -8,20 +8,20 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from ..arguments import Parser
-from ..core.episode import Episode, Outcome, stamp_of
+from ..core.argument_parser import Parser
 from ..core.errors import BagError, ConfigError
-from ..launcher.settings import add_set_argument, with_settings
-from ..outputs import bag_in
-from ..planners.method import simulate, simulate_fleet
-from ..recording.episode import read_recording
-from ..recording.reader import BagReader
-from ..recording.robots import ALONE, of_robot
-from ..verification.check import Report, verify_each
-from ..verification.compare import Divergence, first_divergence, side_by_side
-from ..verification.scratch import is_foreign
-from . import from_scratch
-from .from_scratch import show_remarks
+from ..core.outputs import bag_in
+from ..launcher.set_option import add_set_argument, with_settings
+from ..planning.planner_factory import simulate, simulate_fleet
+from ..recording.bag_reader import BagReader
+from ..recording.read_episode import read_recording
+from ..recording.robot_topics import ALONE, of_robot
+from ..simulation.episode import Episode, Outcome, stamp_of
+from ..verification.compare_decisions import Divergence, first_divergence, side_by_side
+from ..verification.redecide import is_foreign
+from ..verification.verify_bag import Report, verify_each
+from . import verify_foreign
+from .verify_foreign import show_remarks
 
 
 def main(args: list[str]) -> int:
@@ -40,13 +40,13 @@ def main(args: list[str]) -> int:
     parser.add_argument(
         "--picture", type=Path, metavar="PNG", help="with --set: both trails, a file to create"
     )
-    from_scratch.add_arguments(parser)
+    verify_foreign.add_arguments(parser)
     found = parser.parse(args)
     bag = bag_in(found.bag)
     with BagReader(bag) as reader:
         if is_foreign(reader):
-            return from_scratch.report(bag, found)
-    from_scratch.refuse_arguments(bag, found)
+            return verify_foreign.report(bag, found)
+    verify_foreign.refuse_arguments(bag, found)
     if found.picture and not found.settings:
         raise ConfigError("--picture: there is one trail only; give --set NAME=VALUE as well")
     reports = verify_each(bag, found.robots)
@@ -150,8 +150,8 @@ def _closed_loop(bag: Path, robot: str, recorded: Episode, again: Episode) -> No
 
 
 def _what_if(robot: str, recorded: Episode, again: Episode, given: argparse.Namespace) -> None:
-    from ..core.metrics import evaluate
-    from ..report.table import comparison_text
+    from ..evaluation.metrics import evaluate
+    from ..report.result_table import comparison_text
 
     change = " ".join(given.settings)
     print(f"\n{of_robot(robot, f'what if {change}')}")
@@ -162,7 +162,7 @@ def _what_if(robot: str, recorded: Episode, again: Episode, given: argparse.Name
     else:
         print("no decision differs")
     if given.picture:
-        from ..report.figure import draw_what_if
+        from ..report.run_figure import draw_what_if
 
         draw_what_if(recorded, again, change, given.picture)
         print(f"wrote {given.picture}")

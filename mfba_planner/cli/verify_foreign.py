@@ -10,12 +10,12 @@ from pathlib import Path
 
 from ..core.errors import BagError, ConfigError
 from ..core.geometry import Point
-from ..core.planner import PlannerParams
-from ..core.sensing import SensorParams
-from ..launcher.settings import with_settings
-from ..recording.robots import ALONE, of_robot
-from ..verification.check import Report
-from ..verification.scratch import FromScratch, Robot, decide_from_scratch
+from ..launcher.set_option import with_settings
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import PlannerParams
+from ..recording.robot_topics import ALONE, of_robot
+from ..verification.redecide import FromScratch, Robot, decide_from_scratch
+from ..verification.verify_bag import Report
 
 SHOWN = 10  # faults; more of them say nothing new
 _OURS = {"closed_loop": "--closed-loop", "picture": "--picture", "robots": "--robot"}
@@ -74,7 +74,7 @@ def report(bag: Path, found: argparse.Namespace) -> int:
 
 
 def _robot(found: argparse.Namespace) -> Robot:
-    from ..node_settings import VirtualSensorSettings  # a bag of ours does without
+    from ..ros.interface.node_parameters import VirtualSensorSettings  # a bag of ours does without
 
     planner, sensor = with_settings(PlannerParams(), SensorParams(), found.settings)
     told = {"robot_radius_m": found.robot_radius, "scan_yaw": found.scan_yaw}

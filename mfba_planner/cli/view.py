@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..arguments import Parser
-from .episodes import add_paths, named_episodes
+from ..core.argument_parser import Parser
+from .named_episodes import add_paths, named_episodes
 
 _DESCRIPTION = """Watch runs in Rerun's viewer (pip install 'mfba_planner[view]'): the world in
 motion, the decisions in words, clearance and speed; play and scrub on sim_time or tick."""
@@ -21,7 +21,7 @@ def main(args: list[str]) -> int:
     )
     found = parser.parse(args)
     runs, roster = named_episodes(found.paths, found.robots)
-    from ..report.viewer import save, show
+    from ..report.rerun_viewer import save, show
 
     if found.save is None:
         show(runs, roster)

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from .core.errors import OutputError
+from .errors import OutputError
 
 
 def new_run_directory(root: Path = Path("runs"), stem: str = "run") -> Path:

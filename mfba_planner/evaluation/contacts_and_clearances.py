@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .geometry import Point, bearing, distance, wrap_angle
-from .motion import Array, Steps
+from ..core.geometry import Point, bearing, distance, wrap_angle
+from ..simulation.batched_motion import Array, Steps
 
 CONTACT_SLACK_M = 1e-9  # rounding of a tangential pass is not a collision
 STANDSTILL_M = 1e-9  # of a step: shorter ones are rounding
@@ -20,7 +20,7 @@ HEADING_CHANGE_RAD = math.radians(15.0)  # half a sector of Fig. 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conduct:
-    """Figures of one run beyond core.metrics.Result; one value each, over all K steps.
+    """Figures of one run beyond evaluation.metrics.Result; one value each, over all K steps.
 
     hits_moving, hits_standing: the collisions of Result, by whether the robot moved (more than
         STANDSTILL_M) in the step in which the contact began: it ran into the obstacle, or the

@@ -11,12 +11,12 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from .conduct import Conduct, Course, Passes
-from .episode import Episode, Outcome
-from .geometry import Pose2D, distance
-from .jump import carried_off
-from .motion import Array, Motion, Steps
-from .planner import NANO, Decision, Mode
+from ..core.geometry import Pose2D, distance
+from ..planning.algorithm_1 import NANO, Decision, Mode
+from ..planning.odometry_jump import carried_off
+from ..simulation.batched_motion import Array, Motion, Steps
+from ..simulation.episode import Episode, Outcome
+from .contacts_and_clearances import Conduct, Course, Passes
 
 BLOCK = 512  # ticks
 

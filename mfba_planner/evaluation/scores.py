@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from .episode import Outcome
+from ..simulation.episode import Outcome
 from .metrics import Result
 
 BARN_FASTEST, BARN_SLOWEST = 2.0, 8.0  # multiples of the optimal time

@@ -4,7 +4,7 @@
 
 def main(args: list[str], prog: str = "launcher") -> int:
     """Run what args order; return the exit code. MfbaErrors pass through."""
-    from .options import read_order
-    from .run import run
+    from .execute_run import run
+    from .run_arguments import read_order
 
     return run(read_order(args, prog))

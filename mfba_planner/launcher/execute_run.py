@@ -6,17 +6,17 @@ from __future__ import annotations
 import sys
 from contextlib import closing, suppress
 
-from ..core.episode import Episode
 from ..core.errors import BagError, MfbaError
-from ..planners.method import simulate
-from ..run_config import Driver
-from .attempt import Attempt
-from .conclusion import conclude
-from .directory import RunDirectory
-from .fleet import conclude_fleet
-from .options import Order
-from .screen import Screen
-from .stop import StoppedError, StopRequest
+from ..planning.planner_factory import simulate
+from ..scenarios.run_config import Driver
+from ..simulation.episode import Episode
+from .console import Screen
+from .fleet_result import conclude_fleet
+from .run import Attempt
+from .run_arguments import Order
+from .run_directory import RunDirectory
+from .run_result import conclude
+from .stop_request import StoppedError, StopRequest
 
 
 def run(order: Order) -> int:
@@ -55,7 +55,7 @@ def _conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> N
     if failure:
         return
     if attempt.order.view:
-        from ..report.viewer import show
+        from ..report.rerun_viewer import show
 
         show([(conclusion.directory.name, conclusion.episode)])
     conclusion.judge()
@@ -85,8 +85,8 @@ def _drive(attempt: Attempt) -> Episode | None:
 
 
 def _run_in_process(attempt: Attempt) -> None:
-    from ..ros.in_process import run_in_process
-    from .domain import private_domain
+    from .in_process import run_in_process
+    from .ros_domain import private_domain
 
     with private_domain() as domain:
         attempt.wall_s = run_in_process(

@@ -6,11 +6,11 @@ from __future__ import annotations
 import sys
 
 from ..core.errors import MfbaError
-from ..core.metrics import evaluate
-from ..recording.episode import read_recording
-from ..recording.left_out import tell
-from ..report.roster import fleet_text, why_no_success
-from .attempt import Attempt
+from ..evaluation.metrics import evaluate
+from ..recording.omitted_decisions import tell
+from ..recording.read_episode import read_recording
+from ..report.fleet_table import fleet_text, why_no_success
+from .run import Attempt
 
 
 def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
@@ -19,8 +19,8 @@ def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
     Raises MfbaError where the run, otherwise fine, was no success, and BagError where the bag
     holds no decision of a robot or was not closed.
     """
-    from ..report.fleet import draw_fleet
-    from ..report.result import result_to_dict, write_result
+    from ..report.fleet_figure import draw_fleet
+    from ..report.result_json import result_to_dict, write_result
 
     directory, config = attempt.directory, attempt.order.config
     recording = read_recording(directory.bag)
@@ -38,7 +38,7 @@ def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
     if failure:
         return
     if attempt.order.view:
-        from ..report.viewer import show
+        from ..report.rerun_viewer import show
 
         show(list(runs.items()), list(runs))
     if why := why_no_success(results):

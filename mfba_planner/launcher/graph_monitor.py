@@ -16,14 +16,14 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import SetBool, Trigger
 
-from ..messages import points, stamp_ns
-from ..recording.robots import ALONE
-from ..ros import topics
-from ..ros.letterboxes import Letterboxes
-from ..ros.namespaced import below
-from ..ros.runtime import GraphNode
-from ..ros.serialized import header_stamp_ns
-from ..ros.topics import Topic
+from ..recording.messages import points, stamp_ns
+from ..recording.robot_topics import ALONE
+from ..ros.interface import topics
+from ..ros.interface.robot_namespace import below
+from ..ros.interface.serialized_message import header_stamp_ns
+from ..ros.interface.topics import Topic
+from ..ros.runtime.node_runtime import GraphNode
+from ..ros.runtime.polled_subscriptions import Letterboxes
 
 ASK_AGAIN_S = 0.5  # an answer can get lost while client and server still find each other
 PROGRESS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

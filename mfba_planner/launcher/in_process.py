@@ -13,13 +13,19 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from ..core.errors import GraphError
-from ..run_config import NODES, READY_TIMEOUT_S, RunConfig, graph_parameters, recorder_parameters
-from . import params, topics
-from .planner import PlannerNode
-from .recorder import Recorder
-from .runtime import GraphNode, make_executor
-from .virtual_sensor import VirtualSensor
-from .world_sim import WorldSim
+from ..ros.interface import parameters, topics
+from ..ros.nodes.planner import PlannerNode
+from ..ros.nodes.recorder import Recorder
+from ..ros.nodes.virtual_sensor import VirtualSensor
+from ..ros.nodes.world_sim import WorldSim
+from ..ros.runtime.node_runtime import GraphNode, make_executor
+from ..scenarios.run_config import (
+    NODES,
+    READY_TIMEOUT_S,
+    RunConfig,
+    graph_parameters,
+    recorder_parameters,
+)
 
 KINDS: dict[str, Callable[..., GraphNode]] = {
     topics.RECORDER: Recorder,
@@ -75,7 +81,7 @@ def run_in_process(
         world: WorldSim = nodes[topics.WORLD_SIM]
         if bag:
             recorder: Recorder = nodes[topics.RECORDER]
-            recorder.explain({name: params.values(nodes[name]) for name in wanted})
+            recorder.explain({name: parameters.values(nodes[name]) for name in wanted})
         _spin(
             executor,
             lambda: not _missing(nodes),

@@ -13,8 +13,8 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from .by_launch import Argument
-from .robot_by_launch import Start
+from .robot_launch import Start
+from .simulate_launch import Argument
 
 
 def describe(

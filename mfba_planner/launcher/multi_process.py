@@ -9,17 +9,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..core.errors import BagError, GraphError
-from ..recording.reader import BagReader
-from ..recording.robots import ALONE, below
-from ..ros import topics
-from ..run_config import NODES, READY_TIMEOUT_S, graph_parameters, recorder_parameters
-from .attempt import Attempt
-from .crew import Crew
-from .directory import RunDirectory
-from .domain import private_domain
-from .monitor import Monitor
-from .options import RECORDER
-from .stop import StoppedError
+from ..recording.bag_reader import BagReader
+from ..recording.robot_topics import ALONE, below
+from ..ros.interface import topics
+from ..scenarios.run_config import NODES, READY_TIMEOUT_S, graph_parameters, recorder_parameters
+from .graph_monitor import Monitor
+from .node_processes import Crew
+from .ros_domain import private_domain
+from .run import Attempt
+from .run_arguments import RECORDER
+from .run_directory import RunDirectory
+from .stop_request import StoppedError
 
 MORE_PER_ROBOT_S = 5.0
 ANSWER_TIMEOUT_S = 5.0

@@ -13,8 +13,8 @@ from typing import Any
 import yaml
 
 from ..core.errors import GraphError
-from ..run_config import Parameters
-from .child import Child
+from ..scenarios.run_config import Parameters
+from .node_process import Child
 
 RECORDER_GRACE_S = 20.0  # it still writes what it has received
 GRACE_S = 10.0  # on a machine with far too much to do; a killed node counts as a failure

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError
-from ..resources import config_path
-from .by_launch import Argument
+from ..core.resources import config_path
+from .simulate_launch import Argument
 
 TRUE_OR_FALSE = ("true", "false")
 ENABLED = {"true": True, "false": False}

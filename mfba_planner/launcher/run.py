@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import time
 
-from ..core.episode import World
-from ..core.fleet import Fleet
-from .directory import RunDirectory
-from .options import Order
-from .screen import Screen
-from .stop import StoppedError, StopRequest
+from ..simulation.episode import World
+from ..simulation.fleet import Fleet
+from .console import Screen
+from .run_arguments import Order
+from .run_directory import RunDirectory
+from .stop_request import StoppedError, StopRequest
 
 
 class Attempt:

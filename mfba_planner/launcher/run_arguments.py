@@ -9,17 +9,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..arguments import Parser
-from ..core.bat import Algorithm
+from ..core.argument_parser import Parser
 from ..core.errors import ConfigError
 from ..core.options import override
-from ..core.planner import Method
-from ..core.sensing import SensorParams
 from ..paper import readings
-from ..planners.method import USUAL, named
-from ..run_config import NODES, Driver, RunConfig
-from ..scenarios import load_scenario
-from .settings import add_set_argument, with_robot_settings, with_settings
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import Method
+from ..planning.planner_factory import USUAL, named
+from ..scenarios.run_config import NODES, Driver, RunConfig
+from ..scenarios.scenario_files import load_scenario
+from ..swarm.bat_swarm import Algorithm
+from .set_option import add_set_argument, with_robot_settings, with_settings
 
 RECORDER = "recorder"
 # Where discovery stays on this machine, 32 processes find each other and later ones may not (as
@@ -190,7 +190,7 @@ def _order(found: argparse.Namespace) -> Order:
             "use --set, or --driver multi-process"
         )
     if found.view:
-        from ..report.viewer import require_viewer
+        from ..report.rerun_viewer import require_viewer
 
         require_viewer()
     return Order(

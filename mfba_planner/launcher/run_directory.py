@@ -8,8 +8,8 @@ import shutil
 from pathlib import Path
 
 from ..core.errors import OutputError
-from ..outputs import new_run_directory
-from ..recording.storage import make_directory, remove_empty
+from ..core.outputs import new_run_directory
+from ..recording.file_storage import make_directory, remove_empty
 
 _ATTEMPTS = 100  # as many launchers may start at once
 

@@ -7,14 +7,14 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..core.episode import Episode, Outcome
 from ..core.errors import MfbaError
 from ..core.geometry import distance
-from ..core.metrics import Result, evaluate
-from ..recording.episode import read_recording
-from ..recording.left_out import tell
-from ..recording.robots import ALONE
-from .attempt import Attempt
+from ..evaluation.metrics import Result, evaluate
+from ..recording.omitted_decisions import tell
+from ..recording.read_episode import read_recording
+from ..recording.robot_topics import ALONE
+from ..simulation.episode import Episode, Outcome
+from .run import Attempt
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> Co
 
     Raises BagError where the bag holds no decision or was not closed.
     """
-    from ..report.result import result_to_dict, write_result
+    from ..report.result_json import result_to_dict, write_result
 
     directory = attempt.directory
     left_out = ""
@@ -64,7 +64,7 @@ def conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> Co
     extra |= {"left_out": left_out} if left_out else {}
     write_result(directory.result, result_to_dict(episode, extra))
     if attempt.order.picture:
-        from ..report.figure import draw_run
+        from ..report.run_figure import draw_run
 
         draw_run(episode, directory.picture)
     show(episode, result, speed)
@@ -74,7 +74,7 @@ def conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> Co
 
 def show(episode: Episode, result: Result, ticks_per_s: float | None = None) -> None:
     """Print the table: with colours on a terminal, otherwise as plain text."""
-    from ..report.table import print_result, result_text
+    from ..report.result_table import print_result, result_text
 
     if sys.stdout.isatty():
         from rich.console import Console

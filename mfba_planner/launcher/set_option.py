@@ -9,9 +9,9 @@ from typing import Any
 
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean, override, walk
-from ..core.planner import PlannerParams
-from ..core.robot import Robot
-from ..core.sensing import SensorParams
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import PlannerParams
+from ..simulation.robot_model import Robot
 
 
 def add_set_argument(parser: argparse.ArgumentParser) -> None:

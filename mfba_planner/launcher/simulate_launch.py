@@ -7,15 +7,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.bat import Algorithm
 from ..core.errors import ConfigError
 from ..core.options import override
-from ..core.planner import Method
 from ..paper import readings
-from ..planners.method import USUAL, named
-from ..run_config import NODES, Parameters, RunConfig, graph_parameters, recorder_parameters
-from ..scenarios import load_scenario
-from .options import RECORDER
+from ..planning.algorithm_1 import Method
+from ..planning.planner_factory import USUAL, named
+from ..scenarios.run_config import (
+    NODES,
+    Parameters,
+    RunConfig,
+    graph_parameters,
+    recorder_parameters,
+)
+from ..scenarios.scenario_files import load_scenario
+from ..swarm.bat_swarm import Algorithm
+from .run_arguments import RECORDER
 
 _TRUE_OR_FALSE = ("true", "false")
 _MFBA = Algorithm.MFBA.value

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.bat import Algorithm
+from ..swarm.bat_swarm import Algorithm
 from .functions import FUNCTIONS
 from .study.chunk import Benchmark
 from .study.plan import SWARM_READINGS

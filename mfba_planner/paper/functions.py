@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ConfigError
-from ..core.region import Box
+from ..swarm.search_region import Box
 
 Point = tuple[float, ...]
 Coordinates = Sequence[Any]  # d floats, or d arrays of one shape

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from ..core.bat import BatParams, Bounds, Epsilon, Initial, Schedule, Step, Velocity, Walk
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
-from ..core.planner import PlannerParams, Swarm
+from ..planning.algorithm_1 import PlannerParams, Swarm
+from ..swarm.bat_swarm import BatParams, Bounds, Epsilon, Initial, Schedule, Step, Velocity, Walk
 
 T = TypeVar("T")
 

@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .. import statistics
-from ..core.bat import Algorithm
-from ..core.episode import Episode, run
 from ..core.geometry import Point, bearing, distance, towards
-from ..core.metrics import evaluate
 from ..core.options import Scalar, flatten, override
-from ..core.planner import PlannerParams
-from ..core.sensing import SensorParams
-from ..core.world import Obstacle, Scenario
+from ..evaluation import statistics
+from ..evaluation.metrics import evaluate
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import PlannerParams
+from ..simulation.episode import Episode, run
+from ..simulation.scenario import Obstacle, Scenario
+from ..swarm.bat_swarm import Algorithm
 from . import published, readings
 from .study.chunk import Chunk, Trips, chunks
 from .study.run import Sample

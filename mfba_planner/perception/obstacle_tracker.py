@@ -10,8 +10,8 @@ import numpy as np
 
 from ..core.geometry import Point, Pose2D
 from ..core.options import check, option
-from ..core.planner import NANO, Circle
-from ..core.sensing import Scan
+from ..planning.algorithm_1 import NANO, Circle
+from .sensory_vector import Scan
 
 Array = np.ndarray
 

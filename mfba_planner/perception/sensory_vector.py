@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .errors import InputError
-from .geometry import Point, ray_circle_distance, tangent_half_angle
-from .options import check, option
+from ..core.errors import InputError
+from ..core.geometry import Point, ray_circle_distance, tangent_half_angle
+from ..core.options import check, option
 
 Bits = tuple[int, ...]
 Ranges = tuple[float, ...]

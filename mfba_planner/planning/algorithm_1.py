@@ -9,18 +9,18 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
-from .bat import BatParams, BatSwarm, Disc, Vector
-from .caution import CautionParams
-from .errors import ConfigError
-from .gaps import GapHeading, gap_heading, gap_vector, nearest_free_gap
-from .geometry import Point, Pose2D, bearing, distance, towards
-from .jump import JumpWatch, explained
-from .options import check, option
+from ..core.errors import ConfigError
+from ..core.geometry import Point, Pose2D, bearing, distance, towards
+from ..core.options import check, option
+from ..core.random_streams import stream
+from ..perception.sensory_vector import Bits, Ranges, Scan, sensory_vector
+from ..swarm.bat_swarm import BatParams, BatSwarm, Disc, Vector
+from .gap_vector import GapHeading, gap_heading, gap_vector, nearest_free_gap
+from .method_params import Method, SeenParams
+from .odometry_jump import JumpWatch, explained
+from .path_generation import Start, Step, fresh_step, fresh_steps
 from .recovery import RecoveryParams
-from .seen import Method, SeenParams
-from .sensing import Bits, Ranges, Scan, sensory_vector
-from .steps import Start, Step, fresh_step, fresh_steps
-from .streams import stream
+from .speed_limit import CautionParams
 
 NANO = 1e-9
 FEW = 8  # bats of so few planners are no quicker at once

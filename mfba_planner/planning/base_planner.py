@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
-from ..core.jump import JumpWatch, explained
-from ..core.planner import (
+from ..perception.sensory_vector import Bits, SensorParams
+from .algorithm_1 import (
     NANO,
     Decision,
     Event,
@@ -19,7 +19,7 @@ from ..core.planner import (
     reason_to_stand,
     transition,
 )
-from ..core.sensing import Bits, SensorParams
+from .odometry_jump import JumpWatch, explained
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

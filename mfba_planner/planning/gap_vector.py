@@ -7,8 +7,8 @@ import math
 from enum import Enum
 from functools import cache, lru_cache
 
-from .geometry import wrap_angle
-from .sensing import Bits
+from ..core.geometry import wrap_angle
+from ..perception.sensory_vector import Bits
 
 TIE_RAD = 1e-9  # turns closer than this are equal: rounding must not choose the gap
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from .options import option
+from ..core.options import option
 
 
 class Method(Enum):
@@ -18,7 +18,7 @@ class Method(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeenParams:
-    """Options of core.planner.PlannerParams; checked there."""
+    """Options of planning.algorithm_1.PlannerParams; checked there."""
 
     method: Method = option(Method.PAPER, "Algorithm 1, or our planner that predicts")
     jump_m: float = option(

@@ -7,10 +7,10 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from .geometry import Pose2D, distance
+from ..core.geometry import Pose2D, distance
 
 if TYPE_CHECKING:
-    from .planner import Decision, Mode, Observation, PlannerParams
+    from .algorithm_1 import Decision, Mode, Observation, PlannerParams
 
 NANO = 1e-9
 CARRIED_OFF = "carried off"

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bat import BatParams, Bounds, Disc, Vector, minimize
-from .batch import Array, Swarms
-from .geometry import Point, distance
-from .streams import stream
+from ..core.geometry import Point, distance
+from ..core.random_streams import stream
+from ..swarm.bat_swarm import BatParams, Bounds, Disc, Vector, minimize
+from ..swarm.batched_swarms import Array, Swarms
 
 Step = tuple[Point, tuple[Point, ...]]  # the next point, and the last candidates
 

@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..core.episode import Episode, World, look, look_at_scan, run
-from ..core.fleet import Fleet, run_fleet
-from ..core.guarded import Guarded, algorithm_1
-from ..core.planner import Method, PlannerParams
-from ..core.sensing import SensorParams
-from ..core.world import Scenario
+from ..perception.sensory_vector import SensorParams
+from ..simulation.episode import Episode, World, look, look_at_scan, run
+from ..simulation.fleet import Fleet, run_fleet
+from ..simulation.scenario import Scenario
+from .algorithm_1 import Method, PlannerParams
+from .supervised_planner import Guarded, algorithm_1
 
 USUAL = Method.PREDICTIVE  # of the programs and launch files: the robot that does not collide
 
@@ -46,7 +46,7 @@ def simulate(
     seed: int,
     go_on: Callable[[World], bool] = lambda _: True,
 ) -> Episode:
-    """core.episode.run with the planner of planner.method."""
+    """simulation.episode.run with the planner of planner.method."""
     return run(
         scenario,
         planner=planner,
@@ -66,7 +66,7 @@ def simulate_fleet(
     seed: int,
     go_on: Callable[[Fleet], bool] = lambda _: True,
 ) -> tuple[Episode, ...]:
-    """core.fleet.run_fleet with a planner of planner.method for every robot."""
+    """simulation.fleet.run_fleet with a planner of planner.method for every robot."""
     return run_fleet(
         scenario,
         planner=planner,

@@ -6,17 +6,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..core.bat import Algorithm
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
-from ..core.planner import PathPlanner, Planner, PlannerParams
-from ..core.sensing import SensorParams
-from .apf import PotentialField
-from .dwa import DynamicWindow
-from .orca import Orca
+from ..perception.sensory_vector import SensorParams
+from ..swarm.bat_swarm import Algorithm
+from .algorithm_1 import PathPlanner, Planner, PlannerParams
+from .peers.apf import PotentialField
+from .peers.dwa import DynamicWindow
+from .peers.orca import Orca
+from .peers.straight_line import Straight
+from .peers.vfh import VectorFieldHistogram
 from .predictive import Predictive
-from .straight import Straight
-from .vfh import VectorFieldHistogram
 
 Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]
 

@@ -9,18 +9,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..core.bat import BatSwarm
 from ..core.geometry import Point, distance
 from ..core.options import check, option
-from ..core.planner import NANO, Circle, Event, Observation, PlannerParams
-from ..core.region import Disc
-from ..core.sensing import Bits, SensorParams
-from ..core.streams import stream
-from .memory import Memory, MemoryParams
-from .prediction import Prediction, RiskParams, Way, from_sectors, moved
-from .steering import Move, Steering
-from .surroundings import ROBOT_RADIUS_M
-from .tracking import Tracker, TrackingParams
+from ..core.random_streams import stream
+from ..perception.obstacle_memory import Memory, MemoryParams
+from ..perception.obstacle_tracker import Tracker, TrackingParams
+from ..perception.sensory_vector import Bits, SensorParams
+from ..swarm.bat_swarm import BatSwarm
+from ..swarm.search_region import Disc
+from .algorithm_1 import NANO, Circle, Event, Observation, PlannerParams
+from .base_planner import Move, Steering
+from .peers.observed_circles import ROBOT_RADIUS_M
+from .trajectory_cost import Prediction, RiskParams, Way, from_sectors, moved
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # of a gap's waypoints, in reaches
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)

@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from .geometry import wrap_angle
-from .options import check, option
-from .sensing import Ranges
+from ..core.geometry import wrap_angle
+from ..core.options import check, option
+from ..perception.sensory_vector import Ranges
 
 SECOND_NS = 1e9
 

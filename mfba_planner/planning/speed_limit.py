@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from .options import check, option
-from .sensing import Ranges
+from ..core.options import check, option
+from ..perception.sensory_vector import Ranges
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,11 +6,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
-from .caution import allowed_share
-from .errors import ConfigError
-from .geometry import Point, bearing, distance, towards
-from .jump import carried_off
-from .planner import (
+from ..core.errors import ConfigError
+from ..core.geometry import Point, bearing, distance, towards
+from .algorithm_1 import (
     NANO,
     Decision,
     Method,
@@ -20,7 +18,9 @@ from .planner import (
     Planner,
     PlannerParams,
 )
+from .odometry_jump import carried_off
 from .recovery import Phase, Recovery, advance, most_room
+from .speed_limit import allowed_share
 
 TRAIL_M = 0.05  # so far back is where the robot came from
 _STANDING = (Mode.IDLE, Mode.ARRIVED)
@@ -39,7 +39,7 @@ class Resettable(PathPlanner, Protocol):
 class Guarded:
     """A planner whose decisions are passed on unchanged unless an option says otherwise.
 
-    With recovery.enabled, BLOCKED decisions lead through core.recovery's phases; with
+    With recovery.enabled, BLOCKED decisions lead through planning.recovery's phases; with
     caution.slow_within_m, every move is shortened near obstacles. It knows nothing but the
     observations: a recording decides again what was decided.
     """
@@ -139,7 +139,9 @@ class Guarded:
 def algorithm_1(params: PlannerParams, seed: int) -> Guarded:
     """The paper's planner. Raises ConfigError where params name another one, or for the seed."""
     if params.method is not Method.PAPER:
-        raise ConfigError(f"method={params.method.value}: not the core's own; use planners.method")
+        raise ConfigError(
+            f"method={params.method.value}: not the core's own; use planning.planner_factory"
+        )
     return Guarded(Planner(params, seed))
 
 

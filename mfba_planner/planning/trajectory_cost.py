@@ -12,8 +12,8 @@ import numpy as np
 
 from ..core.geometry import Point, towards
 from ..core.options import check, option
-from ..core.planner import Circle
-from ..core.sensing import Ranges
+from ..perception.sensory_vector import Ranges
+from .algorithm_1 import Circle
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12

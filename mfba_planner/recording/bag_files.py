@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..core.errors import BagError
-from . import metadata
-from .metadata import BagMetadata
+from . import bag_metadata as metadata
+from .bag_metadata import BagMetadata
 
 
 @dataclass

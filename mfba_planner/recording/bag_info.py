@@ -8,8 +8,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from ..core.errors import BagError
-from .metadata import BagTopic
-from .reader import BagReader
+from .bag_metadata import BagTopic
+from .bag_reader import BagReader
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

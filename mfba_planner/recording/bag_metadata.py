@@ -10,9 +10,9 @@ from typing import Any
 import yaml
 
 from ..core.errors import BagError
-from . import qos as qos_words
+from . import qos_profiles as qos_words
 from . import yaml_text
-from .qos import OfferedQos
+from .qos_profiles import OfferedQos
 
 FILE_NAME = "metadata.yaml"
 RECORD_NAME = "rosbag2"

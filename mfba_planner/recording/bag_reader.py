@@ -15,13 +15,13 @@ from mcap.records import Attachment, AttachmentIndex, Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from ..core.errors import BagError
-from . import metadata, qos
-from .locate import locate
+from . import bag_metadata, qos_profiles
+from .bag_files import locate
+from .bag_metadata import BagTopic
 from .mcap_file import McapFile, Piece
 from .mcap_index import open_file
-from .merge import RawMessage, Source, in_time_order
-from .metadata import BagTopic
-from .schemas import Definition
+from .merge_by_time import RawMessage, Source, in_time_order
+from .message_definitions import Definition
 
 
 class DecodedMessage(NamedTuple):
@@ -134,7 +134,11 @@ class BagReader:
         if self._metadata is not None:
             return self._metadata.ros_distro
         for name, content in self.metadata_records():
-            text = content.get(metadata.RECORD_KEY, "") if name == metadata.RECORD_NAME else ""
+            text = (
+                content.get(bag_metadata.RECORD_KEY, "")
+                if name == bag_metadata.RECORD_NAME
+                else ""
+            )
             found = re.search(r"^ros_distro: (\w+)", text, re.MULTILINE)
             if found:
                 return found[1]
@@ -276,7 +280,7 @@ class BagReader:
         if self._metadata is not None:
             listed = next((t for t in self._metadata.topics if t.name == name), listed)
         try:
-            offered = qos.from_list(channel.metadata.get("offered_qos_profiles"))
+            offered = qos_profiles.from_list(channel.metadata.get("offered_qos_profiles"))
         except BagError as error:
             self.problems.append(f"{name}: {str(error).split('; ')[0]}")
             offered = ()
@@ -297,5 +301,5 @@ class BagReader:
         listed, found = self._metadata.message_count, self.message_count
         if listed != found:
             self.problems.append(
-                f"{metadata.FILE_NAME} counts {listed} messages, the files hold {found}"
+                f"{bag_metadata.FILE_NAME} counts {listed} messages, the files hold {found}"
             )

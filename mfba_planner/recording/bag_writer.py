@@ -14,10 +14,10 @@ from mcap.well_known import MessageEncoding, Profile
 from mcap.writer import CompressionType, Writer
 
 from ..core.errors import OutputError
-from . import metadata, qos, storage
-from .metadata import BagFile, BagMetadata, BagTopic
-from .qos import OfferedQos
-from .schemas import Definition, definition_of
+from . import bag_metadata, file_storage, qos_profiles
+from .bag_metadata import BagFile, BagMetadata, BagTopic
+from .message_definitions import Definition, definition_of
+from .qos_profiles import OfferedQos
 
 CHUNK_BYTES = 512 * 1024
 MAX_CHUNK_AGE_S = 0.8  # leaves 0.2 s of the promised 1 s to a late timer
@@ -40,7 +40,7 @@ class BagWriter:
         chunk_bytes: int = CHUNK_BYTES,
         max_chunk_age_s: float = MAX_CHUNK_AGE_S,
         compression: CompressionType = CompressionType.ZSTD,
-        ros_distro: str = metadata.ROS_DISTRO,
+        ros_distro: str = bag_metadata.ROS_DISTRO,
     ) -> None:
         if not hasattr(Writer, "flush"):
             raise OutputError("mcap: this version cannot end a chunk; install mcap 1.5 or newer")
@@ -53,7 +53,7 @@ class BagWriter:
         self._channel_ids: dict[str, int] = {}
         self._schema_ids: dict[str, int] = {}
         self._counts: dict[str, int] = {}
-        self._start_ns = metadata.NO_TIME_NS
+        self._start_ns = bag_metadata.NO_TIME_NS
         self._end_ns = 0
         self._pending_bytes = 0
         self._pending_count = 0
@@ -61,12 +61,12 @@ class BagWriter:
         self._last_call_ns: int | None = None
         self._empty_since_ns = 0  # of the steady clock: nothing was pending then
         self._ended = ""  # once it has: why nothing more can be written
-        self._made = storage.make_directory(self.directory)
+        self._made = file_storage.make_directory(self.directory)
         try:
-            self._stream = storage.WholeWrites(self.path)
+            self._stream = file_storage.WholeWrites(self.path)
         except OSError as error:
-            storage.remove_empty(self._made)
-            raise storage.cannot_create(self.directory, error) from error
+            file_storage.remove_empty(self._made)
+            raise file_storage.cannot_create(self.directory, error) from error
         try:
             # Chunks are ended here, by size and by age; mcap's own limit is out of the way.
             self._writer = Writer(
@@ -80,7 +80,7 @@ class BagWriter:
         except BaseException as error:
             self.discard()
             if isinstance(error, OSError):
-                raise storage.cannot_create(self.directory, error) from error
+                raise file_storage.cannot_create(self.directory, error) from error
             raise
 
     def __enter__(self) -> BagWriter:
@@ -135,7 +135,7 @@ class BagWriter:
                 MessageEncoding.CDR,
                 self._schema_ids[type_name],
                 {
-                    "offered_qos_profiles": qos.to_text(profiles),
+                    "offered_qos_profiles": qos_profiles.to_text(profiles),
                     "topic_type_hash": definition.type_hash,
                 },
             )
@@ -161,7 +161,7 @@ class BagWriter:
         if count is None:
             raise OutputError(f"{topic}: not a topic of this bag; announce it with add_topic")
         for time_ns in (log_time_ns, publish_time_ns):
-            if not 0 <= time_ns < metadata.NO_TIME_NS:
+            if not 0 <= time_ns < bag_metadata.NO_TIME_NS:
                 raise OutputError(
                     f"{topic}: time {time_ns} ns cannot be stored; give 0 to 2**63 - 2"
                 )
@@ -235,17 +235,17 @@ class BagWriter:
             self._write_record()
             self._writer.finish()
             self._stream.close()
-            text = metadata.dump_file(self._content())
-            storage.write_whole(self.directory / metadata.FILE_NAME, text)
+            text = bag_metadata.dump_file(self._content())
+            file_storage.write_whole(self.directory / bag_metadata.FILE_NAME, text)
         self._end()
 
     def discard(self) -> None:
         """Close without finishing and remove what was written."""
         self._end()
-        for path in (self.path, self.directory / metadata.FILE_NAME):
+        for path in (self.path, self.directory / bag_metadata.FILE_NAME):
             with suppress(OSError):
                 path.unlink()
-        storage.remove_empty(self._made)
+        file_storage.remove_empty(self._made)
 
     def _content(self) -> BagMetadata:
         file = BagFile(
@@ -259,8 +259,8 @@ class BagWriter:
         )
 
     def _write_record(self) -> None:
-        text = metadata.dump_record(self._content())
-        self._writer.add_metadata(metadata.RECORD_NAME, {metadata.RECORD_KEY: text})
+        text = bag_metadata.dump_record(self._content())
+        self._writer.add_metadata(bag_metadata.RECORD_NAME, {bag_metadata.RECORD_KEY: text})
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:

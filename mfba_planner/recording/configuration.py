@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import BagError, OutputError
-from .reader import BagReader
+from .bag_reader import BagReader
 
 if TYPE_CHECKING:  # who reads a bag need not load what writes one
-    from .writer import BagWriter
+    from .bag_writer import BagWriter
 
 ATTACHMENT_NAME = "mfba_planner/configuration.json"
 MEDIA_TYPE = "application/json"

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from ..core.errors import BagError, InputError
-from ..core.planner import Decision
-from ..core.sensing import Ranges
-from ..messages import decision, sector_ranges, stamp_ns
-from .left_out import left_out
-from .reader import BagReader, DecodedMessage
-from .robots import ALONE, below, heard_by_robot, of_robot
+from ..perception.sensory_vector import Ranges
+from ..planning.algorithm_1 import Decision
+from .bag_reader import BagReader, DecodedMessage
+from .messages import decision, sector_ranges, stamp_ns
+from .omitted_decisions import left_out
+from .robot_topics import ALONE, below, heard_by_robot, of_robot
 
 SECTORS, DECISION = "/sectors", "/planner/decision"
 REMEMBERED = 10_000  # of sectors without a decision, of decisions without sectors, of stamps

@@ -11,7 +11,7 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from ..core.errors import BagError
-from .records import MAGIC
+from .mcap_records import MAGIC
 
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offset start, summary CRC
 _DATA_END = struct.Struct("<BQI")  # opcode, length, CRC of all before it (0: not given)

@@ -11,8 +11,8 @@ from typing import BinaryIO, NamedTuple
 from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Channel, Metadata, MetadataIndex, Schema
 
-from . import records
-from .records import FRAME, Message, reading
+from . import mcap_records
+from .mcap_records import FRAME, Message, reading
 
 
 class Piece(NamedTuple):
@@ -46,27 +46,29 @@ class McapFile:
         """The messages of a piece in file order. Raises BagError."""
         with reading(self.path, f"the chunk at byte {piece.offset}"):
             if piece.is_chunk:
-                return records.messages(records.chunk_data(self.body(piece.offset, Opcode.CHUNK)))
-            return records.messages(self.bytes_at(piece.offset, piece.length))
+                return mcap_records.messages(
+                    mcap_records.chunk_data(self.body(piece.offset, Opcode.CHUNK))
+                )
+            return mcap_records.messages(self.bytes_at(piece.offset, piece.length))
 
     def attachment(self, index: AttachmentIndex) -> Attachment:
         """One attachment with its data. Raises BagError."""
         with reading(self.path, f"the attachment {index.name!r}"):
-            return records.attachment(self.body(index.offset, Opcode.ATTACHMENT))
+            return mcap_records.attachment(self.body(index.offset, Opcode.ATTACHMENT))
 
     def metadata_record(self, index: MetadataIndex) -> dict[str, str]:
         """The content of one metadata record. Raises BagError."""
         with reading(self.path, f"the metadata record {index.name!r}"):
             body = self.body(index.offset, Opcode.METADATA)
-            return dict(Metadata.read(records.parsed(body)).metadata)
+            return dict(Metadata.read(mcap_records.parsed(body)).metadata)
 
     def define(self, opcode: int, body: bytes) -> None:
         """Take a schema or channel record; others are left alone, repetitions too."""
         if opcode == Opcode.SCHEMA:
-            schema = Schema.read(records.parsed(body))
+            schema = Schema.read(mcap_records.parsed(body))
             self.schemas.setdefault(schema.id, schema)
         elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(records.parsed(body))
+            channel = Channel.read(mcap_records.parsed(body))
             self.channels.setdefault(channel.id, channel)
 
     def is_defined(self, channel: Channel) -> bool:

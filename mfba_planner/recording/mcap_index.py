@@ -11,8 +11,8 @@ from mcap.records import AttachmentIndex, ChunkIndex, Footer, Header, MetadataIn
 
 from ..core.errors import BagError
 from .mcap_file import McapFile, Piece
+from .mcap_records import FRAME, MAGIC, frames, parsed, reading
 from .mcap_walk import walk
-from .records import FRAME, MAGIC, frames, parsed, reading
 
 _FOOTER_BYTES = FRAME.size + 20
 _TAIL_BYTES = _FOOTER_BYTES + len(MAGIC)

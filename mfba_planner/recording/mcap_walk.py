@@ -10,9 +10,9 @@ from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, Metadata, MetadataIndex
 
 from ..core.errors import BagError
-from . import records
+from . import mcap_records
 from .mcap_file import McapFile, Piece
-from .records import FRAME, MAGIC, Message, reading
+from .mcap_records import FRAME, MAGIC, Message, reading
 
 _LOOSE_RUN_BYTES = 1 << 20  # messages outside chunks are handled in runs of about this size
 
@@ -73,7 +73,7 @@ class _Walk:
         elif opcode == Opcode.CHUNK:
             self._chunk(position, after)
         elif opcode == Opcode.ATTACHMENT:
-            found = records.attachment(file.body(position, opcode))
+            found = mcap_records.attachment(file.body(position, opcode))
             file.attachments.append(
                 AttachmentIndex(
                     offset=position,
@@ -86,24 +86,24 @@ class _Walk:
                 )
             )
         elif opcode == Opcode.METADATA:
-            name = Metadata.read(records.parsed(file.body(position, opcode))).name
+            name = Metadata.read(mcap_records.parsed(file.body(position, opcode))).name
             file.metadata.append(
                 MetadataIndex(offset=position, length=after - position, name=name)
             )
 
     def _chunk(self, position: int, after: int) -> None:
-        data = records.chunk_data(self.file.body(position, Opcode.CHUNK))
-        for opcode, start, end in records.frames(data):
+        data = mcap_records.chunk_data(self.file.body(position, Opcode.CHUNK))
+        for opcode, start, end in mcap_records.frames(data):
             if opcode != Opcode.MESSAGE:
                 self.file.define(opcode, data[start:end])
-        self._piece(records.messages(data), position, after, is_chunk=True)
+        self._piece(mcap_records.messages(data), position, after, is_chunk=True)
 
     def _loose_message(self, position: int, after: int) -> None:
         if self.loose and after - self.loose_offset > _LOOSE_RUN_BYTES:
             self._end_loose(position)
         if not self.loose:
             self.loose_offset = position
-        self.loose += records.messages(self.file.bytes_at(position, after - position))
+        self.loose += mcap_records.messages(self.file.bytes_at(position, after - position))
 
     def _end_loose(self, position: int) -> None:
         self._piece(self.loose, self.loose_offset, position, is_chunk=False)

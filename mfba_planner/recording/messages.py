@@ -2,7 +2,7 @@
 """What a message says, in the core's terms: for live messages and for those decoded from a bag.
 
 Only attributes are read, so no ROS is needed. Everything is checked: InputError names what
-is wrong. ros/convert.py holds the other direction.
+is wrong. ros/interface/conversions.py holds the other direction.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .core.drive import command
-from .core.errors import FrameError, InputError
-from .core.geometry import Point, Pose2D, yaw_of
-from .core.planner import Decision, Mode, Refused
-from .core.robot import Base
-from .core.sensing import Bits, Ranges, Scan, blind
+from ..core.errors import FrameError, InputError
+from ..core.geometry import Point, Pose2D, yaw_of
+from ..perception.sensory_vector import Bits, Ranges, Scan, blind
+from ..planning.algorithm_1 import Decision, Mode, Refused
+from ..simulation.differential_drive import command
+from ..simulation.robot_model import Base
 
 SECOND_NS = 1_000_000_000
 
@@ -125,7 +125,7 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
 
 
 def laser_scan(message: Any, frame: str = "") -> Scan:
-    """sensor_msgs/LaserScan to a Scan, which core.sensing.sense_scan judges.
+    """sensor_msgs/LaserScan to a Scan, which perception.sensory_vector.sense_scan judges.
 
     Raises FrameError for another frame.
     """

@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TextIO
 
-from .robots import of_robot
+from .robot_topics import of_robot
 
 
 def left_out(stamps: Collection[int], topics: Collection[str]) -> str:

@@ -9,19 +9,19 @@ from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
-from ..core.digest import Digest, digest
-from ..core.episode import Episode
 from ..core.errors import BagError, InputError
-from ..core.fleet import worlds_seen
 from ..core.geometry import Pose2D
-from ..core.metrics import Result, Tally, evaluate
-from ..core.planner import Decision
-from ..core.world import Scenario
-from ..messages import robot_pose, stamp_ns
+from ..evaluation.metrics import Result, Tally, evaluate
+from ..planning.algorithm_1 import Decision
+from ..simulation.decision_digest import Digest, digest
+from ..simulation.episode import Episode
+from ..simulation.fleet import worlds_seen
+from ..simulation.scenario import Scenario
+from .bag_reader import BagReader
 from .decisions import rising_decisions, stream_decisions
-from .reader import BagReader
-from .robots import ALONE, below, chosen, heard_by_robot
-from .setup import read_setup, read_setups
+from .messages import robot_pose, stamp_ns
+from .robot_topics import ALONE, below, chosen, heard_by_robot
+from .run_setup import read_setup, read_setups
 
 TRUTH = "/ground_truth"
 

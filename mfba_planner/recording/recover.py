@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..core.errors import BagError
-from . import metadata
-from .reader import BagReader
-from .writer import BagWriter
+from . import bag_metadata
+from .bag_reader import BagReader
+from .bag_writer import BagWriter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,7 @@ def _copy(reader: BagReader, writer: BagWriter) -> int:
         )
         attachments += 1
     for name, content in reader.metadata_records():
-        if name != metadata.RECORD_NAME:  # the writer makes its own
+        if name != bag_metadata.RECORD_NAME:  # the writer makes its own
             writer.add_metadata(name, content)
     for topic in reader.topics.values():
         definition = reader.definitions[topic.type_name]

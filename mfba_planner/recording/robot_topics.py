@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..core.errors import BagError
 from ..core.options import did_you_mean
-from .reader import BagReader, DecodedMessage
+from .bag_reader import BagReader, DecodedMessage
 
 ALONE = ""
 

@@ -6,18 +6,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar
 
-from ..core.episode import Episode, Outcome, World
 from ..core.errors import BagError, ConfigError, InputError
-from ..core.fleet import worlds_seen
 from ..core.geometry import Pose2D
 from ..core.options import flatten, override
-from ..core.planner import Decision, PlannerParams
-from ..core.sensing import SensorParams
-from ..core.world import Scenario
-from ..scenarios import load_scenario
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import Decision, PlannerParams
+from ..scenarios.scenario_files import load_scenario
+from ..simulation.episode import Episode, Outcome, World
+from ..simulation.fleet import worlds_seen
+from ..simulation.scenario import Scenario
+from .bag_reader import BagReader
 from .configuration import read_configuration
-from .reader import BagReader
-from .robots import ALONE
+from .robot_topics import ALONE
 
 T = TypeVar("T")
 
@@ -101,7 +101,7 @@ def read_setup(reader: BagReader) -> Setup:
     if ALONE not in found:
         raise BagError(
             f"{reader.path}: holds {len(found)} robots, and a bag of one is read here; use "
-            "mfba_planner.recording.episode.read_recording"
+            "mfba_planner.recording.read_episode.read_recording"
         )
     return found[ALONE]
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
-from ..core.planner import NANO
-from ..messages import bits_text
+from ..planning.algorithm_1 import NANO
+from .bag_reader import BagReader
 from .decisions import Answer, rising_decisions
-from .reader import BagReader
-from .robots import ALONE
+from .messages import bits_text
+from .robot_topics import ALONE
 
 Row = dict[str, Any]
 

@@ -18,16 +18,16 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle, Wedge
 from matplotlib.patheffects import withStroke
 
-from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.geometry import Point, bearing, distance, towards
-from mfba_planner.core.planner import Decision, Mode
-from mfba_planner.core.sensing import Bits
-from mfba_planner.core.world import Obstacle, center_at
+from mfba_planner.perception.sensory_vector import Bits
+from mfba_planner.planning.algorithm_1 import Decision, Mode
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.scenario import Obstacle, center_at
 
 from . import style
-from .moments import Pass, encounter_ticks, is_finite, span_s, stretches, track
-from .ring import Ring, ring_of
-from .view import View
+from .run_events import Pass, encounter_ticks, is_finite, span_s, stretches, track
+from .sector_ring import Ring, ring_of
+from .view_bounds import View
 
 Z_SECTOR, Z_TRACK, Z_OBSTACLE, Z_RING, Z_PATH, Z_MARK = (2.0 + 0.1 * i for i in range(6))
 _LONG = 0.75  # widths + heights of the view; longer tracks would cover it with lines

@@ -8,14 +8,12 @@ from dataclasses import replace
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch
 
-from mfba_planner.core.episode import Episode
-from mfba_planner.core.metrics import within_range
-from mfba_planner.core.world import bounce_times, center_at
+from mfba_planner.evaluation.metrics import within_range
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.scenario import bounce_times, center_at
 
 from . import style
-from .moments import span_s, track
-from .ring import ring_of
-from .scene import (
+from .draw_scene import (
     Z_MARK,
     Z_OBSTACLE,
     Z_PATH,
@@ -28,6 +26,8 @@ from .scene import (
     line,
     patch,
 )
+from .run_events import span_s, track
+from .sector_ring import ring_of
 
 AHEAD_S = 4.0  # an arrow is this long: it shows direction and speed
 

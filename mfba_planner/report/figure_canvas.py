@@ -14,8 +14,8 @@ from matplotlib.font_manager import findfont, get_font
 from matplotlib.text import Text
 
 from . import style
+from .format_values import one_line
 from .legend import Entry
-from .words import one_line
 
 EDGE = 0.3
 # neither date nor version: the same figure gives the same bytes

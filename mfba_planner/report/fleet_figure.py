@@ -8,17 +8,17 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from mfba_planner.core.episode import Episode
-from mfba_planner.core.metrics import evaluate
-from mfba_planner.core.world import Scenario
-from mfba_planner.outputs import write_new
+from mfba_planner.core.outputs import write_new
+from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.scenario import Scenario
 
-from . import legend, style, words
-from .moments import is_finite
-from .page import Page
-from .scene import draw_ends, draw_path
-from .sheet import to_bytes
-from .view import View, fitted
+from . import format_values, legend, style
+from .draw_scene import draw_ends, draw_path
+from .figure_canvas import to_bytes
+from .run_events import is_finite
+from .scene_layout import Page
+from .view_bounds import View, fitted
 
 
 def draw_fleet(scenario: Scenario, seed: int, runs: Mapping[str, Episode], path: Path) -> None:
@@ -56,8 +56,8 @@ def _fleet_figure(scenario: Scenario, seed: int, runs: Mapping[str, Episode]) ->
         [
             (
                 name,
-                words.number(result.min_clearance_m, 2, "m"),
-                "" if result.success else words.outcome(result),
+                format_values.number(result.min_clearance_m, 2, "m"),
+                "" if result.success else format_values.outcome(result),
             )
             for name, result in zip(names, results)
         ],

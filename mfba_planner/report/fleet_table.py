@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mfba_planner.core.episode import Outcome
-from mfba_planner.core.metrics import Result
+from mfba_planner.evaluation.metrics import Result
+from mfba_planner.simulation.episode import Outcome
 
 _HEAD = "{:<12}  outcome       length     time  clearance  collisions  encounters\n"
 _ROW = "{:<12}  {:<12}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}  {:>10}\n"

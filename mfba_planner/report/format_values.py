@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import math
 
-from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.metrics import Result
-from mfba_planner.core.planner import Mode
+from mfba_planner.evaluation.metrics import Result
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.simulation.episode import Episode, Outcome
 
 MODES = {
     Mode.IDLE: "idle (no goal)",

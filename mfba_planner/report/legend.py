@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from mfba_planner.core.planner import Mode
+from mfba_planner.planning.algorithm_1 import Mode
 
-from . import style, words
-from .scene import kinds
+from . import format_values, style
+from .draw_scene import kinds
 
 Entry = tuple[Line2D | Patch, str]
 
@@ -26,7 +26,7 @@ def _all() -> dict[str, Entry]:
         "start": (Line2D([], [], **style.START), "start"),
         "goal": (Line2D([], [], **style.GOAL), "goal"),
         "end": (Line2D([], [], **style.END), "end of the run"),
-        **{f"path:{mode.value}": (_path(mode), words.MODES[mode]) for mode in _MODES},
+        **{f"path:{mode.value}": (_path(mode), format_values.MODES[mode]) for mode in _MODES},
         "way": (Line2D([], [], **style.WAY), "way of the recorded run"),
         "obstacle": (_disc(style.OBSTACLE), "obstacle, at closest pass"),
         "enlarged": (Line2D([], [], **_edge(style.ENLARGED)), "enlarged by the robot's radius"),

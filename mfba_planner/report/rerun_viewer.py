@@ -14,16 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from mfba_planner.core.episode import Episode
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.core.motion import Motion
-from mfba_planner.core.planner import Decision, Mode
-from mfba_planner.core.world import velocity_at
-from mfba_planner.outputs import refuse_existing
+from mfba_planner.core.outputs import refuse_existing
+from mfba_planner.planning.algorithm_1 import Decision, Mode
+from mfba_planner.simulation.batched_motion import Motion
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.scenario import velocity_at
 
-from . import style, words
+from . import format_values, style
 from .html.data import clearances, in_one_scene, obstacle_names, speeds
-from .ring import ring_of
+from .sector_ring import ring_of
 
 _GREY, _DARK = style.FAINT, style.QUIET
 _AHEAD_S = 2.0  # arrows lead to where obstacles will be
@@ -165,7 +165,9 @@ class _Log:
             self.stream.set_time("tick", sequence=k)
             self._obstacles(xs[k], ys[k], time_s)
             self._robot(tick)
-            self._put("decision", self.rr.TextLog(f"{words.MODES[tick.mode]}: {tick.reason}"))
+            self._put(
+                "decision", self.rr.TextLog(f"{format_values.MODES[tick.mode]}: {tick.reason}")
+            )
             if math.isfinite(gap_m):
                 self._put("curves/clearance", self.rr.Scalars(gap_m))
             self._put("curves/speed", self.rr.Scalars(speed))

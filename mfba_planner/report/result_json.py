@@ -15,13 +15,13 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from mfba_planner import __version__
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Episode, Outcome
 from mfba_planner.core.errors import InputError
-from mfba_planner.core.metrics import Result, evaluate
 from mfba_planner.core.options import flatten
-from mfba_planner.outputs import write_new
-from mfba_planner.scenarios import scenario_to_dict
+from mfba_planner.core.outputs import write_new
+from mfba_planner.evaluation.metrics import Result, evaluate
+from mfba_planner.scenarios.scenario_files import scenario_to_dict
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Episode, Outcome
 
 SCHEMA_VERSION = 1
 _KINDS = {

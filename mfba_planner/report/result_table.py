@@ -11,11 +11,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from mfba_planner.core.episode import Episode, Outcome
-from mfba_planner.core.metrics import Result
+from mfba_planner.evaluation.metrics import Result
+from mfba_planner.simulation.episode import Episode, Outcome
 
-from . import words
-from .console import print_encodable
+from . import format_values
+from .terminal_output import print_encodable
 
 _ROOM_FOR_REMARKS = 60  # columns
 Row = tuple[str, str, str]
@@ -29,16 +29,16 @@ def result_rows(
     names: Sequence[str] = (),
 ) -> Iterator[Row]:
     """Yield (name, figure, remark) for each line of the table; names are the obstacles'."""
-    yield "outcome", words.outcome(result), _why_no_success(result)
-    yield "length", words.length(result), _against_straight(episode, result)
-    yield "time", words.time(result), "simulated"
-    yield "fitness", words.fitness(result), "1 / length"
+    yield "outcome", format_values.outcome(result), _why_no_success(result)
+    yield "length", format_values.length(result), _against_straight(episode, result)
+    yield "time", format_values.time(result), "simulated"
+    yield "fitness", format_values.fitness(result), "1 / length"
     between = "edge to edge" if math.isfinite(result.min_clearance_m) else ""
-    yield "min clearance", words.clearance(result), between
+    yield "min clearance", format_values.clearance(result), between
     yield "collisions", str(result.collisions), ""
     yield "encounters", str(len(result.encounters)), _numbered(result, names)
     yield "mode switches", str(result.mode_switches), _standing(result)
-    rate = "" if ticks_per_s is None else f"{words.number(ticks_per_s, 0)} ticks/s"
+    rate = "" if ticks_per_s is None else f"{format_values.number(ticks_per_s, 0)} ticks/s"
     yield "ticks", str(result.ticks), rate
 
 
@@ -48,8 +48,8 @@ def _why_no_success(result: Result) -> str:
 
 
 def _against_straight(episode: Episode, result: Result) -> str:
-    straight = words.straight_m(episode)
-    line = f"straight line {words.number(straight, 3, 'm')}"
+    straight = format_values.straight_m(episode)
+    line = f"straight line {format_values.number(straight, 3, 'm')}"
     if result.outcome is not Outcome.GOAL_REACHED:
         return line
     excess = 100.0 * (result.length_m / straight - 1.0)
@@ -79,7 +79,7 @@ def result_table(
     episode: Episode, result: Result, ticks_per_s: float | None = None, *, remarks: bool = True
 ) -> Table:
     """The result as a rich table; its title tells scenario, algorithm, seed and driver."""
-    title = Text(words.run_title(episode), style="bold")
+    title = Text(format_values.run_title(episode), style="bold")
     table = Table(title=title, title_justify="left", box=None, show_header=False, padding=(0, 2))
     table.add_column(style="dim", no_wrap=True)
     table.add_column(no_wrap=True)
@@ -115,10 +115,10 @@ def comparison_text(left: tuple[str, Result], right: tuple[str, Result]) -> str:
     """Two results side by side as plain text; what differs is marked with >."""
     (left_name, a), (right_name, b) = left, right
     rows = [
-        ("outcome", words.outcome(a), words.outcome(b)),
-        ("length", words.length(a), words.length(b)),
-        ("time", words.time(a), words.time(b)),
-        ("min clearance", words.clearance(a), words.clearance(b)),
+        ("outcome", format_values.outcome(a), format_values.outcome(b)),
+        ("length", format_values.length(a), format_values.length(b)),
+        ("time", format_values.time(a), format_values.time(b)),
+        ("min clearance", format_values.clearance(a), format_values.clearance(b)),
         ("collisions", str(a.collisions), str(b.collisions)),
         ("mode switches", str(a.mode_switches), str(b.mode_switches)),
         ("ticks", str(a.ticks), str(b.ticks)),

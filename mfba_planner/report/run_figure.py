@@ -8,16 +8,16 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from mfba_planner.core.episode import Episode
-from mfba_planner.core.metrics import Result, evaluate
-from mfba_planner.outputs import write_new
+from mfba_planner.core.outputs import write_new
+from mfba_planner.evaluation.metrics import Result, evaluate
+from mfba_planner.simulation.episode import Episode
 
-from . import legend, style, words
-from .moments import Pass, closest_passes
-from .page import Page
-from .scene import draw_scene, draw_way, label_numbers
-from .sheet import to_bytes
-from .view import choose_view
+from . import format_values, legend, style
+from .draw_scene import draw_scene, draw_way, label_numbers
+from .figure_canvas import to_bytes
+from .run_events import Pass, closest_passes
+from .scene_layout import Page
+from .view_bounds import choose_view
 
 
 def draw_run(episode: Episode, path: Path) -> None:
@@ -71,8 +71,8 @@ def _pass_rows(passes: Sequence[Pass], result: Result) -> list[tuple[str, str, s
     return [
         (
             f"obstacle {p.number}",
-            words.number(p.gap_m, 2, "m"),
-            f"at {words.number(p.time_s, 1, 's')}",
+            format_values.number(p.gap_m, 2, "m"),
+            f"at {format_values.number(p.time_s, 1, 's')}",
         )
         for p in met
     ]
@@ -82,12 +82,12 @@ def _cells(episode: Episode, result: Result) -> list[tuple[str, str, str]]:
     """(label, value, colour) of the result strip."""
     touched = style.BAD if result.collisions else style.INK
     return [
-        ("outcome", words.outcome(result), style.GOOD if result.success else style.BAD),
-        ("length", words.length(result), style.INK),
-        ("time", words.time(result), style.INK),
-        ("min clearance", words.clearance(result), touched),
+        ("outcome", format_values.outcome(result), style.GOOD if result.success else style.BAD),
+        ("length", format_values.length(result), style.INK),
+        ("time", format_values.time(result), style.INK),
+        ("min clearance", format_values.clearance(result), touched),
         ("collisions", str(result.collisions), touched),
         ("mode switches", str(result.mode_switches), style.INK),
         ("algorithm", episode.label, style.INK),
-        ("seed", words.one_line(str(episode.seed), 12), style.INK),
+        ("seed", format_values.one_line(str(episode.seed), 12), style.INK),
     ]

@@ -9,10 +9,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from . import style
+from .figure_canvas import EDGE, Sheet
+from .format_values import one_line
 from .legend import Entry
-from .sheet import EDGE, Sheet
-from .view import View
-from .words import one_line
+from .view_bounds import View
 
 # inches
 _GAP, _HEAD, _AXIS, _STRIP, _PANEL = 0.3, 0.85, 0.6, 0.8, 2.45

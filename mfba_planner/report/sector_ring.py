@@ -6,9 +6,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..core.episode import Episode
-from ..core.gaps import GapHeading, gap_heading
-from ..core.sensing import Bits
+from ..perception.sensory_vector import Bits
+from ..planning.gap_vector import GapHeading, gap_heading
+from ..simulation.episode import Episode
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rich.table import Table
 
-from mfba_planner.statistics import Interval
-from mfba_planner.sweep.summary import Standing, Versus
+from mfba_planner.evaluation.statistics import Interval
+from mfba_planner.evaluation.sweep.summary import Standing, Versus
 
 _NONE = "-"
 HEAD = (

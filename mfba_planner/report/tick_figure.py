@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mfba_planner.core.episode import Episode
+from mfba_planner.simulation.episode import Episode
 
 from . import legend, style
-from .sheet import EDGE, Sheet, to_bytes
-from .snapshot import draw_snapshot
+from .draw_tick import draw_snapshot
+from .figure_canvas import EDGE, Sheet, to_bytes
 
 _SIDE, _HEAD, _AXIS, _PANEL = 5.0, 0.85, 0.6, 2.6  # inches
 _AROUND = 3.0  # of the sensing range

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from mfba_planner.core.episode import Episode
 from mfba_planner.core.geometry import Point
+from mfba_planner.simulation.episode import Episode
 
-from .moments import Pass, encounter_ticks, is_finite
+from .run_events import Pass, encounter_ticks, is_finite
 
 _NEAR = 0.35  # of the trip's extent: what is further away is not worth shrinking the path for
 _MARGIN = 0.04

@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from . import __version__
-from .core.errors import ConfigError
-from .core.fleet import seed_of, worlds_seen
-from .core.geometry import Pose2D
-from .core.options import Scalar, check, flatten, option
-from .core.planner import NANO, PlannerParams
-from .core.sensing import SensorParams
-from .core.world import Scenario
-from .scenarios import scenario_to_json
+from .. import __version__
+from ..core.errors import ConfigError
+from ..core.geometry import Pose2D
+from ..core.options import Scalar, check, flatten, option
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import NANO, PlannerParams
+from ..simulation.fleet import seed_of, worlds_seen
+from ..simulation.scenario import Scenario
+from .scenario_files import scenario_to_json
 
 Parameters = dict[str, dict[str, Any]]
 

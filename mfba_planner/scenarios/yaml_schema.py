@@ -14,10 +14,10 @@ from typing import Annotated, Any
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from .core.errors import ConfigError
-from .core.options import did_you_mean
-from .core.world import Kidnapping, Member, Obstacle, Scenario, Turn, Walls
-from .scenarios import EXAMPLE, LIMIT, robot_of
+from ..core.errors import ConfigError
+from ..core.options import did_you_mean
+from ..simulation.scenario import Kidnapping, Member, Obstacle, Scenario, Turn, Walls
+from .scenario_files import EXAMPLE, LIMIT, robot_of
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
 _Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=LIMIT)]

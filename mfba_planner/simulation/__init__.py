@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated world: obstacles, robot, sensors, contact, fleets, and the run that comes of it."""
+"""The simulated world: obstacles, robot, sensors, contact, fleets, and the resulting Episode."""

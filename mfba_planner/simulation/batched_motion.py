@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from .world import Scenario, clearance, stretches_of
+from .scenario import Scenario, clearance, stretches_of
 
 Array = np.ndarray
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from .geometry import Point, Pose2D, bearing, distance, wrap_angle
-from .planner import NANO, Decision
-from .robot import Base
+from ..core.geometry import Point, Pose2D, bearing, distance, wrap_angle
+from ..planning.algorithm_1 import NANO, Decision
+from .robot_model import Base
 
 SUBTICK_NS = 10_000_000  # speeds change this often within a tick
 

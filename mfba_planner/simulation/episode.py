@@ -9,14 +9,17 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TypeVar
 
-from .drive import Speeds, command, obey
-from .errors import ConfigError, InputError
-from .geometry import Point, Pose2D, distance
-from .guarded import algorithm_1
-from .instruments import Instruments, Reading
-from .motion import Motion
-from .nearby import Found, Nearby
-from .planner import (
+from ..core.errors import ConfigError, InputError
+from ..core.geometry import Point, Pose2D, distance
+from ..perception.sensory_vector import (
+    Ranges,
+    SensorParams,
+    aligned,
+    blind,
+    sense_circles,
+    sense_scan,
+)
+from ..planning.algorithm_1 import (
     NANO,
     Decision,
     Observation,
@@ -25,8 +28,12 @@ from .planner import (
     Refused,
     observe,
 )
-from .sensing import Ranges, SensorParams, aligned, blind, sense_circles, sense_scan
-from .world import Scenario, velocity_at
+from ..planning.supervised_planner import algorithm_1
+from .batched_motion import Motion
+from .differential_drive import Speeds, command, obey
+from .nearby_obstacles import Found, Nearby
+from .scenario import Scenario, velocity_at
+from .sensor_noise import Instruments, Reading
 
 T = TypeVar("T")
 DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
@@ -88,7 +95,7 @@ class World:
         if scenario.robots:
             raise ConfigError(
                 f"scenario {scenario.name!r}: names {len(scenario.robots)} robots, which share a "
-                "world; use core.fleet"
+                "world; use simulation.fleet"
             )
         self.scenario = scenario
         self.tick_ns = tick_ns
@@ -145,7 +152,7 @@ class World:
         return None
 
     def step(self, told: Point) -> None:
-        """Move robot and time on by one tick; told is what core.drive.command gives."""
+        """Move robot and time on by one tick; told is what differential_drive.command gives."""
         robot = self.scenario.robot
         if robot.turns:
             self.pose, self.speeds = obey(self.pose, self.speeds, told, robot, self.tick_ns)

@@ -9,15 +9,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from .drive import command
+from ..core.errors import ConfigError
+from ..core.geometry import Point, Pose2D, bearing, distance, towards
+from ..perception.sensory_vector import SensorParams
+from ..planning.algorithm_1 import NANO, Decision, PathPlanner, PlannerParams
+from ..planning.supervised_planner import algorithm_1
+from .differential_drive import command
 from .episode import Episode, Look, Outcome, World, look
-from .errors import ConfigError
-from .geometry import Point, Pose2D, bearing, distance, towards
-from .guarded import algorithm_1
-from .nearby import Found
-from .planner import NANO, Decision, PathPlanner, PlannerParams
-from .sensing import SensorParams
-from .world import Obstacle, Scenario, Turn
+from .nearby_obstacles import Found
+from .scenario import Obstacle, Scenario, Turn
 
 FLEET_STREAM = 6  # spawn key of the robots' SeedSequence children; one number per purpose
 DRIFT_M = 1e-12  # by which a way of straight stretches may miss a pose
@@ -192,7 +192,7 @@ def run_fleet(
     brain: MakeBrain | None = None,
     look: Look = look,
 ) -> tuple[Episode, ...]:
-    """core.episode.run for every robot of a scenario at once: an Episode each, in its order.
+    """simulation.episode.run for every robot of a scenario at once: an Episode each, in its order.
 
     brain makes the planner of a robot from its seed. The obstacles of an episode's scenario are
     the scenario's own, then the other robots as they went.

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
-from .geometry import Point, distance
-from .motion import Array, Motion
-from .planner import NANO
+from ..core.geometry import Point, distance
+from ..planning.algorithm_1 import NANO
+from .batched_motion import Array, Motion
 
 AHEAD_TICKS = 64  # whose centres are worked out at once; the paper's trip of 17 m is 57
 PICKED_TICKS = 24  # of these, for which the near ones are picked at once

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.episode import World, sense
 from ..core.errors import ConfigError
 from ..core.geometry import Pose2D, distance
-from ..core.lidar import cast_rays
 from ..core.options import did_you_mean
-from ..core.planner import Circle, Observation
-from ..core.sensing import Ranges, Scan, SensorParams, sense_scan
+from ..perception.sensory_vector import Ranges, Scan, SensorParams, sense_scan
+from ..planning.algorithm_1 import Circle, Observation
+from .episode import World, sense
+from .simulated_lidar import cast_rays
 
 SENSOR_STREAM = 2  # spawn key of the noise's SeedSequence child; the planner's is 1
 BEAMS = {"scan-12": 12, "scan-360": 360}
@@ -25,7 +25,7 @@ Sensed = tuple[tuple[Circle, ...] | None, Scan | None]
 
 
 class Perception:
-    """A look for core.episode.run, by name.
+    """A look for simulation.episode.run, by name.
 
     sectors: the bits' ranges alone. known: the circles whose enlarged edge is within SR, with
     their true velocities of that moment. scan-12, scan-360: beams from the robot's centre along

@@ -11,9 +11,9 @@ from functools import lru_cache
 from itertools import combinations, pairwise
 from operator import attrgetter
 
-from .errors import ConfigError
-from .geometry import Point, closest_approach, distance
-from .robot import Robot
+from ..core.errors import ConfigError
+from ..core.geometry import Point, closest_approach, distance
+from .robot_model import Robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +105,7 @@ class Member:
 class Scenario:
     """A task: start, goal, robot, obstacles, walls and a limit of simulated time.
 
-    robots makes it the task of a fleet (core.fleet); start_m and goal_m are its first robot's.
+    robots makes it the task of a fleet (fleet.py); start_m and goal_m are its first robot's.
     """
 
     name: str

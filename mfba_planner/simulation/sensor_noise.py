@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .geometry import Pose2D, carried
-from .lidar import limited, scan_at
-from .robot import Robot
-from .sensing import Scan
-from .world import Walls
+from ..core.geometry import Pose2D, carried
+from ..perception.sensory_vector import Scan
+from .robot_model import Robot
+from .scenario import Walls
+from .simulated_lidar import limited, scan_at
 
 NANO = 1e-9
 ODOM_STREAM, SCAN_STREAM = 4, 5  # spawn keys of SeedSequence children; one number per purpose

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .geometry import Point, Pose2D
-from .robot import Lidar
-from .sensing import Scan
-from .world import Walls
+from ..core.geometry import Point, Pose2D
+from ..perception.sensory_vector import Scan
+from .robot_model import Lidar
+from .scenario import Walls
 
 _RAYS: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .world import Scenario, bounce_times, center_at
+from .scenario import Scenario, bounce_times, center_at
 
 
 class Legs(NamedTuple):

@@ -9,6 +9,7 @@ from typing import Any
 
 from numpy.random import Generator
 
+from ..core.errors import InputError
 from .bat_params import (
     Acceptance,
     Algorithm,
@@ -22,10 +23,9 @@ from .bat_params import (
     Velocity,
     Walk,
 )
-from .errors import InputError
-from .failures import Failures
-from .flight import Law, Pair
-from .region import Box, Disc, Region, Vector
+from .invalid_values import Failures
+from .search_region import Box, Disc, Region, Vector
+from .swarm_iteration import Law, Pair
 
 __all__ = [
     "Acceptance", "Algorithm", "BatParams", "BatSwarm", "Bounds", "Box", "Disc", "Epsilon",

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from .bat import (
+from ..core.errors import InputError
+from .bat_swarm import (
     Acceptance,
     Algorithm,
     BatParams,
@@ -33,7 +34,6 @@ from .bat import (
     Walk,
     draws_per_bat,
 )
-from .errors import InputError
 
 Array = np.ndarray
 Objective = Callable[[Array], Array]

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from .errors import ConfigError
+from ..core.errors import ConfigError
 
 Vector = list[float]
 

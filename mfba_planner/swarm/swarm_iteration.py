@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .bat_params import BatParams, Bounds, Velocity, Walk
-from .region import Box, Disc, Region, Vector
+from .search_region import Box, Disc, Region, Vector
 
 Bats = Iterable[Any]
 Pair = tuple[Vector, Vector]

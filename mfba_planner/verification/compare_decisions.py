@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..core.digest import canonical
-from ..core.planner import Decision
+from ..planning.algorithm_1 import Decision
+from ..simulation.decision_digest import canonical
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

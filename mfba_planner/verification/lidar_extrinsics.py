@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from ..core.errors import FrameError
 from ..core.geometry import yaw_of
-from ..recording.reader import BagReader
+from ..recording.bag_reader import BagReader
 
 TRANSFORMS, TF_STATIC = "tf2_msgs/msg/TFMessage", "tf_static"
 UPRIGHT = math.cos(math.radians(5.0))  # of a lidar that scans the robot's plane: least cosine

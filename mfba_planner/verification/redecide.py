@@ -10,18 +10,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..core.digest import digest
 from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner import Decision, PlannerParams, Refused, observe
-from ..core.sensing import Ranges, SensorParams, aligned, sense_scan
-from ..messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
-from ..planners.method import brain
+from ..perception.sensory_vector import Ranges, SensorParams, aligned, sense_scan
+from ..planning.algorithm_1 import Decision, PlannerParams, Refused, observe
+from ..planning.planner_factory import brain
+from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions import DECISION, SECTORS, deciders
-from ..recording.integrity import check_data
-from ..recording.reader import BagReader, DecodedMessage
-from ..recording.robots import ALONE
-from .mounting import StaticFrames
+from ..recording.file_integrity import check_data
+from ..recording.messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
+from ..recording.robot_topics import ALONE
+from ..simulation.decision_digest import digest
+from .lidar_extrinsics import StaticFrames
 
 ODOMETRY, SCAN, GOAL = (
     "nav_msgs/msg/Odometry",

@@ -10,11 +10,11 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.geometry import Point
-from ..messages import goal_point, stamp_ns, waypoint_points
+from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions import DECISION, SECTORS, ranges_seen, require_decisions
-from ..recording.left_out import left_out
-from ..recording.reader import BagReader, DecodedMessage
-from ..recording.robots import heard_by_robot
+from ..recording.messages import goal_point, stamp_ns, waypoint_points
+from ..recording.omitted_decisions import left_out
+from ..recording.robot_topics import heard_by_robot
 
 ODOM, OBSTACLES, VECTOR, SCAN = "/odom", "/obstacles", "/sensory_vector", "/scan"
 GOAL, WAYPOINTS = "/goal_pose", "/waypoints"
@@ -168,7 +168,7 @@ def _join_by_order(
 
 
 def _leave_out(found: Evidence, inputs: Sequence[str]) -> None:
-    """Name the decisions after the end of an input, as recording/left_out.py has it.
+    """Name the decisions after the end of an input, as recording/omitted_decisions.py has it.
 
     Not where that would be all of them, nor for an input that was never recorded.
     """

@@ -11,12 +11,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..core.digest import digest
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner import Decision, Mode, Observation, observe
-from ..core.sensing import aligned, sense_circles, sense_scan, sensory_vector
-from ..messages import (
+from ..perception.sensory_vector import aligned, sense_circles, sense_scan, sensory_vector
+from ..planning.algorithm_1 import Decision, Mode, Observation, observe
+from ..planning.planner_factory import brain
+from ..recording.bag_reader import BagReader
+from ..recording.file_integrity import check_data
+from ..recording.messages import (
     body_velocity,
     decision_value,
     laser_scan,
@@ -26,14 +28,12 @@ from ..messages import (
     sector_ranges,
     velocity,
 )
-from ..messages import decision as read_decision
-from ..planners.method import brain
-from ..recording.integrity import check_data
-from ..recording.reader import BagReader
-from ..recording.robots import ALONE, chosen
-from ..recording.setup import Setup, read_setup, read_setups
-from .compare import Divergence, first_divergence
-from .evidence import (
+from ..recording.messages import decision as read_decision
+from ..recording.robot_topics import ALONE, chosen
+from ..recording.run_setup import Setup, read_setup, read_setups
+from ..simulation.decision_digest import digest
+from .compare_decisions import Divergence, first_divergence
+from .tick_records import (
     DECISION,
     OBSTACLES,
     ODOM,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The oracle: the shortest collision-free trajectory with full knowledge, and certificates."""
 
-from .check import Fault, inspect
+from .independent_check import Fault, inspect
 from .solution import Certificate, Solution
 from .solve import solve
 

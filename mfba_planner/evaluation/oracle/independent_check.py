@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from ..core.world import Obstacle, Scenario, Walls
+from ...simulation.scenario import Obstacle, Scenario, Walls
 from .solution import Waypoint
 
 Fault = str

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.legs import Legs
-from ..core.world import Scenario
+from ...simulation.scenario import Scenario
+from ...simulation.uniform_segments import Legs
 
 GOAL_TOLERANCE_M = 0.05  # more than any planner of ours is granted
 

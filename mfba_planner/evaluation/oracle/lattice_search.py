@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.geometry import Point
-from ..core.legs import Legs
-from ..core.world import Walls
+from ...core.geometry import Point
+from ...simulation.scenario import Walls
+from ...simulation.uniform_segments import Legs
 from .polyline import edge_gaps, within
-from .tangents import CLEAR_M
+from .tangent_search import CLEAR_M
 
 _CHUNK = 20_000  # pairs of edge and leg looked at together: what a cache holds
 _AT_ONCE = 300  # the same for pairs of a place and a leg, which have many headings

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from ..core.legs import Legs
-from ..core.world import Walls
+from ...simulation.scenario import Walls
+from ...simulation.uniform_segments import Legs
 from .polyline import gaps, lengths, one_way_gaps, pair_gaps, within
-from .tangents import CLEAR_M
+from .tangent_search import CLEAR_M
 
 _NEAR_M = 1.5  # obstacle legs further away are looked at only in the end
 _PAIR_M = 0.05  # pairs of legs closer than this are constraints

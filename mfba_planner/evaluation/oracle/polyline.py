@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..core.geometry import Point
-from ..core.legs import Legs
-from ..core.world import Walls
+from ...core.geometry import Point
+from ...simulation.scenario import Walls
+from ...simulation.uniform_segments import Legs
 
 Leg = tuple[float, float, float, float, float, float, float]  # Legs, but for the obstacle
 FAR_M = 9.0  # gap reported for a pair that never moves at the same time

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from ..core.geometry import Point
+from ...core.geometry import Point
 
 
 class Certificate(Enum):

@@ -8,17 +8,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..core.errors import ConfigError
-from ..core.geometry import distance
-from ..core.legs import Legs, uniform_legs
-from ..core.world import Scenario, Walls
-from .check import inspect
-from .lattice import LatticeParams, lattice_ways
+from ...core.errors import ConfigError
+from ...core.geometry import distance
+from ...simulation.scenario import Scenario, Walls
+from ...simulation.uniform_segments import Legs, uniform_legs
+from .independent_check import inspect
+from .infeasibility_proof import unreachable
+from .lattice_search import LatticeParams, lattice_ways
+from .path_refinement import refine
 from .polyline import gaps, lengths
-from .reach import unreachable
-from .refine import refine
 from .solution import Certificate, Solution, Waypoint
-from .tangents import CLEAR_M, Search, SearchParams
+from .tangent_search import CLEAR_M, Search, SearchParams
 
 _LONG, _VERY_LONG = 1.05, 1.08  # times the straight line
 _FINE = LatticeParams(step_s=0.6, headings=48, cell_m=0.1)

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core.geometry import Point
-from ..core.legs import Legs
-from ..core.world import Walls
+from ...core.geometry import Point
+from ...simulation.scenario import Walls
+from ...simulation.uniform_segments import Legs
 from .polyline import edge_gaps, within
 
 CLEAR_M = 1e-5  # kept from every circle, so that rounding cannot make contact

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
-from ..core.errors import OutputError
-from ..outputs import write_new
-from .part import Columns, Part
+from ... import __version__
+from ...core.errors import OutputError
+from ...core.outputs import write_new
+from .chunk import Columns, Part
 
 SCHEMA_VERSION = 1
 MANIFEST, CHUNKS = "study.json", "chunks"

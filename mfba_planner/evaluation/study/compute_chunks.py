@@ -14,9 +14,9 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import TypeVar
 
-from ..core.errors import ConfigError, MfbaError
-from .part import Columns, Part
-from .store import Store
+from ...core.errors import ConfigError, MfbaError
+from .chunk import Columns, Part
+from .chunk_store import Store
 
 MAX_WORKERS = 256
 TRIES = 3  # of a part whose worker dies

@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..core.geometry import Point, bearing, distance, towards
-from ..core.world import Obstacle, Turn
+from ...core.geometry import Point, bearing, distance, towards
+from ...simulation.scenario import Obstacle, Turn
 from .trip import OBSTACLE_RADIUS_M, ROBOT_RADIUS_M, Trip, leaves_room
 
 ENLARGED_M = OBSTACLE_RADIUS_M + ROBOT_RADIUS_M

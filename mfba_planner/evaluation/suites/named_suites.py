@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.errors import ConfigError
-from ..core.options import did_you_mean
-from ..core.world import Scenario
-from .adversarial import FAMILIES, hostile
-from .crowd import CrowdParams, Motion, crowd
+from ...core.errors import ConfigError
+from ...core.options import did_you_mean
+from ...simulation.scenario import Scenario
+from .adversarial_worlds import FAMILIES, hostile
+from .random_crowds import CrowdParams, Motion, crowd
 from .trip import ROOM, Trip, scenario
 
 WORLD_STREAM = 3  # spawn key of worlds' SeedSequence children; one number per purpose
@@ -77,7 +77,9 @@ _CASES = ("case1", "case2")
 
 
 def _paper(_: Suite, k: int, __: float) -> Scenario:
-    from ..scenarios import load_scenario  # takes a third of the start of a process that needs it
+    from ...scenarios.scenario_files import (
+        load_scenario,  # takes a third of the start of a process that needs it
+    )
 
     return load_scenario(_CASES[k])
 

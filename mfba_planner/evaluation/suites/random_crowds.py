@@ -9,9 +9,9 @@ from enum import Enum
 
 import numpy as np
 
-from ..core.errors import ConfigError
-from ..core.options import check, option
-from ..core.world import Obstacle, Turn
+from ...core.errors import ConfigError
+from ...core.options import check, option
+from ...simulation.scenario import Obstacle, Turn
 from .trip import OBSTACLE_RADIUS_M, ROOM, leaves_room
 
 _TRIES = 10_000

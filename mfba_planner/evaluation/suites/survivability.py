@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.geometry import distance
-from ..core.legs import Legs, uniform_legs
-from ..core.world import Scenario
+from ...core.geometry import distance
+from ...simulation.scenario import Scenario
+from ...simulation.uniform_segments import Legs, uniform_legs
 from .trip import ROOM
 
 _PLACES = 10  # per side of the area

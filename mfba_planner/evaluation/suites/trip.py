@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..core.geometry import Point, distance
-from ..core.world import Obstacle, Scenario, Walls
+from ...core.geometry import Point, distance
+from ...simulation.scenario import Obstacle, Scenario, Walls
 
 START_M: Point = (0.0, 0.0)
 GOAL_M: Point = (12.0, 12.0)

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
-from ..core.errors import MfbaError
+from ...core.errors import MfbaError
 from ..oracle import solve
-from ..study.part import Columns
-from ..worlds import suite
-from ..worlds.difficulty import survivability
+from ..study.chunk import Columns
+from ..suites import suite
+from ..suites.survivability import survivability
 from .columns import Row, lost_row, made_row, timing_row
-from .keeper import Lost, each
-from .order import Order, Run, Setting
-from .play import flies_together, play, play_together
+from .single_run import flies_together, play, play_together
+from .sweep_spec import Order, Run, Setting
+from .worker import Lost, each
 
 RUNS_AT_ONCE = 100
 WORLDS_AT_ONCE = 20

@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from ..core.conduct import Conduct
-from ..core.episode import Outcome
-from ..core.geometry import distance
-from ..core.metrics import Result, assess
-from ..core.scores import barn_score, optimality_gap, spl, time_to_goal_s
-from .order import Run
-from .play import Played
+from ...core.geometry import distance
+from ...simulation.episode import Outcome
+from ..contacts_and_clearances import Conduct
+from ..metrics import Result, assess
+from ..scores import barn_score, optimality_gap, spl, time_to_goal_s
+from .single_run import Played
+from .sweep_spec import Run
 
 Row = dict[str, Any]
 FAILED = "failed"

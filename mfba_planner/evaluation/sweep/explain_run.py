@@ -9,15 +9,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..core.conduct import Conduct
-from ..core.episode import Episode, Outcome
-from ..core.geometry import Point, bearing, distance, wrap_angle
-from ..core.metrics import Result, assess, within_range
-from ..core.motion import Motion
-from ..core.planner import Decision
-from ..core.world import velocity_at
-from ..messages import bits_text
-from .play import Played
+from ...core.geometry import Point, bearing, distance, wrap_angle
+from ...planning.algorithm_1 import Decision
+from ...recording.messages import bits_text
+from ...simulation.batched_motion import Motion
+from ...simulation.episode import Episode, Outcome
+from ...simulation.scenario import velocity_at
+from ..contacts_and_clearances import Conduct
+from ..metrics import Result, assess, within_range
+from .single_run import Played
 
 BEFORE = 6  # decisions that are shown
 

@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable
 from time import perf_counter_ns
 
-from ..core.errors import MfbaError
-from ..core.planner import Decision, Observation, PathPlanner, PlannerParams
+from ...core.errors import MfbaError
+from ...planning.algorithm_1 import Decision, Observation, PathPlanner, PlannerParams
 
 SPEED_SLACK = 1e-6  # a tick is a whole number of nanoseconds
 

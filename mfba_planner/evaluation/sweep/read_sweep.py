@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import ConfigError, InputError
-from ..core.options import override
-from ..core.planner import PlannerParams
-from ..core.sensing import SensorParams
-from ..study.store import code_digest, read_manifest, read_part
+from ...core.errors import ConfigError, InputError
+from ...core.options import override
+from ...perception.sensory_vector import SensorParams
+from ...planning.algorithm_1 import PlannerParams
+from ..study.chunk_store import code_digest, read_manifest, read_part
+from .chunks import parts_of
 from .columns import Row
-from .order import Order, Setting
-from .parts import parts_of
-from .run import COMMAND, PACKAGES
+from .run_sweep import COMMAND, PACKAGES
+from .sweep_spec import Order, Setting
 from .table import build
 
 

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import ConfigError, MfbaError
-from ..core.options import flatten
-from ..study.compute import compute
-from ..study.part import Part
-from ..study.store import Store
+from ...core.errors import ConfigError, MfbaError
+from ...core.options import flatten
+from ..study.chunk import Part
+from ..study.chunk_store import Store
+from ..study.compute_chunks import compute
+from .chunks import parts_of
 from .columns import Row
-from .order import Order
-from .parts import parts_of
+from .sweep_spec import Order
 from .table import build, sorted_hash
 
 COMMAND = "mfba sweep"

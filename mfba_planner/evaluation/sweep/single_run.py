@@ -7,11 +7,11 @@ from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from ..core.episode import Episode, Look, Outcome, course, ended, look, to_the_end
-from ..core.planner import NANO, Observation, Planner, Swarm, fly_together
-from ..planners.registry import known
-from .guard import Guard, HungError, PlannerFault
-from .order import Run, Setting
+from ...planning.algorithm_1 import NANO, Observation, Planner, Swarm, fly_together
+from ...planning.planner_registry import known
+from ...simulation.episode import Episode, Look, Outcome, course, ended, look, to_the_end
+from .planner_sandbox import Guard, HungError, PlannerFault
+from .sweep_spec import Run, Setting
 
 TICKS_HELD = 100_000  # of all runs under way at once, of some kB each
 

@@ -10,15 +10,15 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
-from ..core.errors import ConfigError
-from ..core.options import flatten
-from ..core.planner import PathPlanner, PlannerParams
-from ..core.sensing import SensorParams
-from ..core.world import Scenario
-from ..planners.perception import Perception
-from ..planners.registry import Factory, known, preset_of
-from ..worlds import suite
-from ..worlds.suites import SPEED_MPS
+from ...core.errors import ConfigError
+from ...core.options import flatten
+from ...perception.sensory_vector import SensorParams
+from ...planning.algorithm_1 import PathPlanner, PlannerParams
+from ...planning.planner_registry import Factory, known, preset_of
+from ...simulation.planner_observations import Perception
+from ...simulation.scenario import Scenario
+from ..suites import suite
+from ..suites.named_suites import SPEED_MPS
 
 PATIENCE_S, LONGEST_S = 60.0, 86_400.0
 

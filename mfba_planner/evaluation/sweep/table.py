@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import ConfigError, OutputError
-from ..outputs import write_same
-from ..study.part import Columns
-from ..worlds import suite
+from ...core.errors import ConfigError, OutputError
+from ...core.outputs import write_same
+from ..study.chunk import Columns
+from ..suites import suite
+from .chunks import Optima, Runs, gather
 from .columns import COLUMNS, TIMINGS, Row, judged
-from .order import Order
-from .parts import Optima, Runs, gather
+from .sweep_spec import Order
 
 Kinds = Mapping[str, tuple[type, str]]
 

@@ -12,7 +12,7 @@ from contextlib import suppress
 from multiprocessing.connection import Pipe
 from typing import Any, NamedTuple, TypeVar
 
-from ..core.errors import MfbaError
+from ...core.errors import MfbaError
 
 START_S = 120.0  # a busy machine may take its time to start a process
 # With other numbers of threads, sums are added up in another order: other last bits.
@@ -63,7 +63,7 @@ class Keeper:
         told = {"PYTHONPATH": paths, "MFBA_PARENT": str(os.getpid()), **_ONE_THREAD}
         with theirs:
             self._child = subprocess.Popen(
-                [sys.executable, "-m", f"{__package__}.child", str(theirs.fileno())],
+                [sys.executable, "-m", f"{__package__}.worker_main", str(theirs.fileno())],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # planners may print what they like

@@ -12,8 +12,8 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ..leash import end_with_parent
-from . import parts as _parts  # noqa: F401  # now: later it would be taken for slow work
+from ...core.child_process import end_with_parent
+from . import chunks as _parts  # noqa: F401  # now: later it would be taken for slow work
 
 MANY = 50_000  # new objects before the collector looks for cycles: runs are large and have none
 

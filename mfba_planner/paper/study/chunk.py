@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ...core.bat import BatParams
-from ...core.batch import BatchResult, minimize_batch
-from ...core.episode import run
-from ...core.metrics import assess
 from ...core.options import Scalar, flatten
-from ...core.planner import PlannerParams
-from ...core.world import Scenario
+from ...evaluation.metrics import assess
+from ...planning.algorithm_1 import PlannerParams
+from ...simulation.episode import run
+from ...simulation.scenario import Scenario
+from ...swarm.bat_swarm import BatParams
+from ...swarm.batched_swarms import BatchResult, minimize_batch
 from ..functions import FUNCTIONS
 
 Columns = dict[str, list[float]]

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ...core.bat import Algorithm, BatParams, Schedule
-from ...core.world import Scenario
+from ...simulation.scenario import Scenario
+from ...swarm.bat_swarm import Algorithm, BatParams, Schedule
 from ..functions import FUNCTIONS
 from ..readings import PLANNERS, SWARMS
 from .chunk import Benchmark, Chunk, Trips, chunks

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...study.compute import compute
-from ...study.part import Columns
-from ...study.store import Store
+from ...evaluation.study.chunk import Columns
+from ...evaluation.study.chunk_store import Store
+from ...evaluation.study.compute_chunks import compute
 from .chunk import Chunk
 
 PACKAGES = ("core", "paper")  # their code decides the numbers

@@ -8,17 +8,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ... import statistics as stats
-from ...statistics import Array, Interval
+from ...evaluation import statistics as stats
+from ...evaluation.statistics import Array, Interval
 from .. import published
 from ..functions import FUNCTIONS
 from ..published import BENCHMARK_COLUMNS, BENCHMARK_RUNS, BY_KEY
-from ..study.plan import (
-    EXCEPTION_FUNCTIONS,
-    EXCEPTIONS,
-    SWARM_READINGS,
-    benchmark_sample,
-)
+from ..study.plan import EXCEPTION_FUNCTIONS, EXCEPTIONS, SWARM_READINGS, benchmark_sample
 from ..study.run import Sample
 from .model import Cell, Entry, Grid, Ours, Section, Verdict, entry, inside
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ...core.errors import ConfigError
 from ...core.options import did_you_mean
-from ...core.world import Scenario
+from ...simulation.scenario import Scenario
 from ..study.chunk import Chunk
 from ..study.plan import Size, benchmark_plan, trip_plan
 from ..study.run import Sample

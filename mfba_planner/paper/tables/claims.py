@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ... import statistics as stats
 from ...core.geometry import distance
-from ...core.world import Scenario, step_clearances
-from ...statistics import Array, Comparison
+from ...evaluation import statistics as stats
+from ...evaluation.statistics import Array, Comparison
+from ...simulation.scenario import Scenario, step_clearances
 from .. import published
 from ..readings import PLANNERS
 from ..study.plan import LAWS, PLANNER_READINGS, trip_sample

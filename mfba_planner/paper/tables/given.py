@@ -6,11 +6,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ...core.gaps import gap_vector
 from ...core.geometry import distance
-from ...core.planner import PlannerParams
-from ...core.sensing import SensorParams
-from ...core.world import Scenario
+from ...perception.sensory_vector import SensorParams
+from ...planning.algorithm_1 import PlannerParams
+from ...planning.gap_vector import gap_vector
+from ...simulation.scenario import Scenario
 from .. import published
 from ..functions import FUNCTIONS, STEEPNESS
 from ..published import BY_KEY, Printed
@@ -22,7 +22,7 @@ TABLE_2_ROUNDING = 5e-5  # Fmin is printed with at most four decimals
 
 
 def gap_section() -> Section:
-    """Table 1 and the example of section 4.2, by core.gaps."""
+    """Table 1 and the example of section 4.2, by planning.gap_vector."""
     entries = []
     for printed in published.GAPS:
         a, b = (int(bit) for bit in printed.row.split("= ")[1].split())

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from ...statistics import Interval
+from ...evaluation.statistics import Interval
 from .. import doubts
 from ..published import Printed
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ... import statistics as stats
-from ...statistics import Array
+from ...evaluation import statistics as stats
+from ...evaluation.statistics import Array
 from .. import published
 from ..published import TRIP_RUNS, TRIP_TABLES, Printed
 from ..readings import PLANNERS

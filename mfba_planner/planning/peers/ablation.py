@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The predictive planner without one ingredient, as mfba_planner.planners.ablation:NAME."""
+"""The predictive planner without one ingredient, as mfba_planner.planning.peers.ablation:NAME."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from ..core.geometry import Point, wrap_angle
-from ..core.planner import NANO, Circle, Event, Observation, PlannerParams
-from ..core.sensing import SensorParams
-from .memory import MemoryParams
-from .prediction import Prediction, RiskParams, Way
-from .predictive import Predictive, PredictiveParams
-from .steering import Move
+from ...core.geometry import Point, wrap_angle
+from ...perception.obstacle_memory import MemoryParams
+from ...perception.sensory_vector import SensorParams
+from ..algorithm_1 import NANO, Circle, Event, Observation, PlannerParams
+from ..base_planner import Move
+from ..predictive import Predictive, PredictiveParams
+from ..trajectory_cost import Prediction, RiskParams, Way
 
 
 class BitsOnly(Predictive):

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from ..core.geometry import Point
-from ..core.planner import Event, Observation
-from .steering import Move, Steering
-from .surroundings import discs
+from ...core.geometry import Point
+from ..algorithm_1 import Event, Observation
+from ..base_planner import Move, Steering
+from .observed_circles import discs
 
 REPULSION = 0.3  # of the pull, at the distance where 1/d - 1/SR is 1 per metre
 NEAREST_M = 0.02  # gaps below this push no harder

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from ..core.geometry import Point
-from ..core.planner import NANO, Event, Observation
-from .steering import Move, Steering
-from .surroundings import discs
+from ...core.geometry import Point
+from ..algorithm_1 import NANO, Event, Observation
+from ..base_planner import Move, Steering
+from .observed_circles import discs
 
 HEADINGS, SPEEDS = 36, (1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0)
 HORIZON_S = 2.0

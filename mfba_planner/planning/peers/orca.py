@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import math
 
-from ..core.errors import ConfigError
-from ..core.geometry import Point
-from ..core.planner import NANO, Event, Observation, PlannerParams
-from ..core.sensing import SensorParams
-from .steering import Move, Steering
+from ...core.errors import ConfigError
+from ...core.geometry import Point
+from ...perception.sensory_vector import SensorParams
+from ..algorithm_1 import NANO, Event, Observation, PlannerParams
+from ..base_planner import Move, Steering
 
 HORIZON_S = 3.0
 MARGIN_M = 0.06

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from ..core.geometry import Point
-from ..core.planner import Observation
-from .steering import Move, Steering
+from ...core.geometry import Point
+from ..algorithm_1 import Observation
+from ..base_planner import Move, Steering
 
 
 class Straight(Steering):

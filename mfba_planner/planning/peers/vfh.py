@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from ..core.geometry import Point, bearing
-from ..core.planner import Event, Observation
-from .steering import Move, Steering
-from .surroundings import discs
+from ...core.geometry import Point, bearing
+from ..algorithm_1 import Event, Observation
+from ..base_planner import Move, Steering
+from .observed_circles import discs
 
 HEADINGS = 72
 MARGIN_M = 0.3  # added to every circle: it moves while the robot passes

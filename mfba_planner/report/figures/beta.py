@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mfba_planner.core.bat import BatParams, BatSwarm, Box, Schedule
+from mfba_planner.swarm.bat_swarm import BatParams, BatSwarm, Box, Schedule
 
 from .. import style
-from ..sheet import EDGE, Sheet
+from ..figure_canvas import EDGE, Sheet
 
 RHOS = (0.01, 0.5, 1.0, 3.0)
 HORIZON = 50

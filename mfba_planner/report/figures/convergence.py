@@ -12,13 +12,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 
-from mfba_planner.core.bat import Algorithm
 from mfba_planner.paper.convergence import READING, RUNS, Curve, curves
 from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.study.plan import SWARM_READINGS
+from mfba_planner.swarm.bat_swarm import Algorithm
 
 from .. import style
-from ..sheet import EDGE, Sheet
+from ..figure_canvas import EDGE, Sheet
 
 LAWS: dict[Algorithm, style.Looks] = {
     Algorithm.BA: {"color": style.VERMILLION, "linestyle": (0, (4, 1.5))},

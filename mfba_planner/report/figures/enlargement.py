@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from mfba_planner.core.geometry import Point
-from mfba_planner.core.world import Obstacle, Scenario
+from mfba_planner.simulation.scenario import Obstacle, Scenario
 
 from .. import style
-from ..scene import Z_MARK, line, patch
-from ..sheet import EDGE, Sheet
+from ..draw_scene import Z_MARK, line, patch
+from ..figure_canvas import EDGE, Sheet
 from .sketch import draw_obstacle, write
 
 WORLD = Scenario(

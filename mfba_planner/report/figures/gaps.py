@@ -8,14 +8,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
-from mfba_planner.core.gaps import gap_heading, gap_vector, nearest_free_gap
 from mfba_planner.core.geometry import bearing, towards
-from mfba_planner.core.sensing import Bits
+from mfba_planner.perception.sensory_vector import Bits
+from mfba_planner.planning.gap_vector import gap_heading, gap_vector, nearest_free_gap
 
 from .. import style
+from ..draw_scene import Z_MARK, Z_PATH, line, patch
+from ..figure_canvas import EDGE, Sheet
 from ..legend import Entry
-from ..scene import Z_MARK, Z_PATH, line, patch
-from ..sheet import EDGE, Sheet
 from .sketch import EXAMPLE, HERE, bare, draw_ring, example_vs, write
 
 _SIDE, _STRIP, _TALL = 4.2, 5.6, 2.0  # inches

@@ -6,9 +6,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from .core.episode import Episode, run
-from .paper import readings
-from .scenarios import load_scenario
+from ...paper import readings
+from ...scenarios.scenario_files import load_scenario
+from ...simulation.episode import Episode, run
 
 FIGURES = {
     "fig2": "beta of eq. 10 over the iterations, for several rho",
@@ -36,8 +36,8 @@ FORMATS = ("svg", "png")
 
 def render(name: str, forms: tuple[str, ...] = FORMATS) -> dict[str, bytes]:
     """One figure in several formats, {format: bytes}."""
-    from .report import style
-    from .report.sheet import to_bytes
+    from .. import style
+    from ..figure_canvas import to_bytes
 
     with style.context():
         figure = _draw(name)
@@ -53,6 +53,6 @@ def figure_run(name: str) -> Episode:
 def _draw(name: str) -> Any:
     if name in _MODULES:
         return import_module(f"mfba_planner.report.figures.{_MODULES[name]}").draw()
-    from .report.figures import trips
+    from . import trips
 
     return trips.draw(figure_run(name), _TITLES[name], _CHOICE)

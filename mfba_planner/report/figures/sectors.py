@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mfba_planner.core.geometry import Point, bearing, distance, tangent_half_angle, towards
-from mfba_planner.core.sensing import sense_circles, sensory_vector
+from mfba_planner.perception.sensory_vector import sense_circles, sensory_vector
 
 from .. import legend, style
-from ..scene import Z_TRACK, line
-from ..sheet import EDGE, Sheet
+from ..draw_scene import Z_TRACK, line
+from ..figure_canvas import EDGE, Sheet
 from .sketch import EXAMPLE, HERE, SENSOR, bare, draw_obstacle, draw_ring, example_vs, write
 
 _SIDE, _PANEL = 5.8, 2.7  # inches

@@ -16,8 +16,8 @@ from matplotlib.patches import Patch, Rectangle
 from mfba_planner.paper.sensitivity import CASES, LAWS, STATISTICS, Row
 
 from .. import style
-from ..sensitivity import pairs
-from ..sheet import EDGE, Sheet
+from ..figure_canvas import EDGE, Sheet
+from ..sensitivity_table import pairs
 
 # inches
 _WIDE, _TALL, _GAP, _LABELS, _HEAD, _FOOT = 0.45, 0.24, 0.18, 3.35, 1.5, 0.75

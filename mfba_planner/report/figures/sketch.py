@@ -10,12 +10,17 @@ from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
 from mfba_planner.core.geometry import Point, towards
-from mfba_planner.core.sensing import Bits, SensorParams, sense_circles, sensory_vector
-from mfba_planner.core.world import Obstacle, Scenario
+from mfba_planner.perception.sensory_vector import (
+    Bits,
+    SensorParams,
+    sense_circles,
+    sensory_vector,
+)
+from mfba_planner.simulation.scenario import Obstacle, Scenario
 
 from .. import style
-from ..ring import Ring
-from ..scene import Z_MARK, Z_OBSTACLE, Z_RING, draw_sectors, line, patch
+from ..draw_scene import Z_MARK, Z_OBSTACLE, Z_RING, draw_sectors, line, patch
+from ..sector_ring import Ring
 
 SENSOR = SensorParams()
 HERE: Point = (0.0, 0.0)

@@ -11,16 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mfba_planner.core.episode import Episode
 from mfba_planner.core.errors import InputError
-from mfba_planner.core.metrics import Result, evaluate, within_range
-from mfba_planner.core.planner import Mode
+from mfba_planner.evaluation.metrics import Result, evaluate, within_range
+from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.simulation.episode import Episode
 
-from .. import legend, style, words
-from ..moments import closest_passes
-from ..sheet import EDGE, Sheet
-from ..snapshot import draw_snapshot
-from ..view import View, choose_view
+from .. import format_values, legend, style
+from ..draw_tick import draw_snapshot
+from ..figure_canvas import EDGE, Sheet
+from ..run_events import closest_passes
+from ..view_bounds import View, choose_view
 
 # inches
 _SIDE, _GAP, _TITLE, _HEAD, _AXIS = 3.3, 0.45, 0.42, 0.7, 0.45
@@ -45,7 +45,9 @@ def scenes(episode: Episode) -> list[Scene]:
     """
     modes = [tick.mode for tick in episode.ticks]
     if Mode.OBSTACLE_AVOIDANCE not in modes:
-        raise InputError(f"{words.run_title(episode)}: avoids no obstacle; give a run that does")
+        raise InputError(
+            f"{format_values.run_title(episode)}: avoids no obstacle; give a run that does"
+        )
     first = modes.index(Mode.OBSTACLE_AVOIDANCE)
     length = sum(1 for _ in takewhile(lambda m: m is Mode.OBSTACLE_AVOIDANCE, modes[first:]))
     found = [Scene(first // 2, "nothing within SR")]
@@ -58,7 +60,7 @@ def scenes(episode: Episode) -> list[Scene]:
     after = first + length
     if after < len(modes) - 1:
         found.append(Scene(after, "back to path generation"))
-    return [*found, Scene(len(modes) - 1, words.outcome(evaluate(episode)))]
+    return [*found, Scene(len(modes) - 1, format_values.outcome(evaluate(episode)))]
 
 
 def _obstacles(numbers: Sequence[int]) -> str:
@@ -128,14 +130,14 @@ def _caption(
     sheet.text(left, y, f"({letter})", fontweight="bold")
     sheet.text(left + 0.3, y, moment.caption)
     right = left + _SIDE
-    sheet.text(right, y, words.number(time_s, 1, "s"), ha="right", color=style.QUIET)
+    sheet.text(right, y, format_values.number(time_s, 1, "s"), ha="right", color=style.QUIET)
 
 
 def _facts(sheet: Sheet, left: float, top: float, result: Result) -> None:
     rows = (
-        ("length", words.length(result)),
-        ("time", words.time(result)),
-        ("min clearance", words.clearance(result)),
+        ("length", format_values.length(result)),
+        ("time", format_values.time(result)),
+        ("min clearance", format_values.clearance(result)),
         ("collisions", str(result.collisions)),
     )
     for row, (name, value) in enumerate(rows):

@@ -13,20 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import Episode
-from mfba_planner.core.jump import carried_off
-from mfba_planner.core.metrics import evaluate, tick_clearances, within_range
-from mfba_planner.core.motion import Motion
 from mfba_planner.core.options import walk
-from mfba_planner.core.planner import Mode, PlannerParams
-from mfba_planner.core.sensing import Bits, SensorParams
-from mfba_planner.core.world import velocity_at
-from mfba_planner.report import words
-from mfba_planner.report.moments import closest_passes
-from mfba_planner.report.ring import ring_of
-from mfba_planner.report.table import result_rows
-from mfba_planner.report.view import View, choose_view
+from mfba_planner.evaluation.metrics import evaluate, tick_clearances, within_range
+from mfba_planner.perception.sensory_vector import Bits, SensorParams
+from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.planning.odometry_jump import carried_off
+from mfba_planner.report import format_values
+from mfba_planner.report.result_table import result_rows
+from mfba_planner.report.run_events import closest_passes
+from mfba_planner.report.sector_ring import ring_of
+from mfba_planner.report.view_bounds import View, choose_view
+from mfba_planner.simulation.batched_motion import Motion
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.scenario import velocity_at
 
 MOST_RUNS = 6  # side by side
 MOST_ROBOTS = 36  # of a fleet in one scene: as many lines can be told apart
@@ -59,7 +59,7 @@ def pages_data(
     return {
         "version": version,
         "fleet": is_fleet,
-        "modes": [{"key": mode.value, "label": words.MODES[mode]} for mode in _MODES],
+        "modes": [{"key": mode.value, "label": format_values.MODES[mode]} for mode in _MODES],
         "runs": [
             run_data(name, episode, view, obstacle_names(name, episode, roster), times_s)
             for (name, episode), view in zip(runs, shared)
@@ -102,9 +102,9 @@ def run_data(
     ring = ring_of(episode, next((tick.vs for tick in episode.ticks if tick.vs), ()))
     return {
         "name": name,
-        "title": words.run_title(episode),
+        "title": format_values.run_title(episode),
         "success": result.success,
-        "outcome": words.outcome(result),
+        "outcome": format_values.outcome(result),
         "world": {
             "name": episode.scenario.name,
             "description": episode.scenario.description,
@@ -119,7 +119,7 @@ def run_data(
         "reach": episode.sensor.sensing_range_m,
         "wedges": [ring.wedge(i) for i in range(ring.count)],
         "gap_headings": ring.gaps,
-        "bits": words.bits(ring.of_headings),
+        "bits": format_values.bits(ring.of_headings),
         "reasons": reasons,
         "ticks": {
             "time": [episode.time_s(tick.stamp_ns) for tick in episode.ticks],

@@ -13,10 +13,10 @@ from pathlib import Path
 from string import Template
 
 from mfba_planner import __version__
-from mfba_planner.core.episode import Episode
 from mfba_planner.core.errors import InputError
-from mfba_planner.outputs import write_new
-from mfba_planner.report import words
+from mfba_planner.core.outputs import write_new
+from mfba_planner.report import format_values
+from mfba_planner.simulation.episode import Episode
 
 from .charts import charts, look
 from .data import MOST_ROBOTS, MOST_RUNS, MOST_TICKS, in_one_scene, pages_data, world_name
@@ -46,7 +46,7 @@ def page(runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = ()) -> str
     names = ", ".join(dict.fromkeys(worlds))
     script = "\n".join(_own(f"{name}.js") for name in _SCRIPTS)
     return Template(_own("page.html")).substitute(
-        title=escape(words.one_line(names, 80)),
+        title=escape(format_values.one_line(names, 80)),
         policy=_policy(script),
         style=_own("page.css"),
         data=as_json(

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.paper.tables.model import Cell, Section
-from mfba_planner.statistics import Interval
 
 from .text import Origin
 

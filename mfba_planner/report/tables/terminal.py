@@ -13,7 +13,7 @@ from rich.text import Text
 
 from mfba_planner.paper.tables.model import Entry, Grid, Section, Verdict
 
-from ..console import print_encodable
+from ..terminal_output import print_encodable
 from . import markdown, text
 from .text import Origin
 

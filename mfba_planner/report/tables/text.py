@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mfba_planner import __version__
+from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.paper.tables.model import Cell, Entry, Grid, Section, Verdict
-from mfba_planner.statistics import Interval
 
 NOTHING = "–"
 

@@ -9,18 +9,18 @@ from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 
-from ..core.episode import World
-from ..core.errors import InputError
-from ..core.geometry import Point
-from ..messages import stamp_ns, told
-from ..node_settings import WorldSimSettings
+from ...core.errors import InputError
+from ...core.geometry import Point
+from ...recording.messages import stamp_ns, told
+from ...simulation.episode import World
+from ..runtime.command_matching import Answers
+from ..runtime.command_timeout import Deadman
+from ..runtime.node_runtime import GraphNode, Refusals
+from ..runtime.polled_subscriptions import Letter, Letterboxes
 from . import topics
-from .answers import Answers
-from .deadman import Deadman
-from .letterboxes import Letter, Letterboxes
-from .namespaced import Namespaced
-from .runtime import GraphNode, Refusals
-from .serialized import header_stamp_ns
+from .node_parameters import WorldSimSettings
+from .robot_namespace import Namespaced
+from .serialized_message import header_stamp_ns
 
 REST: Point = (0.0, 0.0)
 

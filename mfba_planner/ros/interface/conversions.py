@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core's values as messages; mfba_planner/messages.py holds the other direction."""
+"""The core's values as messages; mfba_planner/recording/messages.py holds the other direction."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
-from ..core.episode import Outcome
-from ..core.geometry import Point, Pose2D, half_turn
-from ..core.jump import carried_off
-from ..core.planner import Decision, Mode
-from ..core.robot import Base
-from ..core.sensing import Bits, Ranges, Scan, SensorParams, longest_range_m
-from ..messages import SECOND_NS, bits_text, body_velocity, points_text, rotated
+from ...core.geometry import Point, Pose2D, half_turn
+from ...perception.sensory_vector import Bits, Ranges, Scan, SensorParams, longest_range_m
+from ...planning.algorithm_1 import Decision, Mode
+from ...planning.odometry_jump import carried_off
+from ...recording.messages import SECOND_NS, bits_text, body_velocity, points_text, rotated
+from ...simulation.episode import Outcome
+from ...simulation.robot_model import Base
 from .health import Status
 
 OMNIDIRECTIONAL = Base()

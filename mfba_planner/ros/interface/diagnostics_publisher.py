@@ -6,11 +6,11 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from ..core.planner import NANO
-from ..node_settings import PlannerSettings, VirtualSensorSettings
-from . import convert, topics
+from ...planning.algorithm_1 import NANO
+from ..runtime.node_runtime import GraphNode
+from . import conversions, topics
 from .health import Status
-from .runtime import GraphNode
+from .node_parameters import PlannerSettings, VirtualSensorSettings
 
 
 class DiagnosticTopic:
@@ -44,7 +44,7 @@ class DiagnosticTopic:
         gist = [status.gist for status in statuses]
         if news or gist != self._last_gist or self.is_due(now_s):
             self._last_gist, self._last_ns = gist, self._stamp(now_s)
-            message = convert.diagnostics_msg(
+            message = conversions.diagnostics_msg(
                 statuses, self._who, self._hardware_id, self._last_ns
             )
             self._publisher.publish(message)

@@ -9,16 +9,16 @@ from typing import Any
 
 from rclpy.serialization import serialize_message
 
-from ..core.episode import Episode, Outcome
-from ..core.planner import Decision
-from ..core.sensing import sense_circles, sensory_vector
-from ..recording.configuration import attach_configuration
-from ..recording.writer import BagWriter
-from ..run_config import Driver, RunConfig, node_parameters, run_facts
-from ..scenarios import scenario_to_json
-from . import convert, topics
-from .qos import offered
-from .serialized import type_name
+from ...perception.sensory_vector import sense_circles, sensory_vector
+from ...planning.algorithm_1 import Decision
+from ...recording.bag_writer import BagWriter
+from ...recording.configuration import attach_configuration
+from ...scenarios.run_config import Driver, RunConfig, node_parameters, run_facts
+from ...scenarios.scenario_files import scenario_to_json
+from ...simulation.episode import Episode, Outcome
+from . import conversions, topics
+from .qos_conversion import offered
+from .serialized_message import type_name
 
 _FRAME, _BASE = "odom", "base_link"
 _SAID = (
@@ -65,16 +65,16 @@ def _messages(episode: Episode) -> Iterator[tuple[int, topics.Topic, Any]]:
     if not episode.ticks:
         return
     first, last = episode.ticks[0].stamp_ns, episode.ticks[-1].stamp_ns
-    goal = convert.pose_stamped_msg(episode.scenario.goal_m, first, _FRAME)
+    goal = conversions.pose_stamped_msg(episode.scenario.goal_m, first, _FRAME)
     yield first, topics.GOAL_POSE, goal
-    yield first, topics.OUTCOME, convert.outcome_msg(None, 0)
+    yield first, topics.OUTCOME, conversions.outcome_msg(None, 0)
     velocity = (0.0, 0.0)
     for tick in episode.ticks:
         for topic, message in _tick_messages(episode, tick, velocity):
             yield tick.stamp_ns, topic, message
         velocity = tick.velocity
     if episode.outcome is not Outcome.INTERRUPTED:
-        yield last, topics.OUTCOME, convert.outcome_msg(episode.outcome, len(episode.ticks))
+        yield last, topics.OUTCOME, conversions.outcome_msg(episode.outcome, len(episode.ticks))
 
 
 def _tick_messages(
@@ -84,16 +84,16 @@ def _tick_messages(
     scenario, stamp, time_s = episode.scenario, tick.stamp_ns, episode.time_s(tick.stamp_ns)
     circles = scenario.enlarged(time_s)
     ranges = tick.ranges_m or sense_circles(tick.pose.position, circles, episode.sensor)
-    yield topics.CLOCK, convert.clock_msg(stamp)
-    yield topics.OBSTACLES, convert.obstacles_msg([c for c, _ in circles], stamp, _FRAME)
-    yield topics.ODOM, convert.odometry_msg(tick.pose, velocity, stamp, _FRAME, _BASE)
+    yield topics.CLOCK, conversions.clock_msg(stamp)
+    yield topics.OBSTACLES, conversions.obstacles_msg([c for c, _ in circles], stamp, _FRAME)
+    yield topics.ODOM, conversions.odometry_msg(tick.pose, velocity, stamp, _FRAME, _BASE)
     yield (
         topics.SECTORS,
-        convert.sectors_msg(ranges, episode.sensor, scenario.robot_radius_m, stamp, _FRAME),
+        conversions.sectors_msg(ranges, episode.sensor, scenario.robot_radius_m, stamp, _FRAME),
     )
-    yield topics.SENSORY_VECTOR, convert.sensory_vector_msg(sensory_vector(ranges))
-    yield topics.PLAN, convert.plan_msg(tick, _FRAME)
+    yield topics.SENSORY_VECTOR, conversions.sensory_vector_msg(sensory_vector(ranges))
+    yield topics.PLAN, conversions.plan_msg(tick, _FRAME)
     law = episode.label
-    yield topics.DECISION, convert.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
-    yield topics.GOAL_STEP, convert.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
-    yield topics.CMD_VEL, convert.twist_msg(tick, scenario.robot, episode.planner.tick_ns)
+    yield topics.DECISION, conversions.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
+    yield topics.GOAL_STEP, conversions.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
+    yield topics.CMD_VEL, conversions.twist_msg(tick, scenario.robot, episode.planner.tick_ns)

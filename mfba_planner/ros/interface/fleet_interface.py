@@ -5,14 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..core.episode import Outcome, World
-from ..core.fleet import Fleet
-from ..core.geometry import Point
-from ..core.world import Scenario
-from ..node_settings import WorldSimSettings
-from . import convert, topics
-from .runtime import GraphNode, Refusals
-from .seat import Seat
+from ...core.geometry import Point
+from ...simulation.episode import Outcome, World
+from ...simulation.fleet import Fleet
+from ...simulation.scenario import Scenario
+from ..runtime.node_runtime import GraphNode, Refusals
+from . import conversions, topics
+from .node_parameters import WorldSimSettings
+from .robot_interface import Seat
 
 
 class Alone:
@@ -88,7 +88,7 @@ class Company:
 
     def publish_again(self, stamp_ns: int) -> None:
         """Publish the present tick to those who have not answered it."""
-        self._time.publish(convert.clock_msg(stamp_ns))
+        self._time.publish(conversions.clock_msg(stamp_ns))
         # In real time a robot that has arrived must see on: its planner would call it blind.
         for seat in self._asked.values() if self._settings.lockstep else self.seats:
             if not seat.answered:

@@ -8,12 +8,12 @@ from typing import Any
 
 from std_srvs.srv import Trigger
 
-from ..core.errors import InputError
-from ..core.geometry import Point, Pose2D
-from ..messages import goal_point, waypoint_points
+from ...core.errors import InputError
+from ...core.geometry import Point, Pose2D
+from ...recording.messages import goal_point, waypoint_points
+from ..runtime.goal_queue import Errands
+from ..runtime.node_runtime import GraphNode, Refusals
 from . import topics
-from .errands import Errands
-from .runtime import GraphNode, Refusals
 
 
 class Goals:

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import NamedTuple
 
-from ..core.planner import Decision, Mode
-from ..core.recovery import Phase
+from ...planning.algorithm_1 import Decision, Mode
+from ...planning.recovery import Phase
 
 WINDOW = 20  # messages over which a rate is taken
 

@@ -13,11 +13,11 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..core.episode import World
-from ..core.geometry import Point, bearing, towards
-from ..core.planner import NANO, Decision, Mode
-from ..core.sensing import Ranges
-from .convert import pose_msg, set_header
+from ...core.geometry import Point, bearing, towards
+from ...perception.sensory_vector import Ranges
+from ...planning.algorithm_1 import NANO, Decision, Mode
+from ...simulation.episode import World
+from .conversions import pose_msg, set_header
 
 Rgba = tuple[float, float, float, float]
 

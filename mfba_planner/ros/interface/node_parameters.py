@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from .core.options import check, option
-from .core.planner import PlannerParams
-from .core.robot import Base, Robot
-from .core.world import Scenario
+from ...core.options import check, option
+from ...planning.algorithm_1 import PlannerParams
+from ...simulation.robot_model import Base, Robot
+from ...simulation.scenario import Scenario
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
 _WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause lets it go"

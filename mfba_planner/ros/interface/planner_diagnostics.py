@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import time
 
-from ..core.guarded import Guarded
-from ..core.planner import Decision
-from ..messages import points_text
-from ..node_settings import PlannerSettings
-from .diagnostic_topic import DiagnosticTopic
-from .errands import Errands
+from ...planning.algorithm_1 import Decision
+from ...planning.supervised_planner import Guarded
+from ...recording.messages import points_text
+from ..runtime.goal_queue import Errands
+from ..runtime.node_runtime import GraphNode, Refusals
+from .diagnostics_publisher import DiagnosticTopic
 from .health import Health, driving
-from .runtime import GraphNode, Refusals
+from .node_parameters import PlannerSettings
 
 
 class PlannerHealth:

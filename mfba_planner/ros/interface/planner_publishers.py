@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 
 from geometry_msgs.msg import Twist, TwistStamped
 
-from ..core.geometry import Point
-from ..core.jump import carried_off
-from ..core.planner import Decision, Mode
-from ..node_settings import PlannerSettings
-from . import convert, markers, topics
-from .runtime import GraphNode
+from ...core.geometry import Point
+from ...planning.algorithm_1 import Decision, Mode
+from ...planning.odometry_jump import carried_off
+from ..runtime.node_runtime import GraphNode
+from . import conversions, markers, topics
+from .node_parameters import PlannerSettings
 
 
 class PlannerTopics:
@@ -42,8 +42,8 @@ class PlannerTopics:
         if decision.mode is Mode.STOPPED or carried_off(decision.reason):
             self._log.warning(decision.reason, throttle_duration_sec=1.0)
         frame = self._settings.odom_frame
-        self._plan.publish(convert.plan_msg(decision, frame))
-        reason = convert.decision_msg(decision, algorithm, refused, self._who, more)
+        self._plan.publish(conversions.plan_msg(decision, frame))
+        reason = conversions.decision_msg(decision, algorithm, refused, self._who, more)
         self._decision.publish(reason)
         if self._view.due(decision.stamp_ns):
             self._markers.publish(markers.decision_markers(decision, frame, self.reach_m))
@@ -51,20 +51,22 @@ class PlannerTopics:
     def move(self, decision: Decision) -> None:
         """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
         s, stamp, tick_ns = self._settings, decision.stamp_ns, self._tick_ns()
-        self._goal_step.publish(convert.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame))
+        self._goal_step.publish(
+            conversions.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame)
+        )
         if s.enable_stamped_cmd_vel:
-            twist = convert.twist_stamped_msg(decision, s.base_frame, s, tick_ns)
+            twist = conversions.twist_stamped_msg(decision, s.base_frame, s, tick_ns)
             self._cmd_vel.publish(twist)
         else:
-            self._cmd_vel.publish(convert.twist_msg(decision, s, tick_ns))
+            self._cmd_vel.publish(conversions.twist_msg(decision, s, tick_ns))
 
     def halt(self, place: Point, stamp_ns: int) -> None:
         """Command rest, here, without having decided anything."""
         s = self._settings
-        self._goal_step.publish(convert.pose_stamped_msg(place, stamp_ns, s.odom_frame))
+        self._goal_step.publish(conversions.pose_stamped_msg(place, stamp_ns, s.odom_frame))
         if s.enable_stamped_cmd_vel:
             rest = TwistStamped()
-            convert.set_header(rest.header, stamp_ns, s.base_frame)
+            conversions.set_header(rest.header, stamp_ns, s.base_frame)
             self._cmd_vel.publish(rest)
         else:
             self._cmd_vel.publish(Twist())

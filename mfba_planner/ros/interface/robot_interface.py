@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..core.episode import Outcome, World
-from ..core.geometry import Point
-from ..core.world import Scenario
-from ..node_settings import WorldSimSettings
-from .answer_topics import AnswerTopics
-from .namespaced import Namespaced
-from .runtime import GraphNode, Refusals
-from .world_topics import WorldTopics
+from ...core.geometry import Point
+from ...simulation.episode import Outcome, World
+from ...simulation.scenario import Scenario
+from ..runtime.node_runtime import GraphNode, Refusals
+from .command_subscriptions import AnswerTopics
+from .node_parameters import WorldSimSettings
+from .robot_namespace import Namespaced
+from .world_publishers import WorldTopics
 
 
 class Seat:

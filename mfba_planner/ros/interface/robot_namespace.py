@@ -10,8 +10,8 @@ from typing import Any
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
-from .letterboxes import Deliver, Letterboxes
-from .runtime import GraphNode
+from ..runtime.node_runtime import GraphNode
+from ..runtime.polled_subscriptions import Deliver, Letterboxes
 from .topics import GRAPH, Topic
 
 

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from ..core.errors import InputError
-from ..core.planner import Observation, PlannerParams
-from ..core.sensing import Scan, aligned
-from ..messages import laser_scan, stamp_ns
+from ...core.errors import InputError
+from ...perception.sensory_vector import Scan, aligned
+from ...planning.algorithm_1 import Observation, PlannerParams
+from ...recording.messages import laser_scan, stamp_ns
+from ..runtime.node_runtime import GraphNode, Refusals
+from ..runtime.stamp_pairing import StampPairs
 from . import topics
-from .pairing import StampPairs
-from .runtime import GraphNode, Refusals
 
 
 class Sight:

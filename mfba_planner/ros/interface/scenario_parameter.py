@@ -5,17 +5,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..core.world import Scenario
-from ..node_settings import Rig
-from ..scenarios import load_scenario, scenario_to_json
-from . import params
-from .runtime import GraphNode
+from ...scenarios.scenario_files import load_scenario, scenario_to_json
+from ...simulation.scenario import Scenario
+from ..runtime.node_runtime import GraphNode
+from . import parameters
+from .node_parameters import Rig
 
 
 def declare_scenario(node: GraphNode, source: str) -> Scenario:
     """Load a scenario, declare its robot's options and state the whole; ConfigError if bad."""
     scenario = load_scenario(source)
-    rig = params.declare(node, Rig(robot=scenario.robot), read_only=True)
+    rig = parameters.declare(node, Rig(robot=scenario.robot), read_only=True)
     scenario = replace(scenario, robot=rig.robot)
-    params.state(node, "scenario_json", scenario_to_json(scenario), "scenario in full")
+    parameters.state(node, "scenario_json", scenario_to_json(scenario), "scenario in full")
     return scenario

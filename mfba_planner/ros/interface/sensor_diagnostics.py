@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import time
 
-from ..node_settings import VirtualSensorSettings
-from .diagnostic_topic import DiagnosticTopic
+from ..runtime.node_runtime import GraphNode, Refusals
+from ..runtime.stale_inputs import watch_period_s
+from .diagnostics_publisher import DiagnosticTopic
 from .health import Health
-from .inputs import watch_period_s
-from .runtime import GraphNode, Refusals
+from .node_parameters import VirtualSensorSettings
 
 
 class SensorHealth:

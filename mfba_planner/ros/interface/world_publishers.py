@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import replace
 
-from ..core.episode import Outcome, World
-from ..core.geometry import Point, towards
-from ..core.robot import Robot
-from ..node_settings import WorldSimSettings
-from . import convert, markers, topics
-from .namespaced import Namespaced
-from .runtime import GraphNode
+from ...core.geometry import Point, towards
+from ...simulation.episode import Outcome, World
+from ...simulation.robot_model import Robot
+from ..runtime.node_runtime import GraphNode
+from . import conversions, markers, topics
+from .node_parameters import WorldSimSettings
+from .robot_namespace import Namespaced
 
 TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is shown
 
@@ -49,12 +49,12 @@ class WorldTopics:
     def begin(self, goal: Point, stamp_ns: int) -> None:
         """A run begins: where it leads to, and that it is under way."""
         self._path.clear()
-        self._goal.publish(convert.pose_stamped_msg(goal, stamp_ns, self._frame))
-        self._outcome.publish(convert.outcome_msg(None, 0))
+        self._goal.publish(conversions.pose_stamped_msg(goal, stamp_ns, self._frame))
+        self._outcome.publish(conversions.outcome_msg(None, 0))
 
     def end(self, outcome: Outcome, ticks: int) -> None:
         """A run has ended."""
-        self._outcome.publish(convert.outcome_msg(outcome, ticks))
+        self._outcome.publish(conversions.outcome_msg(outcome, ticks))
 
     def tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
         """One tick under one stamp; odom completes the sensor's pair, views can wait."""
@@ -66,20 +66,22 @@ class WorldTopics:
                 towards((0.0, 0.0), reading.pose.yaw, world.speeds.v),
                 world.speeds.omega,
             )
-        odom = convert.odometry_msg(
+        odom = conversions.odometry_msg(
             reading.pose, velocity, stamp_ns, frame, self._base_frame, turn
         )
-        self._obstacles.publish(convert.obstacles_msg(centers, stamp_ns, frame))
+        self._obstacles.publish(conversions.obstacles_msg(centers, stamp_ns, frame))
         if self._tf:
             self._tf.publish(markers.tf_msg(odom))
         if self._truth:
             self._truth.publish(
-                convert.odometry_msg(world.pose, velocity, stamp_ns, frame, self._base_frame, turn)
+                conversions.odometry_msg(
+                    world.pose, velocity, stamp_ns, frame, self._base_frame, turn
+                )
             )
         if self._scan and reading.scan:
-            self._scan.publish(convert.scan_msg(reading.scan, stamp_ns, self._scan_frame))
+            self._scan.publish(conversions.scan_msg(reading.scan, stamp_ns, self._scan_frame))
         self._odom.publish(odom)
         if self._view.due(stamp_ns):
             self._path.append(world.pose.position)
-            self._trail.publish(convert.path_msg(list(self._path), stamp_ns, frame))
+            self._trail.publish(conversions.path_msg(list(self._path), stamp_ns, frame))
             self._markers.publish(markers.world_markers(world, stamp_ns, frame))

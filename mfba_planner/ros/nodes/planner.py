@@ -6,21 +6,21 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from ..core.errors import InputError
-from ..core.geometry import Pose2D
-from ..core.planner import NANO, Decision, Mode, PlannerParams, observe
-from ..core.recovery import Phase
-from ..messages import robot_pose, sector_ranges, stamp_ns
-from ..node_settings import PlannerSettings, names
-from ..planners.method import brain
-from . import params, topics
-from .goals import Goals
-from .inputs import Lockstep, Newest, Ready, watch_period_s
-from .managed import ManagedNode
-from .planner_health import PlannerHealth
-from .planner_topics import PlannerTopics
-from .runtime import Refusals, spin_node
-from .sight import Sight
+from ...core.errors import InputError
+from ...core.geometry import Pose2D
+from ...planning.algorithm_1 import NANO, Decision, Mode, PlannerParams, observe
+from ...planning.planner_factory import brain
+from ...planning.recovery import Phase
+from ...recording.messages import robot_pose, sector_ranges, stamp_ns
+from ..interface import parameters, topics
+from ..interface.goal_subscriptions import Goals
+from ..interface.node_parameters import PlannerSettings, names
+from ..interface.planner_diagnostics import PlannerHealth
+from ..interface.planner_publishers import PlannerTopics
+from ..interface.scan_sync import Sight
+from ..runtime.lifecycle_node import ManagedNode
+from ..runtime.node_runtime import Refusals, spin_node
+from ..runtime.stale_inputs import Lockstep, Newest, Ready, watch_period_s
 
 
 class PlannerNode(ManagedNode):
@@ -29,9 +29,9 @@ class PlannerNode(ManagedNode):
     def __init__(self, **kwargs: Any) -> None:
         """Raise ConfigError for a parameter that cannot be accepted."""
         super().__init__(topics.PLANNER, **kwargs)
-        self.settings = s = params.declare(self, PlannerSettings(), read_only=True)
-        self.brain = brain(params.declare(self, PlannerParams()), seed=s.seed)
-        params.follow(self, lambda: self.brain.params, self._set_params)
+        self.settings = s = parameters.declare(self, PlannerSettings(), read_only=True)
+        self.brain = brain(parameters.declare(self, PlannerParams()), seed=s.seed)
+        parameters.follow(self, lambda: self.brain.params, self._set_params)
         self._refusals = Refusals(self)
         self.goals = Goals(self, s.odom_frame, self._refusals, self._is_over, self._set_out)
         params_now = self.brain.params

@@ -14,22 +14,22 @@ from rclpy.executors import Executor
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMsg
 
-from ..core.errors import ConfigError
-from ..messages import stamp_ns
-from ..node_settings import RecorderSettings, names
-from ..outputs import new_run_directory
-from ..recording.configuration import attach_configuration
-from ..recording.qos import OfferedQos
-from ..recording.schemas import definition_of
-from ..recording.writer import BagWriter
-from . import params, topics
-from .drain import drain
-from .letterboxes import Deliver, Letter, Letterboxes
-from .namespaced import everywhere
-from .qos import offered
-from .runtime import GraphNode, spin_node
-from .serialized import has_header, header_stamp_ns, type_name
-from .survey import Found, ParameterSurvey
+from ...core.errors import ConfigError
+from ...core.outputs import new_run_directory
+from ...recording.bag_writer import BagWriter
+from ...recording.configuration import attach_configuration
+from ...recording.message_definitions import definition_of
+from ...recording.messages import stamp_ns
+from ...recording.qos_profiles import OfferedQos
+from ..interface import parameters, topics
+from ..interface.node_parameters import RecorderSettings, names
+from ..interface.qos_conversion import offered
+from ..interface.robot_namespace import everywhere
+from ..interface.serialized_message import has_header, header_stamp_ns, type_name
+from ..runtime.drain import drain
+from ..runtime.node_runtime import GraphNode, spin_node
+from ..runtime.parameter_client import Found, ParameterSurvey
+from ..runtime.polled_subscriptions import Deliver, Letter, Letterboxes
 
 EMPTY_PERIOD_S = 0.02  # far below what a crash may cost, and a hundred times a message's cost
 
@@ -40,7 +40,7 @@ class Recorder(GraphNode):
     def __init__(self, **kwargs: Any) -> None:
         """Raise ConfigError or OutputError for what cannot be accepted or written."""
         super().__init__(topics.RECORDER, **kwargs)
-        self.settings = s = params.declare(self, RecorderSettings(), read_only=True)
+        self.settings = s = parameters.declare(self, RecorderSettings(), read_only=True)
         self._facts = _facts(s.run)
         self._log_time_ns = self._tick_before_ns = 0
         self._held: list[tuple[str, bytes]] = []

@@ -9,9 +9,9 @@ from typing import Any
 from rclpy.executors import Executor
 from std_srvs.srv import Trigger
 
-from .player import Phase, Player
-from .replay_args import ReplaySettings, parse, split_ros_args
-from .runtime import SPIN_S, GraphNode, spin_node
+from ..replaying.bag_player import Phase, Player
+from ..replaying.replay_arguments import ReplaySettings, parse, split_ros_args
+from ..runtime.node_runtime import SPIN_S, GraphNode, spin_node
 
 FINE_S = 0.0015  # an executor wakes up late: so long before a message is due it is left
 

@@ -7,9 +7,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ..core.errors import InputError
-from ..core.geometry import Point, Pose2D
-from ..core.sensing import (
+from ...core.errors import InputError
+from ...core.geometry import Point, Pose2D
+from ...perception.sensory_vector import (
     Ranges,
     Scan,
     SensorParams,
@@ -17,13 +17,13 @@ from ..core.sensing import (
     sense_scan,
     sensory_vector,
 )
-from ..messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
-from ..node_settings import Source, VirtualSensorSettings, names
-from . import params, topics
-from .convert import sectors_msg, sensory_vector_msg
-from .pairing import StampPairs
-from .runtime import GraphNode, Refusals, spin_node
-from .sensor_health import SensorHealth
+from ...recording.messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
+from ..interface import parameters, topics
+from ..interface.conversions import sectors_msg, sensory_vector_msg
+from ..interface.node_parameters import Source, VirtualSensorSettings, names
+from ..interface.sensor_diagnostics import SensorHealth
+from ..runtime.node_runtime import GraphNode, Refusals, spin_node
+from ..runtime.stamp_pairing import StampPairs
 
 _DEFAULT_RADII = [0.3]
 
@@ -34,10 +34,10 @@ class VirtualSensor(GraphNode):
     def __init__(self, **kwargs: Any) -> None:
         """Raise ConfigError for a parameter that cannot be accepted."""
         super().__init__(topics.VIRTUAL_SENSOR, **kwargs)
-        self.settings = s = params.declare(self, VirtualSensorSettings(), read_only=True)
-        self.sensor = params.declare(self, SensorParams())
-        self.radii = params.declare_radii(self, _DEFAULT_RADII)
-        params.follow(self, lambda: self.sensor, self._set_sensor)
+        self.settings = s = parameters.declare(self, VirtualSensorSettings(), read_only=True)
+        self.sensor = parameters.declare(self, SensorParams())
+        self.radii = parameters.declare_radii(self, _DEFAULT_RADII)
+        parameters.follow(self, lambda: self.sensor, self._set_sensor)
         self._refusals = Refusals(self)
         self._by_stamp = s.lockstep or s.source is Source.OBSTACLES
         self._start_afresh()

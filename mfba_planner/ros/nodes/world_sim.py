@@ -12,16 +12,16 @@ from typing import Any
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from std_srvs.srv import SetBool, Trigger
 
-from ..core.episode import stamp_of
-from ..core.errors import ConfigError, InputError
-from ..core.planner import NANO
-from ..messages import pose2d
-from ..node_settings import WorldSimSettings, names
-from . import params, topics
-from .company import Company
-from .pace import Pace
-from .runtime import GraphNode, Refusals, spin_node
-from .world_params import declare_scenario
+from ...core.errors import ConfigError, InputError
+from ...planning.algorithm_1 import NANO
+from ...recording.messages import pose2d
+from ...simulation.episode import stamp_of
+from ..interface import parameters, topics
+from ..interface.fleet_interface import Company
+from ..interface.node_parameters import WorldSimSettings, names
+from ..interface.scenario_parameter import declare_scenario
+from ..runtime.node_runtime import GraphNode, Refusals, spin_node
+from ..runtime.tick_control import Pace
 
 
 class WorldSim(GraphNode):
@@ -30,7 +30,7 @@ class WorldSim(GraphNode):
     def __init__(self, **kwargs: Any) -> None:
         """Raise ConfigError for a scenario or parameter that cannot be accepted."""
         super().__init__(topics.WORLD_SIM, **kwargs)
-        self.settings = s = params.declare(self, WorldSimSettings(), read_only=True)
+        self.settings = s = parameters.declare(self, WorldSimSettings(), read_only=True)
         self.scenario = declare_scenario(self, s.scenario)
         if s.run_on and self.scenario.robots:
             raise ConfigError("parameter run_on=True: a fleet's run ends; give false")

@@ -10,16 +10,16 @@ from enum import Enum, auto
 
 from rclpy.event_handler import PublisherEventCallbacks
 
-from ..core.errors import ConfigError, GraphError
-from ..recording.reader import BagReader
-from ..recording.timeline import UNKNOWN_DEPTH, Due, Schedule, begin_ns, due_messages
-from . import topics
-from .convert import clock_msg
-from .flow import FlowControl, all_acknowledged, windowed
-from .replay_args import ReplaySettings
-from .replay_topics import awaited, choose
-from .replay_wait import Awaited
-from .runtime import SPIN_S, GraphNode
+from ...core.errors import ConfigError, GraphError
+from ...recording.bag_reader import BagReader
+from ...recording.replay_schedule import UNKNOWN_DEPTH, Due, Schedule, begin_ns, due_messages
+from ..interface import topics
+from ..interface.conversions import clock_msg
+from ..runtime.node_runtime import SPIN_S, GraphNode
+from .flow_control import FlowControl, all_acknowledged, windowed
+from .reader_readiness import Awaited
+from .replay_arguments import ReplaySettings
+from .topic_selection import awaited, choose
 
 BURST = 50  # messages that may follow each other before services and signals are looked at
 POLL_S = 0.002  # between two looks at what others have to do

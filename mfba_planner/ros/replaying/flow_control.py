@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
-from ..core.errors import GraphError
+from ...core.errors import GraphError
 
 WINDOW = 5  # messages of a topic on their way: half of what a reader holds by default
 HOLD_S = 0.1  # longest delay for the sake of a latched message, where timing counts

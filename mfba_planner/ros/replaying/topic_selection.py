@@ -10,12 +10,13 @@ from typing import Any
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from ..core.errors import ConfigError, InputError
-from ..recording.metadata import BagTopic
-from ..recording.schemas import definition_of
-from ..recording.timeline import offer
-from . import qos, topics
-from .replay_args import ReplaySettings, known
+from ...core.errors import ConfigError, InputError
+from ...recording.bag_metadata import BagTopic
+from ...recording.message_definitions import definition_of
+from ...recording.replay_schedule import offer
+from ..interface import qos_conversion as qos
+from ..interface import topics
+from .replay_arguments import ReplaySettings, known
 
 Resolve = Callable[[str], str]
 

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from ..core.planner import NANO
-from ..node_settings import WorldSimSettings
+from ...planning.algorithm_1 import NANO
+from ..interface.node_parameters import WorldSimSettings
 
 TICKS = 1.25  # a Twist is meant for a tick: that long it always holds
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..core.geometry import Point, distance
+from ...core.geometry import Point, distance
 
 
 class Errands:

@@ -8,7 +8,7 @@ from typing import Any
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
-from .runtime import GraphNode
+from .node_runtime import GraphNode
 
 
 class ManagedNode(GraphNode, LifecycleNodeMixin):

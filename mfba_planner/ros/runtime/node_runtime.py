@@ -21,10 +21,10 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-from ..core.errors import FrameError, StampError
-from . import params
-from .letterboxes import Deliver, Letterboxes, Once
-from .topics import Topic, expected_readers, reading_qos
+from ...core.errors import FrameError, StampError
+from ..interface import parameters
+from ..interface.topics import Topic, expected_readers, reading_qos
+from .polled_subscriptions import Deliver, Letterboxes, Once
 
 SPIN_S = 0.1  # longest time until a signal is noticed
 
@@ -183,7 +183,7 @@ class GraphNode(Node):
 
         The last thing a node does to get going: what it was told in vain is named here.
         """
-        params.warn_of_unknown(self)
+        parameters.warn_of_unknown(self)
         self._peers = peers
         self.create_service(Trigger, "~/ready", self._on_ready)
 

@@ -11,8 +11,8 @@ from typing import Any
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
-from . import params
-from .runtime import GraphNode
+from ..interface import parameters
+from .node_runtime import GraphNode
 
 PERIOD_S = 0.05
 ASK_AGAIN_S = 1.0  # an answer can get lost while a server still looks for its client
@@ -65,4 +65,4 @@ class ParameterSurvey:
 
     def _on_values(self, name: str, listed: list[str], future: Any) -> None:
         values = map(parameter_value_to_python, future.result().values)
-        self.found[name] = {key: params.plain(value) for key, value in zip(listed, values)}
+        self.found[name] = {key: parameters.plain(value) for key, value in zip(listed, values)}

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..core.errors import StampError
-from ..core.geometry import Pose2D
-from ..core.planner import Refused
-from ..core.sensing import Ranges
-from .pairing import StampPairs
+from ...core.errors import StampError
+from ...core.geometry import Pose2D
+from ...perception.sensory_vector import Ranges
+from ...planning.algorithm_1 import Refused
+from .stamp_pairing import StampPairs
 
 
 def watch_period_s(timeout_s: float, *, lockstep: bool) -> float:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import Any, Generic, TypeVar
 
-from ..core.errors import StampError
+from ...core.errors import StampError
 
 A = TypeVar("A")
 B = TypeVar("B")

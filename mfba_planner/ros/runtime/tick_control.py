@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from ..core.errors import GraphError
-from ..node_settings import WorldSimSettings
+from ...core.errors import GraphError
+from ..interface.node_parameters import WorldSimSettings
 
 
 class Pace:

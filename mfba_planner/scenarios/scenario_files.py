@@ -12,12 +12,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .core.errors import ConfigError
-from .core.geometry import Point
-from .core.options import did_you_mean, override
-from .core.robot import Robot
-from .core.world import Kidnapping, Member, Obstacle, Scenario, Turn, Walls
-from .resources import scenario_names, scenario_path
+from ..core.errors import ConfigError
+from ..core.geometry import Point
+from ..core.options import did_you_mean, override
+from ..core.resources import scenario_names, scenario_path
+from ..simulation.robot_model import Robot
+from ..simulation.scenario import Kidnapping, Member, Obstacle, Scenario, Turn, Walls
 
 EXAMPLE = "compare config/scenarios/case1.yaml"
 LIMIT = 1e6  # no number in a scenario is larger
@@ -63,7 +63,7 @@ def parse_scenario(text: str, origin: str) -> Scenario:
     try:
         with suppress(_UnusualError):
             return _as_written(data)
-        from .scenario_model import checked
+        from .yaml_schema import checked
 
         return checked(data)
     except ConfigError as error:
@@ -74,7 +74,7 @@ def _plain(text: str, origin: str) -> Any:
     """What the text holds; JSON first, since YAML reads some of JSON's escapes differently."""
     with suppress(ValueError, RecursionError):
         return json.loads(text)
-    from .scenario_model import from_yaml
+    from .yaml_schema import from_yaml
 
     return from_yaml(text, origin)
 
@@ -101,7 +101,10 @@ def scenario_to_json(scenario: Scenario) -> str:
 
 
 def robot_of(told: dict[str, Any]) -> Robot:
-    """The robot of a scenario: options of core.robot, nested or with dots; ConfigError if bad."""
+    """The robot of a scenario: simulation.robot_model's options, nested or with dots.
+
+    Raises ConfigError for a bad one.
+    """
     try:
         return override(Robot(), dict(_dotted(told)))
     except ConfigError as error:

@@ -139,7 +139,7 @@ DECISION = Topic(
     every_tick=True,
 )
 OUTCOME = Topic(
-    # "running", then how it ended (core.episode.Outcome) and after how many ticks
+    # "running", then how it ended (simulation.episode.Outcome) and after how many ticks
     name="outcome",
     type=DiagnosticStatus,
     writers=(WORLD_SIM,),
