@@ -19,11 +19,11 @@ from planners import arrangement
 from stepwise_dwa import StepwiseDwa
 
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.types import Observation, PathPlanner
 from mfba_planner.evaluation.sweep.run_sweep import sweep
 from mfba_planner.evaluation.sweep.sweep_spec import Order
 from mfba_planner.evaluation.sweep.worker import Lost, each
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Observation, PathPlanner
 from mfba_planner.planning.planner_registry import make
 
 COUNTS = (1, 3, 10, 30, 100, 300, 1000)

@@ -18,7 +18,7 @@ from mfba_planner.evaluation.sweep.columns import Row, judged
 from mfba_planner.evaluation.sweep.run_sweep import open_store, sweep
 from mfba_planner.evaluation.sweep.summary import Standing, Versus, standings, versus
 from mfba_planner.evaluation.sweep.sweep_spec import Order, Setting
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
 
 ORACLE = ("core", "oracle", "worlds")  # their code decides the optima

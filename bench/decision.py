@@ -19,9 +19,11 @@ import numpy as np
 
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.random_streams import stream
-from mfba_planner.planning.algorithm_1 import Mode, Observation, Planner, PlannerParams
+from mfba_planner.core.types import Mode, Observation
+from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.run_episode import run
 from mfba_planner.swarm.bat_swarm import BatParams
 
 BUDGET_US = 200.0

@@ -16,10 +16,11 @@ from pathlib import Path
 
 from mfba_planner.core.options import override
 from mfba_planner.evaluation.metrics import evaluate
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Episode, run
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.run_episode import run
 
 MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
 

@@ -21,13 +21,13 @@ from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.options import flatten
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.configuration import attach_configuration
 from mfba_planner.ros.interface.conversions import decision_msg, sectors_msg, set_stamp
 from mfba_planner.scenarios.run_config import RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.run_episode import run
 
 MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
 

@@ -19,13 +19,14 @@ import numpy as np
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.statistics import share_interval
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Planner, PlannerParams
+from mfba_planner.planning.algorithm_1 import Planner
 from mfba_planner.planning.peers.orca import Orca
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import Predictive, PredictiveParams, preset
 from mfba_planner.planning.trajectory_cost import RiskParams
-from mfba_planner.simulation.episode import Look, Outcome, look, look_at_scan
+from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import MakeBrain, run_fleet
-from mfba_planner.simulation.planner_observations import Perception
+from mfba_planner.simulation.planner_observations import Look, Perception, look, look_at_scan
 from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.scenario import Member, Scenario
 

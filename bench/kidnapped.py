@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from mfba_planner.core.geometry import distance
+from mfba_planner.core.types import NANO
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.ros_domain import claim_domain
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import NANO, Method, PlannerParams, Swarm
 from mfba_planner.planning.odometry_jump import carried_off
-from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.scenarios.run_config import Driver, RunConfig
@@ -31,6 +31,7 @@ from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
 from mfba_planner.simulation.scenario import Kidnapping, Scenario
+from mfba_planner.simulation.simulate import simulate
 
 ROOM_M, CLEAR_M = 12.0, 0.1
 AHEAD = replace(preset(), method=Method.PREDICTIVE)

@@ -32,11 +32,12 @@ from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.planner_factory import simulate
 from mfba_planner.scenarios.run_config import Driver, RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.simulation.scenario import Obstacle, Scenario, Walls
+from mfba_planner.simulation.obstacle_motion import Obstacle, Walls
+from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.simulation.simulate import simulate
 from mfba_planner.verification.verify_bag import verify
 
 

@@ -19,10 +19,11 @@ from pathlib import Path
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 from mfba_planner.core.geometry import distance
+from mfba_planner.core.types import NANO
 from mfba_planner.launcher.graph_monitor import Monitor, Question
 from mfba_planner.launcher.node_processes import Crew
 from mfba_planner.launcher.ros_domain import private_domain
-from mfba_planner.planning.algorithm_1 import NANO, PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.ros.interface.topics import RECORDER
 from mfba_planner.scenarios.run_config import NODES, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario

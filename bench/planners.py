@@ -18,7 +18,8 @@ import numpy as np
 from decision import FREE, decisions, measure
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.planning.algorithm_1 import Circle, Mode, Observation, PlannerParams
+from mfba_planner.core.types import Circle, Mode, Observation
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
 from mfba_planner.planning.predictive import preset
 

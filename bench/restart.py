@@ -16,11 +16,11 @@ import numpy as np
 from by_hand import ByHand
 
 from mfba_planner.paper import readings
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.run_episode import run
 from mfba_planner.verification.verify_bag import verify
 
 

@@ -7,9 +7,10 @@ import time
 from dataclasses import replace
 from typing import Any
 
+from mfba_planner.core.types import Decision, Observation
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Decision, Observation, PlannerParams
 from mfba_planner.planning.peers.straight_line import Straight
+from mfba_planner.planning.planner_params import PlannerParams
 
 GOOD_TICKS = 5
 

@@ -10,8 +10,8 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.perception.sensory_vector import Ranges, SensorParams
-from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.core.types import Mode, Ranges
+from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.conversions import odometry_msg, pose_stamped_msg, sectors_msg
 from mfba_planner.ros.nodes.planner import PlannerNode

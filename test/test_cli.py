@@ -15,7 +15,7 @@ from launching import PROGRAM, ROOT, complete
 from mfba_planner import __version__, cli
 from mfba_planner.entry_points import guarded_main
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.run_episode import run
 
 Said = pytest.CaptureFixture[str]
 

@@ -14,7 +14,7 @@ from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, OutputError
 from mfba_planner.recording.tick_table import COLUMNS
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation import episode
+from mfba_planner.simulation import run_episode
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def expected_rows() -> list[dict[str, Any]]:
     """The table of the same run, from the core's episode."""
-    ticks = episode.run(load_scenario("case2"), seed=4).ticks
+    ticks = run_episode.run(load_scenario("case2"), seed=4).ticks
     return [
         {
             "stamp_ns": t.stamp_ns,

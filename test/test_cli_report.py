@@ -12,7 +12,8 @@ from mfba_planner import cli
 from mfba_planner.entry_points import guarded_main
 from mfba_planner.report.result_json import result_to_dict, write_result
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Episode, run
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.run_episode import run
 
 Said = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parents[1]

@@ -19,7 +19,7 @@ from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
 from mfba_planner.evaluation.sweep import chunks as parts
 from mfba_planner.evaluation.sweep.run_sweep import sweep
 from mfba_planner.evaluation.sweep.sweep_spec import Order, Setting
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
 

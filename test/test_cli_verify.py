@@ -11,7 +11,7 @@ from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, OutputError
 from mfba_planner.report.result_json import result_to_dict, write_result
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation import episode
+from mfba_planner.simulation import run_episode
 from mfba_planner.simulation.decision_digest import digest
 
 
@@ -20,21 +20,21 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(tmp_path_factory.mktemp("cli") / "bag", "case1", 2)
 
 
-EXPECTED = digest(episode.run(load_scenario("case1"), seed=2).ticks)
+EXPECTED = digest(run_episode.run(load_scenario("case1"), seed=2).ticks)
 
 
 def test_digest_of_a_bag_and_of_a_result(
     bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     result = tmp_path / "result.json"
-    write_result(result, result_to_dict(episode.run(load_scenario("case1"), seed=2)))
+    write_result(result, result_to_dict(run_episode.run(load_scenario("case1"), seed=2)))
     assert cli.main(["digest", str(bag), str(result)]) == 0
     assert capsys.readouterr().out == f"{EXPECTED}  {bag}\n{EXPECTED}  {result}\n"
 
 
 def test_a_result_without_digest_is_refused(tmp_path: Path) -> None:
     result = tmp_path / "result.json"
-    data = result_to_dict(episode.run(load_scenario("case1")))
+    data = result_to_dict(run_episode.run(load_scenario("case1")))
     del data["digest"]
     result.write_text(json.dumps(data))
     with pytest.raises(Exception, match="digest is missing; give a result"):
@@ -43,7 +43,7 @@ def test_a_result_without_digest_is_refused(tmp_path: Path) -> None:
 
 def test_verify_an_honest_bag(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["verify", str(bag), "--closed-loop"]) == 0
-    ticks = len(episode.run(load_scenario("case1"), seed=2).ticks)
+    ticks = len(run_episode.run(load_scenario("case1"), seed=2).ticks)
     assert capsys.readouterr().out == (
         f"identical, {ticks} decisions, digest {EXPECTED}\nclosed loop: identical, {ticks} ticks\n"
     )

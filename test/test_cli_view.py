@@ -16,7 +16,8 @@ from mfba_planner.launcher.run_arguments import read_order
 from mfba_planner.report.html.data import clearances
 from mfba_planner.report.rerun_viewer import save
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Episode, run
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.run_episode import run
 
 RERUN = Path(sys.executable).parent / "rerun"
 ROWS = re.compile(r"^Chunk\(\w+\) with (\d+) rows .*? - (/\S+)", re.MULTILINE)

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.planning.algorithm_1 import Decision, Mode
+from mfba_planner.core.types import Decision, Mode
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation import episode
+from mfba_planner.simulation import run_episode
 from mfba_planner.simulation.decision_digest import HEAD, canonical, digest
 
 SAMPLE = Decision(
@@ -112,5 +112,5 @@ def test_what_the_bats_tried_is_not_a_decision() -> None:
 )
 def test_the_case_studies_keep_their_digests(scenario: str, expected: str) -> None:
     """A change here is a change of what everybody's planner decides: say so in the CHANGELOG."""
-    ticks = episode.run(load_scenario(scenario), seed=1).ticks
+    ticks = run_episode.run(load_scenario(scenario), seed=1).ticks
     assert digest(ticks) == expected

@@ -10,12 +10,18 @@ from trips import post, trip
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.types import Mode, Observation
 from mfba_planner.evaluation.metrics import Result, evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
-from mfba_planner.planning.algorithm_1 import Method, Mode, Observation, Planner, PlannerParams
+from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Episode, Outcome, World, advance, run, sense, stamp_of
-from mfba_planner.simulation.scenario import Obstacle, Scenario
+from mfba_planner.simulation.episode import Episode, Outcome, stamp_of
+from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.planner_observations import sense
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.simulation.world import World, advance
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams
 
 STRAIGHT = 12.0 * math.sqrt(2.0)  # 16.9706 m

@@ -10,8 +10,8 @@ from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.evaluation.suites import suite
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
-from mfba_planner.simulation.episode import World
 from mfba_planner.simulation.nearby_obstacles import FEW
+from mfba_planner.simulation.world import World
 
 SR_M = 0.8
 

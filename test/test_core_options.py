@@ -13,7 +13,7 @@ from mfba_planner.core import errors
 from mfba_planner.core.errors import ConfigError, MfbaError
 from mfba_planner.core.options import Spec, check, did_you_mean, flatten, option, override, walk
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, Bounds
 
 

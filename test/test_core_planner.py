@@ -13,23 +13,19 @@ from hypothesis import strategies as st
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
 from mfba_planner.core.random_streams import stream
+from mfba_planner.core.types import Decision, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.paper import readings
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import (
-    Decision,
-    Event,
-    Mode,
-    Observation,
-    Planner,
-    PlannerParams,
-    Swarm,
-    decide,
-    transition,
-)
+from mfba_planner.planning.algorithm_1 import Planner, decide
+from mfba_planner.planning.mode_transitions import Event, transition
+from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Outcome, World, run, sense
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.planner_observations import sense
+from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.simulation.world import World
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, Bounds, Schedule
 
 FREE = (math.inf,) * 12

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.options import override
+from mfba_planner.core.types import Decision, Mode, Observation
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
-from mfba_planner.planning.algorithm_1 import Decision, Mode, Observation, Planner, PlannerParams
+from mfba_planner.planning.algorithm_1 import Planner
 from mfba_planner.planning.planner_factory import brain
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.recovery import (
     Phase,
     Recovery,

@@ -12,16 +12,11 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Point, Pose2D
 from mfba_planner.core.random_streams import stream
+from mfba_planner.core.types import Observation
 from mfba_planner.planning import algorithm_1 as module
-from mfba_planner.planning.algorithm_1 import (
-    FEW,
-    Observation,
-    Planner,
-    PlannerParams,
-    Swarm,
-    fly_together,
-)
+from mfba_planner.planning.algorithm_1 import FEW, Planner, fly_together
 from mfba_planner.planning.path_generation import Start, Step, fresh_step, fresh_steps
+from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.swarm.bat_swarm import BatParams, Bounds, Disc, Schedule, minimize
 
 FREE = (math.inf,) * 12

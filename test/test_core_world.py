@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point
-from mfba_planner.simulation.scenario import (
+from mfba_planner.simulation.contact import step_clearances
+from mfba_planner.simulation.obstacle_motion import (
     Obstacle,
-    Scenario,
     Turn,
     Walls,
     bounce_times,
     center_at,
-    step_clearances,
     velocity_at,
 )
+from mfba_planner.simulation.scenario import Scenario
 
 ROOM = Walls(lower_m=(-2.0, 1.0), upper_m=(4.0, 6.0))
 RADII = st.floats(0.05, 1.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mfba_planner.core.options import walk
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.recovery import RecoveryParams, longest_s
 from mfba_planner.ros.interface.node_parameters import PlannerSettings, WorldSimSettings
 

@@ -10,12 +10,15 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, carried, distance
-from mfba_planner.planning.algorithm_1 import Decision, Mode, PlannerParams
+from mfba_planner.core.types import Decision, Mode
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario, scenario_to_json
 from mfba_planner.simulation.differential_drive import Speeds, arc, brake, command, obey, track
-from mfba_planner.simulation.episode import Outcome, World, run
+from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.robot_model import Base, Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.simulation.world import World
 
 TICK_NS = 100_000_000
 ORIGIN = Pose2D(0.0, 0.0)

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, closest_approach, distance
+from mfba_planner.core.types import Decision, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Decision, Method, Mode, Observation, PlannerParams
-from mfba_planner.planning.planner_factory import simulate_fleet
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.planner_registry import make
 from mfba_planner.planning.predictive import preset
 from mfba_planner.planning.speed_limit import CautionParams
@@ -27,18 +27,15 @@ from mfba_planner.recording.read_episode import read_episode, read_recording
 from mfba_planner.report.result_json import read_result
 from mfba_planner.scenarios.scenario_files import load_scenario, scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.simulation.episode import Outcome, World, run
+from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import Fleet, alone, run_fleet, seed_of, way
+from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at
 from mfba_planner.simulation.planner_observations import Perception
 from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
-from mfba_planner.simulation.scenario import (
-    Kidnapping,
-    Member,
-    Obstacle,
-    Scenario,
-    Walls,
-    center_at,
-)
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Kidnapping, Member, Scenario
+from mfba_planner.simulation.simulate import simulate_fleet
+from mfba_planner.simulation.world import World
 
 TICK_NS = PlannerParams().tick_ns
 

@@ -25,8 +25,9 @@ from mfba_planner.scenarios.scenario_files import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.fleet import run_fleet
+from mfba_planner.simulation.obstacle_motion import Obstacle, center_at
 from mfba_planner.simulation.robot_model import Noise, Robot
-from mfba_planner.simulation.scenario import Member, Obstacle, Scenario, center_at
+from mfba_planner.simulation.scenario import Member, Scenario
 from mfba_planner.verification.verify_bag import verify
 
 # b has arrived long before the others; odometry errs, so that truth is recorded as well.

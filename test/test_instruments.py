@@ -12,24 +12,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Pose2D, distance
+from mfba_planner.core.types import Mode
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.in_process import run_in_process
-from mfba_planner.perception.sensory_vector import (
-    SensorParams,
-    sense_circles,
-    sense_scan,
-    sensory_vector,
-)
-from mfba_planner.planning.algorithm_1 import Mode, Planner, PlannerParams
-from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.perception.scan_to_sectors import sense_scan
+from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
+from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.scenarios.run_config import Driver, RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Outcome, World, look, sense
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.obstacle_motion import Walls
+from mfba_planner.simulation.planner_observations import look, sense
 from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
-from mfba_planner.simulation.scenario import Scenario, Walls
+from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.simulation.sensor_noise import Instruments
+from mfba_planner.simulation.simulate import simulate
 from mfba_planner.simulation.simulated_lidar import cast_walls, rays, scan_at
+from mfba_planner.simulation.world import World
 
 TICK_NS = 100_000_000
 ROOM = Walls(lower_m=(-2.0, -1.0), upper_m=(3.0, 4.0))

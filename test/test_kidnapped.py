@@ -14,12 +14,14 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, distance
+from mfba_planner.core.types import Mode, observe
 from mfba_planner.evaluation.metrics import assess, evaluate, tick_clearances
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Method, Mode, Planner, PlannerParams, Swarm, observe
+from mfba_planner.planning.algorithm_1 import Planner
 from mfba_planner.planning.odometry_jump import carried_off
-from mfba_planner.planning.planner_factory import brain, simulate
+from mfba_planner.planning.planner_factory import brain
+from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
@@ -29,9 +31,12 @@ from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
 from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario, scenario_to_json
-from mfba_planner.simulation.episode import Episode, Outcome, run
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.robot_model import Drive
-from mfba_planner.simulation.scenario import Kidnapping, Obstacle, Scenario
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Kidnapping, Scenario
+from mfba_planner.simulation.simulate import simulate
 from mfba_planner.verification.verify_bag import verify
 
 KIDNAPPED = load_scenario("kidnapped")

@@ -17,7 +17,7 @@ from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.core.options import flatten
 from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, REPLAY_ARGUMENTS, replayed, robot
 from mfba_planner.launcher.simulate_launch import ARGUMENTS, told_by_launch
-from mfba_planner.planning.algorithm_1 import Method, PlannerParams
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.ros.interface.node_parameters import Source
 from mfba_planner.ros.nodes.planner import PlannerNode

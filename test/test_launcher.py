@@ -9,14 +9,14 @@ from launching import Program, complete
 
 from mfba_planner.core.options import override
 from mfba_planner.launcher.run_arguments import read_order
-from mfba_planner.planning.algorithm_1 import Method, PlannerParams
-from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios import scenario_files
-from mfba_planner.simulation import episode
+from mfba_planner.simulation import episode, run_episode
+from mfba_planner.simulation.simulate import simulate
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -55,7 +55,7 @@ def test_multi_process_run_is_the_core_s(tmp_path: Path, scenario: str, algorith
         "run.png",
     ]
     params = override(PlannerParams(), {"bat.algorithm": algorithm})
-    expected = episode.run(scenario_files.load_scenario(scenario), planner=params, seed=3)
+    expected = run_episode.run(scenario_files.load_scenario(scenario), planner=params, seed=3)
     check_bag(run / "bag", expected)
     assert (run / "run.png").read_bytes().startswith(PNG)
     result = json.loads((run / "result.json").read_text())
@@ -98,7 +98,7 @@ def test_two_launchers_at_once_do_not_meet(tmp_path: Path) -> None:
     episodes = [read_episode(run / "bag") for run in sorted((tmp_path / "runs").iterdir())]
     found = {recorded.scenario.name: recorded.ticks for recorded in episodes}
     assert found == {
-        name: episode.run(scenario_files.load_scenario(name), seed=seed).ticks
+        name: run_episode.run(scenario_files.load_scenario(name), seed=seed).ticks
         for name, seed in (("case1", 1), ("case2", 2))
     }
 

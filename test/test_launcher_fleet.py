@@ -16,7 +16,6 @@ from mfba_planner.core.errors import ConfigError
 from mfba_planner.launcher import node_processes
 from mfba_planner.launcher.run_arguments import MOST_ROBOTS, read_order
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.planner_factory import simulate_fleet
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
 from mfba_planner.recording.read_episode import read_recording
@@ -25,7 +24,9 @@ from mfba_planner.scenarios.scenario_files import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import run_fleet
-from mfba_planner.simulation.scenario import Member, Obstacle, Scenario
+from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.scenario import Member, Scenario
+from mfba_planner.simulation.simulate import simulate_fleet
 
 PROCESSES = ["--driver", "multi-process", "--no-picture", "--out", "run"]
 PAPER = ["--planner", "paper"]

@@ -29,7 +29,7 @@ from mfba_planner.launcher.run_directory import RunDirectory
 from mfba_planner.launcher.set_option import option_rows
 from mfba_planner.launcher.stop_request import StoppedError, StopRequest
 from mfba_planner.paper import readings
-from mfba_planner.planning.algorithm_1 import Method, PlannerParams
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario

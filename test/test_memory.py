@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Point
+from mfba_planner.core.types import Circle
 from mfba_planner.perception.obstacle_memory import Memory, MemoryParams
-from mfba_planner.planning.algorithm_1 import Circle
 
 SECOND = 10**9
 RANGE_M = 0.8

@@ -10,12 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trips import SECOND, post, trip
 
+from mfba_planner.core.types import Mode
 from mfba_planner.evaluation import metrics
 from mfba_planner.evaluation.metrics import Tally, assess, conduct, evaluate
-from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Episode, run
-from mfba_planner.simulation.scenario import Obstacle, Scenario
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
 
 
 def mover(center: tuple[float, float], degrees: float, speed: float = 1.0) -> Obstacle:

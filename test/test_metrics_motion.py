@@ -9,14 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mfba_planner.simulation.batched_motion import Motion
-from mfba_planner.simulation.scenario import (
-    Obstacle,
-    Scenario,
-    Turn,
-    Walls,
-    center_at,
-    step_clearances,
-)
+from mfba_planner.simulation.contact import step_clearances
+from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls, center_at
+from mfba_planner.simulation.scenario import Scenario
 
 ROOM = Walls(lower_m=(-2.0, 1.0), upper_m=(4.0, 6.0))
 SPEEDS, HEADINGS = st.floats(0.0, 3.0), st.floats(-10.0, 10.0)

@@ -14,10 +14,10 @@ from std_srvs.srv import Trigger
 from talk import FREE, GOAL, LOCKSTEP, NAN, Talk, fields, goal, mode, odom, sectors
 
 from mfba_planner.core.options import override
+from mfba_planner.core.types import Mode
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings
-from mfba_planner.planning.algorithm_1 import Mode
 from mfba_planner.recording.messages import decision as read_decision
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.conversions import path_msg

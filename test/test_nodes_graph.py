@@ -9,7 +9,7 @@ from graph import Graph
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.conversions import pose_stamped_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
@@ -18,7 +18,7 @@ from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
 from mfba_planner.scenarios.run_config import NODES, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.run_episode import run
 
 # The table of the design: name, type, who writes, who reads (besides the recorder), latched.
 TABLE = [

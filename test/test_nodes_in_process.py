@@ -12,12 +12,12 @@ from graph import Graph
 
 from mfba_planner.core.errors import GraphError
 from mfba_planner.core.options import override
+from mfba_planner.core.types import NANO, Mode
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.paper import readings
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import NANO, Method, Mode, PlannerParams
-from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.messages import stamp_ns
 from mfba_planner.recording.read_episode import read_episode
@@ -28,8 +28,10 @@ from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
 from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation import episode
-from mfba_planner.simulation.episode import Outcome, World
+from mfba_planner.simulation import episode, run_episode
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.simulate import simulate
+from mfba_planner.simulation.world import World
 from mfba_planner.verification.verify_bag import verify
 
 
@@ -98,7 +100,7 @@ def test_the_planner_that_predicts(scenario: str, tmp_path: Path, domain_id: int
     recorded = run_and_compare(told, tmp_path / "bag", domain_id)
     result = evaluate(recorded)
     assert result.success
-    others = episode.run(paper.scenario, planner=paper.planner, seed=1)
+    others = run_episode.run(paper.scenario, planner=paper.planner, seed=1)
     assert result.length_m <= evaluate(others).length_m + paper.planner.goal_tolerance_m
     report = verify(tmp_path / "bag")
     assert report.is_identical, report.faults
@@ -121,7 +123,7 @@ def test_a_run_can_be_ended_early(tmp_path: Path, domain_id: int) -> None:
     assert recorded.outcome is Outcome.INTERRUPTED
     count = len(recorded.ticks)
     assert 10 <= count < 30
-    assert recorded.ticks == episode.run(told.scenario).ticks[:count]
+    assert recorded.ticks == run_episode.run(told.scenario).ticks[:count]
 
 
 def test_a_run_that_takes_too_long_is_a_clear_error(tmp_path: Path, domain_id: int) -> None:
@@ -165,7 +167,7 @@ def test_a_loop_of_stamped_twists(graph: Graph) -> None:
     world = start_loop(graph, "case2", 6, enable_stamped_cmd_vel=True)
     world.resume()
     run_to_the_end(graph, world)
-    expected = episode.run(load_scenario("case2"), seed=6).ticks
+    expected = run_episode.run(load_scenario("case2"), seed=6).ticks
     assert modes_of(decisions) == [tick.mode for tick in expected]
     assert world.world.pose == expected[-1].pose
 
@@ -177,7 +179,7 @@ def test_a_robot_that_looks_elsewhere_takes_the_same_way(graph: Graph, yaw: floa
     teleport(graph, 0.0, 0.0, yaw)
     world.resume()
     run_to_the_end(graph, world)
-    expected = episode.run(load_scenario("case2"), seed=6).ticks
+    expected = run_episode.run(load_scenario("case2"), seed=6).ticks
     assert modes_of(decisions) == [tick.mode for tick in expected]
     assert world.world.pose == pytest.approx((*expected[-1].pose.position, yaw), abs=1e-6)
 
@@ -214,7 +216,7 @@ def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph)
     second = graph.start(PlannerNode, told["planner"])
     run_to_the_end(graph, world)
     assert second._refusals.count == 0
-    expected = episode.run(load_scenario("case2"), seed=7).ticks
+    expected = run_episode.run(load_scenario("case2"), seed=7).ticks
     assert left_at < len(expected) - 5, "it was restarted too late to say anything"
     assert [stamp_ns(message.header.stamp) for message in decisions] == [
         tick.stamp_ns for tick in expected

@@ -10,7 +10,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from std_srvs.srv import Trigger
 from talk import FREE, GOAL, LOCKSTEP, Talk, fields, goal, mode, odom, sectors
 
-from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.core.types import Mode
 from mfba_planner.recording.messages import decision as read_decision
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.nodes.planner import PlannerNode

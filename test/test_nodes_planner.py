@@ -29,15 +29,9 @@ from talk import (
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
-from mfba_planner.planning.algorithm_1 import (
-    NANO,
-    Decision,
-    Mode,
-    Observation,
-    Planner,
-    PlannerParams,
-    Swarm,
-)
+from mfba_planner.core.types import NANO, Decision, Mode, Observation
+from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.recording.messages import decision as read_decision
 from mfba_planner.recording.messages import stamp_ns
 from mfba_planner.ros.interface import topics

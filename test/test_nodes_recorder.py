@@ -18,8 +18,9 @@ from std_srvs.srv import Trigger
 
 from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.options import flatten
+from mfba_planner.core.types import Mode
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
 from mfba_planner.recording.message_definitions import definition_of
@@ -41,7 +42,7 @@ from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
 from mfba_planner.scenarios.run_config import NODES
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation import episode
+from mfba_planner.simulation import episode, run_episode
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +61,7 @@ def in_bag(topic: topics.Topic) -> str:
 
 
 def test_there_is_one_message_per_tick(bag: Path) -> None:
-    ticks = len(episode.run(load_scenario("case2"), seed=9).ticks)
+    ticks = len(run_episode.run(load_scenario("case2"), seed=9).ticks)
     found = counts(bag)
     for topic in topics.GRAPH:
         if topic.every_tick:

@@ -16,13 +16,9 @@ from std_msgs.msg import Header
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.perception.sensory_vector import (
-    Scan,
-    SensorParams,
-    sense_circles,
-    sense_scan,
-    sensory_vector,
-)
+from mfba_planner.core.types import Scan
+from mfba_planner.perception.scan_to_sectors import sense_scan
+from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
 from mfba_planner.recording.messages import stamp_ns
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.conversions import obstacles_msg, odometry_msg, time_msg

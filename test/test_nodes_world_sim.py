@@ -18,7 +18,8 @@ from graph import Graph
 from std_srvs.srv import SetBool, Trigger
 
 from mfba_planner.core.errors import ConfigError, GraphError
-from mfba_planner.planning.algorithm_1 import NANO, PlannerParams
+from mfba_planner.core.types import NANO
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.messages import robot_pose, stamp_ns, velocity
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.conversions import pose_msg, pose_stamped_msg, set_header

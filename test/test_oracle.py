@@ -26,17 +26,13 @@ from mfba_planner.evaluation.oracle.polyline import FAR_M, gaps, lengths, one_wa
 from mfba_planner.evaluation.oracle.solution import Waypoint
 from mfba_planner.evaluation.oracle.tangent_search import SearchParams
 from mfba_planner.evaluation.suites import suite
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Outcome, run
-from mfba_planner.simulation.scenario import (
-    Obstacle,
-    Scenario,
-    Turn,
-    Walls,
-    center_at,
-    step_clearances,
-)
+from mfba_planner.simulation.contact import step_clearances
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls, center_at
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.simulation.uniform_segments import uniform_legs
 
 ROOM = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 12.0))

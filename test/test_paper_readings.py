@@ -8,9 +8,9 @@ from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.options import override
 from mfba_planner.evaluation.metrics import Result, evaluate
 from mfba_planner.paper import readings
-from mfba_planner.planning.algorithm_1 import PlannerParams, Swarm
+from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.run_episode import run
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams
 
 SEEDS = 200  # of the 1000 that the full claim is made of

@@ -21,13 +21,13 @@ from mfba_planner.paper import sensitivity
 from mfba_planner.paper.sensitivity import CASES, Reading, Row, Variation, turned
 from mfba_planner.paper.study.run import Sample
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report import style
 from mfba_planner.report.figure_canvas import to_bytes
 from mfba_planner.report.figures.sensitivity import draw
 from mfba_planner.report.sensitivity_table import to_csv, to_markdown, to_table
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.run_episode import run
 
 SCENARIOS = {case: load_scenario(case) for case in CASES}
 BASE, *OTHERS = sensitivity.all_readings()

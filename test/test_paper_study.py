@@ -20,8 +20,8 @@ from mfba_planner.paper.readings import PLANNERS
 from mfba_planner.paper.study.chunk import BENCHMARK_STREAM, Benchmark, Chunk, Trips, chunks
 from mfba_planner.paper.study.plan import FULL, QUICK, benchmark_plan, trip_plan
 from mfba_planner.paper.study.run import open_store, run_plan
-from mfba_planner.planning.algorithm_1 import PlannerParams
-from mfba_planner.simulation.episode import run
+from mfba_planner.planning.planner_params import PlannerParams
+from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, minimize
 

@@ -11,17 +11,21 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
+from mfba_planner.core.types import Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Mode, Observation, PlannerParams
 from mfba_planner.planning.peers.straight_line import Straight
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import PLANNERS, make
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.simulation.episode import Outcome, World, run
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at, velocity_at
 from mfba_planner.simulation.planner_observations import Perception
-from mfba_planner.simulation.scenario import Obstacle, Scenario, Walls, center_at, velocity_at
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.simulation.simulated_lidar import cast_rays
+from mfba_planner.simulation.world import World
 
 PARAMS = PlannerParams(speed_mps=0.8, step_length_m=0.2)
 SENSOR = SensorParams()

@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.types import Circle, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.sweep.single_run import play
 from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Circle, Mode, Observation, PlannerParams
 from mfba_planner.planning.peers import ablation
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import Predictive, preset
 from mfba_planner.simulation.episode import Episode, Outcome
 

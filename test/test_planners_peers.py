@@ -12,15 +12,17 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.types import Circle, Mode, Observation, Scan
 from mfba_planner.evaluation.metrics import evaluate
-from mfba_planner.perception.sensory_vector import Scan, SensorParams
-from mfba_planner.planning.algorithm_1 import Circle, Mode, Observation, PlannerParams
+from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.peers import apf
 from mfba_planner.planning.peers.observed_circles import discs
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
-from mfba_planner.simulation.episode import run
+from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.planner_observations import Perception
-from mfba_planner.simulation.scenario import Obstacle, Scenario
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
 
 PEERS = ("apf", "vfh", "dwa", "orca")
 PARAMS = PlannerParams(speed_mps=0.8)

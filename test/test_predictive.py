@@ -10,18 +10,21 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Point, Pose2D, distance
+from mfba_planner.core.types import Circle, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.suites.named_suites import suite
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Circle, Mode, Observation, PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
 from mfba_planner.planning.predictive import Predictive, PredictiveParams, preset
 from mfba_planner.planning.trajectory_cost import Prediction, RiskParams, from_sectors, moved
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.simulation.episode import Episode, run
+from mfba_planner.simulation.episode import Episode
+from mfba_planner.simulation.obstacle_motion import Obstacle, Walls
 from mfba_planner.simulation.planner_observations import Perception
-from mfba_planner.simulation.scenario import Obstacle, Scenario, Walls
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
 
 PARAMS = preset(PlannerParams(speed_mps=0.8))
 SENSOR = SensorParams()

@@ -15,7 +15,8 @@ from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.recording.read_episode import read_episode, summarize
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.simulation.episode import Outcome, run
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.run_episode import run
 
 Change = Callable[[str, Any], Any]  # (topic, message) -> message, or None to leave it out
 

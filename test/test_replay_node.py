@@ -21,8 +21,9 @@ from std_srvs.srv import Trigger
 
 from mfba_planner.core.errors import BagError, ConfigError, GraphError
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.types import Mode
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.messages import decision, sector_ranges
 from mfba_planner.recording.qos_profiles import OfferedQos

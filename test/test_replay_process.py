@@ -15,8 +15,8 @@ from nav_msgs.msg import Odometry
 from recording_bags import FOREIGN, odometry, scan, write_bag
 from sensor_msgs.msg import LaserScan
 
+from mfba_planner.core.types import Decision, Mode
 from mfba_planner.launcher.in_process import run_in_process
-from mfba_planner.planning.algorithm_1 import Decision, Mode
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.messages import decision
 from mfba_planner.ros.interface import topics

@@ -24,14 +24,17 @@ from matplotlib.text import Text
 
 from mfba_planner.core.errors import OutputError
 from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.types import Mode
 from mfba_planner.evaluation.metrics import evaluate
-from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report import style
 from mfba_planner.report.run_events import closest_passes
 from mfba_planner.report.run_figure import draw_run, png_bytes, run_figure
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Episode, Outcome, run
-from mfba_planner.simulation.scenario import Obstacle, Scenario, Walls, center_at
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
 
 
 def _still(x: float, y: float, radius: float = 0.3) -> Obstacle:

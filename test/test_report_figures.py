@@ -15,10 +15,10 @@ from matplotlib.text import Text
 from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, InputError, OutputError
 from mfba_planner.core.geometry import distance
+from mfba_planner.core.types import Mode
 from mfba_planner.evaluation.metrics import evaluate, within_range
 from mfba_planner.paper import convergence, published
 from mfba_planner.paper.functions import FUNCTIONS
-from mfba_planner.planning.algorithm_1 import Mode
 from mfba_planner.planning.gap_vector import gap_vector
 from mfba_planner.report import style
 from mfba_planner.report.figure_canvas import Sheet, to_bytes

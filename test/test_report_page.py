@@ -17,11 +17,11 @@ from launching import complete
 from selenium.webdriver.common.keys import Keys
 
 from mfba_planner.core.errors import InputError, OutputError
+from mfba_planner.core.types import Mode
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Method, Mode, PlannerParams
 from mfba_planner.planning.gap_vector import gap_heading
-from mfba_planner.planning.planner_factory import simulate
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.report import format_values
@@ -32,9 +32,11 @@ from mfba_planner.report.result_table import result_rows
 from mfba_planner.report.run_events import closest_passes
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.simulation.episode import Episode, run
+from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.fleet import run_fleet
 from mfba_planner.simulation.robot_model import Noise
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.simulate import simulate
 
 
 @pytest.fixture(scope="module")

@@ -22,10 +22,11 @@ from mfba_planner.core.options import override
 from mfba_planner.core.outputs import write_new
 from mfba_planner.evaluation.metrics import Result, evaluate
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report.result_json import read_result, result_to_dict, write_result
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Episode, Outcome, run
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.run_episode import run
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams
 
 

@@ -10,11 +10,13 @@ import pytest
 from rich.console import Console
 
 from mfba_planner.evaluation.metrics import Result, evaluate
-from mfba_planner.planning.algorithm_1 import PlannerParams
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report.result_table import print_result, result_rows, result_text
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.episode import Episode, Outcome, run
-from mfba_planner.simulation.scenario import Obstacle, Scenario
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
 
 Rows = dict[str, tuple[str, str]]
 

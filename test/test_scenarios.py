@@ -22,8 +22,10 @@ from mfba_planner.scenarios.scenario_files import (
     scenario_to_json,
 )
 from mfba_planner.scenarios.yaml_schema import checked
-from mfba_planner.simulation.episode import Outcome, run
-from mfba_planner.simulation.scenario import Obstacle, Scenario, Turn, Walls
+from mfba_planner.simulation.episode import Outcome
+from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls
+from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.scenario import Scenario
 
 EXAMPLE = "compare config/scenarios/case1.yaml"
 TASK = "name: x\nstart_m: [0, 0]\ngoal_m: [5, 5]\n"

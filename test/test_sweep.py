@@ -16,6 +16,7 @@ import pytest
 from pyarrow import parquet
 
 from mfba_planner.core.errors import ConfigError, OutputError
+from mfba_planner.core.types import Observation
 from mfba_planner.evaluation.metrics import assess
 from mfba_planner.evaluation.oracle import solve
 from mfba_planner.evaluation.suites import suite
@@ -30,8 +31,9 @@ from mfba_planner.evaluation.sweep.summary import comparisons, standings, versus
 from mfba_planner.evaluation.sweep.sweep_spec import Order, Run, Setting, read_run
 from mfba_planner.evaluation.sweep.table import sorted_hash, to_csv, to_parquet, write
 from mfba_planner.evaluation.sweep.worker import Keeper, Lost, each
-from mfba_planner.planning.algorithm_1 import Observation, Planner, PlannerParams, Swarm
-from mfba_planner.simulation.episode import run
+from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.planner_params import PlannerParams, Swarm
+from mfba_planner.simulation.run_episode import run
 
 
 def an_order(**changes: Any) -> Order:

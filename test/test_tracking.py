@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.types import Circle, Scan
 from mfba_planner.perception.obstacle_tracker import Tracker, TrackingParams
-from mfba_planner.perception.sensory_vector import Scan
-from mfba_planner.planning.algorithm_1 import Circle
 from mfba_planner.simulation.simulated_lidar import cast_rays
 
 TICK_NS = 100_000_000

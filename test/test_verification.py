@@ -20,11 +20,11 @@ from edited_bags import (
 )
 
 from mfba_planner.core.errors import BagError
-from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.core.types import Mode
 from mfba_planner.recording.file_integrity import check_data
 from mfba_planner.recording.messages import stamp_ns
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation import episode
+from mfba_planner.simulation import run_episode
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.verification.verify_bag import verify
 
@@ -40,7 +40,7 @@ def test_an_honest_bag_is_identical(bag: Path) -> None:
     report = verify(bag)
     assert report.is_identical
     assert (report.faults, report.notes) == ((), ())
-    expected = episode.run(load_scenario("case2"), seed=4).ticks
+    expected = run_episode.run(load_scenario("case2"), seed=4).ticks
     assert report.decided == expected
     assert report.digest == digest(expected)
 

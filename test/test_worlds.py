@@ -18,14 +18,9 @@ from mfba_planner.evaluation.suites.random_crowds import CrowdParams, Motion, cr
 from mfba_planner.evaluation.suites.survivability import first_contact_s, survivability
 from mfba_planner.evaluation.suites.trip import Trip
 from mfba_planner.scenarios.scenario_files import load_scenario, scenario_to_json
-from mfba_planner.simulation.scenario import (
-    Obstacle,
-    Scenario,
-    Turn,
-    Walls,
-    center_at,
-    step_clearances,
-)
+from mfba_planner.simulation.contact import step_clearances
+from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls, center_at
+from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.simulation.uniform_segments import uniform_legs
 
 # centre, speed and heading of the first obstacle of random-10, world 0

@@ -4,9 +4,11 @@
 from typing import Any
 
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.planning.algorithm_1 import Decision, Mode, PlannerParams
+from mfba_planner.core.types import Decision, Mode
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.simulation.episode import Episode, Outcome
-from mfba_planner.simulation.scenario import Obstacle, Scenario
+from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.scenario import Scenario
 
 # One metre, one second per tick.
 SECOND = PlannerParams(speed_mps=1.0, step_length_m=1.0)

@@ -23,8 +23,8 @@ from typing import Any
 from mfba_planner import cli
 from mfba_planner.core.options import override, walk
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import PlannerParams
 from mfba_planner.planning.planner_factory import USUAL
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.ros.interface import node_parameters as settings
 from mfba_planner.ros.interface import topics

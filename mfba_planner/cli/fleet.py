@@ -8,10 +8,10 @@ from pathlib import Path
 
 from ..core.errors import ConfigError, MfbaError
 from ..evaluation.metrics import Result, evaluate
-from ..planning.planner_factory import simulate_fleet
 from ..report.fleet_table import fleet_text, why_no_success
 from ..scenarios.run_config import RunConfig
 from ..simulation.episode import Episode, Outcome
+from ..simulation.simulate import simulate_fleet
 
 _SEED_HEAD = "    seed  at the goal   longest     last  clearance  collisions"
 _SEED_ROW = "{:>8}  {:>4} of {:<4}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"

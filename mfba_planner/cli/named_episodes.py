@@ -18,8 +18,7 @@ from ..core.options import override
 from ..core.outputs import bag_in
 from ..core.resources import scenario_names
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import PlannerParams
-from ..planning.planner_factory import simulate
+from ..planning.planner_params import PlannerParams
 from ..recording.omitted_decisions import tell
 from ..recording.read_episode import Recording, read_recording
 from ..recording.robot_topics import ALONE, chosen
@@ -28,6 +27,7 @@ from ..scenarios.scenario_files import load_scenario
 from ..simulation.decision_digest import digest
 from ..simulation.episode import Episode
 from ..simulation.scenario import Scenario
+from ..simulation.simulate import simulate
 
 _RESULT = "result.json"
 

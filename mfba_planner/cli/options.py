@@ -9,8 +9,8 @@ from typing import Any
 from ..core.argument_parser import Parser
 from ..core.options import Spec, flatten
 from ..launcher.set_option import option_rows
-from ..planning.algorithm_1 import PlannerParams
 from ..planning.planner_factory import named
+from ..planning.planner_params import PlannerParams
 
 
 def main(args: list[str]) -> int:

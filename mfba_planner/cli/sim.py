@@ -13,8 +13,8 @@ from ..core.errors import ConfigError, MfbaError
 from ..evaluation.metrics import Result, evaluate
 from ..launcher.run_arguments import Order, add_world_arguments, read_config
 from ..launcher.run_result import show, why_no_success
-from ..planning.planner_factory import simulate
 from ..scenarios.run_config import Driver, RunConfig
+from ..simulation.simulate import simulate
 
 _DESCRIPTION = "Simulate episodes without ROS: the decisions of `mfba run`, but no bag."
 _HEAD = "    seed  outcome       length     time  clearance  collisions"

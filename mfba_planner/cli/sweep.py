@@ -24,8 +24,8 @@ from ..evaluation.sweep.sweep_spec import PATIENCE_S, Order, Setting, own_preset
 from ..evaluation.sweep.table import write
 from ..launcher.set_option import add_set_argument, with_settings
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import PlannerParams
 from ..planning.planner_factory import USUAL
+from ..planning.planner_params import PlannerParams
 from ..planning.planner_registry import PLANNERS
 from ..simulation.planner_observations import NAMES as PERCEPTIONS
 from .study_progress import add_work_arguments, progress, say

@@ -12,11 +12,11 @@ from ..core.argument_parser import Parser
 from ..core.errors import BagError, ConfigError
 from ..core.outputs import bag_in
 from ..launcher.set_option import add_set_argument, with_settings
-from ..planning.planner_factory import simulate, simulate_fleet
 from ..recording.bag_reader import BagReader
 from ..recording.read_episode import read_recording
 from ..recording.robot_topics import ALONE, of_robot
 from ..simulation.episode import Episode, Outcome, stamp_of
+from ..simulation.simulate import simulate, simulate_fleet
 from ..verification.compare_decisions import Divergence, first_divergence, side_by_side
 from ..verification.redecide import is_foreign
 from ..verification.verify_bag import Report, verify_each

@@ -12,7 +12,7 @@ from ..core.errors import BagError, ConfigError
 from ..core.geometry import Point
 from ..launcher.set_option import with_settings
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import PlannerParams
+from ..planning.planner_params import PlannerParams
 from ..recording.robot_topics import ALONE, of_robot
 from ..verification.redecide import FromScratch, Robot, decide_from_scratch
 from ..verification.verify_bag import Report

@@ -12,7 +12,7 @@ from itertools import pairwise, zip_longest
 import numpy as np
 
 from ..core.geometry import Pose2D, distance
-from ..planning.algorithm_1 import NANO, Decision, Mode
+from ..core.types import NANO, Decision, Mode
 from ..planning.odometry_jump import carried_off
 from ..simulation.batched_motion import Array, Motion, Steps
 from ..simulation.episode import Episode, Outcome

@@ -7,9 +7,9 @@ import sys
 from contextlib import closing, suppress
 
 from ..core.errors import BagError, MfbaError
-from ..planning.planner_factory import simulate
 from ..scenarios.run_config import Driver
 from ..simulation.episode import Episode
+from ..simulation.simulate import simulate
 from .console import Screen
 from .fleet_result import conclude_fleet
 from .run import Attempt

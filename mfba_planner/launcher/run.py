@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import time
 
-from ..simulation.episode import World
 from ..simulation.fleet import Fleet
+from ..simulation.world import World
 from .console import Screen
 from .run_arguments import Order
 from .run_directory import RunDirectory

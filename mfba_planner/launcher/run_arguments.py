@@ -14,8 +14,8 @@ from ..core.errors import ConfigError
 from ..core.options import override
 from ..paper import readings
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import Method
 from ..planning.planner_factory import USUAL, named
+from ..planning.planner_params import Method
 from ..scenarios.run_config import NODES, Driver, RunConfig
 from ..scenarios.scenario_files import load_scenario
 from ..swarm.bat_swarm import Algorithm

@@ -10,7 +10,7 @@ from typing import Any
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean, override, walk
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import PlannerParams
+from ..planning.planner_params import PlannerParams
 from ..simulation.robot_model import Robot
 
 

@@ -10,8 +10,8 @@ from typing import Any
 from ..core.errors import ConfigError
 from ..core.options import override
 from ..paper import readings
-from ..planning.algorithm_1 import Method
 from ..planning.planner_factory import USUAL, named
+from ..planning.planner_params import Method
 from ..scenarios.run_config import (
     NODES,
     Parameters,

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
-from ..planning.algorithm_1 import PlannerParams, Swarm
+from ..planning.planner_params import PlannerParams, Swarm
 from ..swarm.bat_swarm import BatParams, Bounds, Epsilon, Initial, Schedule, Step, Velocity, Walk
 
 T = TypeVar("T")

@@ -14,9 +14,11 @@ from ..core.options import Scalar, flatten, override
 from ..evaluation import statistics
 from ..evaluation.metrics import evaluate
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import PlannerParams
-from ..simulation.episode import Episode, run
-from ..simulation.scenario import Obstacle, Scenario
+from ..planning.planner_params import PlannerParams
+from ..simulation.episode import Episode
+from ..simulation.obstacle_motion import Obstacle
+from ..simulation.run_episode import run
+from ..simulation.scenario import Scenario
 from ..swarm.bat_swarm import Algorithm
 from . import published, readings
 from .study.chunk import Chunk, Trips, chunks

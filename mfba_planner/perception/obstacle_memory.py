@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ..core.geometry import Point, distance
 from ..core.options import check, option
-from ..planning.algorithm_1 import NANO, Circle
+from ..core.types import NANO, Circle
 
 _SAME = 0.25  # of a radius: a circle seen this near to a remembered one is the same
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..core.geometry import Point, Pose2D
 from ..core.options import check, option
-from ..planning.algorithm_1 import NANO, Circle
-from .sensory_vector import Scan
+from ..core.types import NANO, Circle, Scan
 
 Array = np.ndarray
 

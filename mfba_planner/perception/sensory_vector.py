@@ -5,16 +5,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.errors import InputError
 from ..core.geometry import Point, ray_circle_distance, tangent_half_angle
 from ..core.options import check, option
-
-Bits = tuple[int, ...]
-Ranges = tuple[float, ...]
+from ..core.types import Bits, Ranges
 
 TWO_PI = 2.0 * math.pi
 FARTHER = 1.0 + 1e-9  # times a distance: beyond it whatever the rounding
@@ -83,7 +81,7 @@ def sense_circles(
                 "not finite; send finite numbers"
             )
         if d - radius <= reach:
-            _mark(ranges, d, radius, math.atan2(dy, dx))
+            mark_sectors(ranges, d, radius, math.atan2(dy, dx))
     return single_precision(ranges)
 
 
@@ -94,7 +92,7 @@ def single_precision(ranges: Sequence[float]) -> Ranges:
     return tuple(np.asarray(ranges, dtype=np.float32).tolist())
 
 
-def _mark(ranges: list[float], d: float, radius: float, direction: float) -> None:
+def mark_sectors(ranges: list[float], d: float, radius: float, direction: float) -> None:
     """Lower the range of every sector that the tangent span of one circle touches."""
     n = len(ranges)
     width = TWO_PI / n
@@ -109,49 +107,3 @@ def _mark(ranges: list[float], d: float, radius: float, direction: float) -> Non
         index = sector % n
         if r < ranges[index]:
             ranges[index] = r
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scan:
-    """A planar laser scan: beam k looks along angle_min_rad + k * angle_increment_rad."""
-
-    ranges_m: np.ndarray
-    angle_min_rad: float
-    angle_increment_rad: float
-    range_min_m: float
-    range_max_m: float
-
-
-def aligned(scan: Scan, yaw_rad: float) -> Scan:
-    """The scan in a frame that its own is turned against by yaw_rad."""
-    return replace(scan, angle_min_rad=scan.angle_min_rad + yaw_rad)
-
-
-def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: SensorParams) -> Ranges:
-    """Range per sector from any laser scan; every return is a point enlarged by the robot.
-
-    yaw_rad turns the scan's frame into the sectors' frame. As in REP-117, +inf is free space,
-    -inf an obstacle nearer than range_min (taken at range_min), NaN and values outside
-    [range_min, range_max] are no measurement and are passed over. Raises InputError for a
-    scan without a single usable beam or with unusable geometry: blind is not free. A sector
-    that no beam looks into is free all the same: the scan knows nothing of it.
-    """
-    geometry = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m, yaw_rad)
-    if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:
-        raise InputError(
-            f"scan geometry angle_min={scan.angle_min_rad}, increment={scan.angle_increment_rad},"
-            f" range=[{scan.range_min_m}, {scan.range_max_m}], yaw={yaw_rad}: unusable;"
-            " check the lidar driver"
-        )
-    r = np.asarray(scan.ranges_m, dtype=np.float64)
-    near = np.isneginf(r)
-    hits = near | ((r >= scan.range_min_m) & (r <= scan.range_max_m) & np.isfinite(r))
-    if not (hits | np.isposinf(r)).any():
-        raise InputError(f"scan of {r.size} beams without one usable range; check the lidar")
-    d = np.where(near, scan.range_min_m, r)
-    hits &= np.where(hits, d, np.inf) - robot_radius_m <= params.sensing_range_m
-    angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hits) + yaw_rad
-    ranges = [math.inf] * params.sectors
-    for distance_m, angle in zip(d[hits].tolist(), angles.tolist()):
-        _mark(ranges, distance_m, robot_radius_m, angle)
-    return single_precision(ranges)

@@ -5,196 +5,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import Protocol
 
 from ..core.errors import ConfigError
-from ..core.geometry import Point, Pose2D, bearing, distance, towards
-from ..core.options import check, option
+from ..core.geometry import Point, bearing, distance, towards
 from ..core.random_streams import stream
-from ..perception.sensory_vector import Bits, Ranges, Scan, sensory_vector
-from ..swarm.bat_swarm import BatParams, BatSwarm, Disc, Vector
-from .gap_vector import GapHeading, gap_heading, gap_vector, nearest_free_gap
-from .method_params import Method, SeenParams
+from ..core.types import NANO, Bits, Decision, Mode, Observation
+from ..perception.sensory_vector import sensory_vector
+from ..swarm.bat_swarm import BatSwarm, Disc, Vector
+from .gap_vector import gap_heading, gap_vector, nearest_free_gap
+from .mode_transitions import Event, transition
 from .odometry_jump import JumpWatch, explained
 from .path_generation import Start, Step, fresh_step, fresh_steps
-from .recovery import RecoveryParams
-from .speed_limit import CautionParams
+from .planner_params import PlannerParams, Swarm
+from .stop_conditions import reason_to_stand
 
-NANO = 1e-9
 FEW = 8  # bats of so few planners are no quicker at once
-
-
-class Mode(Enum):
-    """What the planner is doing."""
-
-    IDLE = "idle"
-    PATH_GENERATION = "path_generation"
-    OBSTACLE_AVOIDANCE = "obstacle_avoidance"
-    BLOCKED = "blocked"
-    STOPPED = "stopped"
-    ARRIVED = "arrived"
-
-
-class Event(Enum):
-    """What the planner has just learned; one event per tick."""
-
-    NO_GOAL = "no_goal"
-    NEW_GOAL = "new_goal"
-    INVALID = "invalid"
-    STALE = "stale"
-    AT_GOAL = "at_goal"
-    CLEAR = "clear"
-    OBSTACLE = "obstacle"
-    NO_GAP = "no_gap"
-
-
-_NEXT = {
-    Event.NO_GOAL: Mode.IDLE,
-    Event.NEW_GOAL: Mode.IDLE,
-    Event.INVALID: Mode.STOPPED,
-    Event.STALE: Mode.STOPPED,
-    Event.AT_GOAL: Mode.ARRIVED,
-    Event.CLEAR: Mode.PATH_GENERATION,
-    Event.OBSTACLE: Mode.OBSTACLE_AVOIDANCE,
-    Event.NO_GAP: Mode.BLOCKED,
-}
-
-
-def transition(mode: Mode, event: Event) -> Mode:
-    """Next mode: Algorithm 1 has no memory, except that it ends on arrival.
-
-    Once ARRIVED, only a new (or withdrawn) goal leads out: the while loop is over.
-    """
-    if mode is Mode.ARRIVED and event not in (Event.NEW_GOAL, Event.NO_GOAL):
-        return Mode.ARRIVED
-    return _NEXT[event]
-
-
-class Swarm(Enum):
-    """Fresh bats in the step's disc at every step, or one swarm that lives over the trip."""
-
-    FRESH = "fresh"
-    PERSISTENT = "persistent"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerParams(SeenParams):
-    """The reading `section6` of Algorithm 1 and section 6.2."""
-
-    speed_mps: float = option(0.785, "robot speed", unit="m/s", minimum=0.01, maximum=100.0)
-    step_length_m: float = option(
-        0.3, "longest goal step, in both modes", unit="m", minimum=0.001, maximum=100.0
-    )
-    goal_tolerance_m: float = option(
-        0.02, "distance at which the goal counts as reached", unit="m", minimum=1e-6, maximum=10.0
-    )
-    input_timeout_s: float = option(
-        1.0, "age at which odometry or sectors are stale", unit="s", minimum=0.001, maximum=3600.0
-    )
-    gap_heading: GapHeading = option(GapHeading.BOUNDARY, "where a gap leads, in its two sectors")
-    swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
-    bat: BatParams = field(default_factory=BatParams)
-    caution: CautionParams = field(default_factory=CautionParams)
-    recovery: RecoveryParams = field(default_factory=RecoveryParams)
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range."""
-        check(self)
-
-    @property
-    def label(self) -> str:
-        """Who decides, for people: the law of beta in Algorithm 1, or the other method."""
-        paper = self.method is Method.PAPER
-        return self.bat.algorithm.value if paper else self.method.value
-
-    @property
-    def tick_ns(self) -> int:
-        """Duration of one decision, step length / speed, in whole nanoseconds."""
-        return round(self.step_length_m / self.speed_mps / NANO)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Circle:
-    """An obstacle as a planner may know it, enlarged by the robot: m and m/s in the odom frame."""
-
-    center_m: Point
-    radius_m: float
-    velocity_mps: Point = (0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Observation:
-    """What the planner knows at one tick; now_ns - stamp_ns is the age of the inputs.
-
-    The paper's planner reads the sectors alone. circles (what is within SR) and scan (real
-    surfaces, in a frame aligned with odom) are for planners that want more than bits; where
-    they are older than the pose, sensed says since when and from where.
-    """
-
-    stamp_ns: int
-    pose: Pose2D
-    ranges_m: Ranges
-    goal: Point | None
-    now_ns: int
-    refused: str = ""
-    circles: tuple[Circle, ...] | None = None
-    scan: Scan | None = None
-    sensed: tuple[int, Pose2D] | None = None
-
-
-Refused = str  # an input that was refused travels as its reason
-
-
-def observe(
-    stamp_ns: int,
-    pose: Pose2D | Refused,
-    ranges_m: Ranges | Refused,
-    goal: Point | None,
-    last_pose: Pose2D,
-    age_ns: int = 0,
-) -> Observation:
-    """Join what was read into an Observation; last_pose stands in for a pose that was refused."""
-    refused = ""
-    if isinstance(ranges_m, str):
-        refused, ranges_m = ranges_m, ()
-    if isinstance(pose, str):
-        refused, pose = pose, last_pose
-    return Observation(
-        stamp_ns=stamp_ns,
-        pose=pose,
-        ranges_m=ranges_m,
-        goal=goal,
-        now_ns=stamp_ns + age_ns,
-        refused=refused,
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Decision:
-    """One answer of the planner and why; gap counts from 1, 0 is none; lengths in metres."""
-
-    stamp_ns: int
-    mode: Mode
-    reason: str
-    pose: Pose2D
-    goal: Point | None
-    ranges_m: Ranges
-    vs: Bits
-    vg: Bits
-    gap: int
-    waypoint: Point
-    velocity: Point
-    candidates: tuple[Point, ...] = ()
-
-
-class PathPlanner(Protocol):
-    """What may drive the robot: one Observation in, one Decision out; it may remember."""
-
-    def plan(self, obs: Observation) -> Decision:
-        """Answer one observation; called once per tick, stamps rising."""
-        ...
 
 
 Generate = Callable[[Point, Point], Step]
@@ -257,42 +82,6 @@ def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tupl
     if gap is None:
         return Event.NO_GAP, f"sectors {sensed} set: every gap is closed", 0
     return Event.OBSTACLE, f"sectors {sensed} set: gap {gap} is nearest to the goal", gap
-
-
-def reason_to_stand(
-    obs: Observation, params: PlannerParams, *, sectors: bool = True
-) -> tuple[Event, str] | None:
-    """What keeps any planner from moving, with its reason; sectors=False: it reads none."""
-    refused = obs.refused or _fault(obs, sectors)
-    if refused:
-        return Event.INVALID, f"refused input: {refused}"
-    age_s = (obs.now_ns - obs.stamp_ns) * NANO
-    if age_s > params.input_timeout_s:
-        return Event.STALE, f"input is {age_s:.3f} s old"
-    if obs.goal is None:
-        return Event.NO_GOAL, "no goal given"
-    if distance(obs.pose.position, obs.goal) <= params.goal_tolerance_m:
-        return Event.AT_GOAL, "goal reached"
-    return None
-
-
-def _fault(obs: Observation, sectors: bool) -> str:
-    """What must never move a robot, "" for nothing; the last of the doors."""
-    pose, goal, ranges = obs.pose, obs.goal or (0.0, 0.0), obs.ranges_m
-    total, ring = sum(pose) + sum(goal), sum(ranges)
-    finite = total - total == 0.0 and ring == ring  # or a sum has overflowed
-    if finite and obs.stamp_ns >= 0 and (len(ranges) > 2 or not sectors):
-        return ""  # the usual case, found in one go
-    for name, numbers in (("pose", obs.pose), ("goal", obs.goal or ())):
-        if not all(map(math.isfinite, numbers)):
-            return f"{name} {tuple(numbers)} is not finite"
-    if sectors and len(obs.ranges_m) < 3:
-        return f"{len(obs.ranges_m)} sectors are fewer than 3"
-    if any(map(math.isnan, obs.ranges_m)):
-        return "a sector's range is NaN"
-    if obs.stamp_ns < 0:
-        return f"stamp {obs.stamp_ns} ns is negative"
-    return ""
 
 
 class Planner:

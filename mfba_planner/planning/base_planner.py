@@ -8,18 +8,12 @@ from dataclasses import dataclass
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
-from ..perception.sensory_vector import Bits, SensorParams
-from .algorithm_1 import (
-    NANO,
-    Decision,
-    Event,
-    Mode,
-    Observation,
-    PlannerParams,
-    reason_to_stand,
-    transition,
-)
+from ..core.types import NANO, Bits, Decision, Mode, Observation
+from ..perception.sensory_vector import SensorParams
+from .mode_transitions import Event, transition
 from .odometry_jump import JumpWatch, explained
+from .planner_params import PlannerParams
+from .stop_conditions import reason_to_stand
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

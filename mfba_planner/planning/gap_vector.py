@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cache, lru_cache
 
 from ..core.geometry import wrap_angle
-from ..perception.sensory_vector import Bits
+from ..core.types import Bits
 
 TIE_RAD = 1e-9  # turns closer than this are equal: rounding must not choose the gap
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from ..core.geometry import Pose2D, distance
+from ..core.types import NANO, Decision, Mode, Observation
+from .planner_params import PlannerParams
 
-if TYPE_CHECKING:
-    from .algorithm_1 import Decision, Mode, Observation, PlannerParams
-
-NANO = 1e-9
 CARRIED_OFF = "carried off"
 
 
@@ -37,7 +34,7 @@ class JumpWatch:
             return ""
         took_s = (obs.stamp_ns - last[0]) * NANO
         moved_m = distance(last[1].position, obs.pose.position)
-        if not moved_m > params.speed_mps * took_s + params.jump_m or mode.value == "arrived":
+        if not moved_m > params.speed_mps * took_s + params.jump_m or mode is Mode.ARRIVED:
             return ""
         return f"{CARRIED_OFF} {moved_m:.3g} m in {took_s:.3g} s, beginning anew"
 

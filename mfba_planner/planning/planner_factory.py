@@ -3,14 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from ..perception.sensory_vector import SensorParams
-from ..simulation.episode import Episode, World, look, look_at_scan, run
-from ..simulation.fleet import Fleet, run_fleet
-from ..simulation.scenario import Scenario
-from .algorithm_1 import Method, PlannerParams
+from .planner_params import Method, PlannerParams
 from .supervised_planner import Guarded, algorithm_1
 
 USUAL = Method.PREDICTIVE  # of the programs and launch files: the robot that does not collide
@@ -36,43 +32,3 @@ def brain(params: PlannerParams, sensor: SensorParams | None = None, seed: int =
 
         return Guarded(Predictive(params, sensor or SensorParams(), seed))
     return algorithm_1(params, seed)
-
-
-def simulate(
-    scenario: Scenario,
-    *,
-    planner: PlannerParams,
-    sensor: SensorParams,
-    seed: int,
-    go_on: Callable[[World], bool] = lambda _: True,
-) -> Episode:
-    """simulation.episode.run with the planner of planner.method."""
-    return run(
-        scenario,
-        planner=planner,
-        sensor=sensor,
-        seed=seed,
-        go_on=go_on,
-        brain=brain(planner, sensor, seed),
-        look=look_at_scan if planner.tracks_scan else look,
-    )
-
-
-def simulate_fleet(
-    scenario: Scenario,
-    *,
-    planner: PlannerParams,
-    sensor: SensorParams,
-    seed: int,
-    go_on: Callable[[Fleet], bool] = lambda _: True,
-) -> tuple[Episode, ...]:
-    """simulation.fleet.run_fleet with a planner of planner.method for every robot."""
-    return run_fleet(
-        scenario,
-        planner=planner,
-        sensor=sensor,
-        seed=seed,
-        go_on=go_on,
-        brain=lambda child: brain(planner, sensor, child),
-        look=look_at_scan if planner.tracks_scan else look,
-    )

@@ -8,14 +8,16 @@ from dataclasses import replace
 
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
+from ..core.types import PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..swarm.bat_swarm import Algorithm
-from .algorithm_1 import PathPlanner, Planner, PlannerParams
+from .algorithm_1 import Planner
 from .peers.apf import PotentialField
 from .peers.dwa import DynamicWindow
 from .peers.orca import Orca
 from .peers.straight_line import Straight
 from .peers.vfh import VectorFieldHistogram
+from .planner_params import PlannerParams
 from .predictive import Predictive
 
 Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]

@@ -12,14 +12,16 @@ import numpy as np
 from ..core.geometry import Point, distance
 from ..core.options import check, option
 from ..core.random_streams import stream
+from ..core.types import NANO, Bits, Circle, Observation
 from ..perception.obstacle_memory import Memory, MemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
-from ..perception.sensory_vector import Bits, SensorParams
+from ..perception.sensory_vector import SensorParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
-from .algorithm_1 import NANO, Circle, Event, Observation, PlannerParams
 from .base_planner import Move, Steering
+from .mode_transitions import Event
 from .peers.observed_circles import ROBOT_RADIUS_M
+from .planner_params import PlannerParams
 from .trajectory_cost import Prediction, RiskParams, Way, from_sectors, moved
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # of a gap's waypoints, in reaches

@@ -9,7 +9,7 @@ from enum import Enum
 
 from ..core.geometry import wrap_angle
 from ..core.options import check, option
-from ..perception.sensory_vector import Ranges
+from ..core.types import Ranges
 
 SECOND_NS = 1e9
 

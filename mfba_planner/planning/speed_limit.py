@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from ..core.options import check, option
-from ..perception.sensory_vector import Ranges
+from ..core.types import Ranges
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,17 +8,10 @@ from typing import Protocol
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, bearing, distance, towards
-from .algorithm_1 import (
-    NANO,
-    Decision,
-    Method,
-    Mode,
-    Observation,
-    PathPlanner,
-    Planner,
-    PlannerParams,
-)
+from ..core.types import NANO, Decision, Mode, Observation, PathPlanner
+from .algorithm_1 import Planner
 from .odometry_jump import carried_off
+from .planner_params import Method, PlannerParams
 from .recovery import Phase, Recovery, advance, most_room
 from .speed_limit import allowed_share
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from ..core.geometry import Point, towards
 from ..core.options import check, option
-from ..perception.sensory_vector import Ranges
-from .algorithm_1 import Circle
+from ..core.types import Circle, Ranges
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from ..core.errors import BagError, InputError
-from ..perception.sensory_vector import Ranges
-from ..planning.algorithm_1 import Decision
+from ..core.types import Decision, Ranges
 from .bag_reader import BagReader, DecodedMessage
 from .messages import decision, sector_ranges, stamp_ns
 from .omitted_decisions import left_out

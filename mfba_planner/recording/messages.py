@@ -15,8 +15,8 @@ import numpy as np
 
 from ..core.errors import FrameError, InputError
 from ..core.geometry import Point, Pose2D, yaw_of
-from ..perception.sensory_vector import Bits, Ranges, Scan, blind
-from ..planning.algorithm_1 import Decision, Mode, Refused
+from ..core.types import Bits, Decision, Mode, Ranges, Refused, Scan
+from ..perception.sensory_vector import blind
 from ..simulation.differential_drive import command
 from ..simulation.robot_model import Base
 
@@ -125,7 +125,7 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
 
 
 def laser_scan(message: Any, frame: str = "") -> Scan:
-    """sensor_msgs/LaserScan to a Scan, which perception.sensory_vector.sense_scan judges.
+    """sensor_msgs/LaserScan to a Scan, which perception.scan_to_sectors.sense_scan judges.
 
     Raises FrameError for another frame.
     """

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from ..core.errors import BagError, InputError
 from ..core.geometry import Pose2D
+from ..core.types import Decision
 from ..evaluation.metrics import Result, Tally, evaluate
-from ..planning.algorithm_1 import Decision
 from ..simulation.decision_digest import Digest, digest
 from ..simulation.episode import Episode
 from ..simulation.fleet import worlds_seen

@@ -9,12 +9,14 @@ from typing import Any, NamedTuple, TypeVar
 from ..core.errors import BagError, ConfigError, InputError
 from ..core.geometry import Pose2D
 from ..core.options import flatten, override
+from ..core.types import Decision
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import Decision, PlannerParams
+from ..planning.planner_params import PlannerParams
 from ..scenarios.scenario_files import load_scenario
-from ..simulation.episode import Episode, Outcome, World
+from ..simulation.episode import Episode, Outcome
 from ..simulation.fleet import worlds_seen
 from ..simulation.scenario import Scenario
+from ..simulation.world import World
 from .bag_reader import BagReader
 from .configuration import read_configuration
 from .robot_topics import ALONE

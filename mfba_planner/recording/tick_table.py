@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
-from ..planning.algorithm_1 import NANO
+from ..core.types import NANO
 from .bag_reader import BagReader
 from .decisions import Answer, rising_decisions
 from .messages import bits_text

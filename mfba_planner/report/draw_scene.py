@@ -19,10 +19,9 @@ from matplotlib.patches import Circle, FancyArrowPatch, Rectangle, Wedge
 from matplotlib.patheffects import withStroke
 
 from mfba_planner.core.geometry import Point, bearing, distance, towards
-from mfba_planner.perception.sensory_vector import Bits
-from mfba_planner.planning.algorithm_1 import Decision, Mode
+from mfba_planner.core.types import Bits, Decision, Mode
 from mfba_planner.simulation.episode import Episode, Outcome
-from mfba_planner.simulation.scenario import Obstacle, center_at
+from mfba_planner.simulation.obstacle_motion import Obstacle, center_at
 
 from . import style
 from .run_events import Pass, encounter_ticks, is_finite, span_s, stretches, track

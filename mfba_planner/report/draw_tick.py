@@ -10,7 +10,7 @@ from matplotlib.patches import Circle, FancyArrowPatch
 
 from mfba_planner.evaluation.metrics import within_range
 from mfba_planner.simulation.episode import Episode
-from mfba_planner.simulation.scenario import bounce_times, center_at
+from mfba_planner.simulation.obstacle_motion import bounce_times, center_at
 
 from . import style
 from .draw_scene import (

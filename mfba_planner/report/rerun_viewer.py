@@ -16,10 +16,10 @@ import numpy as np
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.outputs import refuse_existing
-from mfba_planner.planning.algorithm_1 import Decision, Mode
+from mfba_planner.core.types import Decision, Mode
 from mfba_planner.simulation.batched_motion import Motion
 from mfba_planner.simulation.episode import Episode
-from mfba_planner.simulation.scenario import velocity_at
+from mfba_planner.simulation.obstacle_motion import velocity_at
 
 from . import format_values, style
 from .html.data import clearances, in_one_scene, obstacle_names, speeds

@@ -10,10 +10,10 @@ from itertools import groupby
 import numpy as np
 
 from mfba_planner.core.geometry import Point, distance
+from mfba_planner.core.types import Decision, Mode
 from mfba_planner.evaluation.metrics import steps_driven, tick_clearances
-from mfba_planner.planning.algorithm_1 import Decision, Mode
 from mfba_planner.simulation.episode import Episode
-from mfba_planner.simulation.scenario import Obstacle, Walls, bounce_times, center_at
+from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, bounce_times, center_at
 
 _PARTS = 64  # of one step; in 0.3 m of robot path that leaves an error below 3 mm
 

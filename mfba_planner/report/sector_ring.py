@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..perception.sensory_vector import Bits
+from ..core.types import Bits
 from ..planning.gap_vector import GapHeading, gap_heading
 from ..simulation.episode import Episode
 

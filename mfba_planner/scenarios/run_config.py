@@ -16,8 +16,9 @@ from .. import __version__
 from ..core.errors import ConfigError
 from ..core.geometry import Pose2D
 from ..core.options import Scalar, check, flatten, option
+from ..core.types import NANO
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import NANO, PlannerParams
+from ..planning.planner_params import PlannerParams
 from ..simulation.fleet import seed_of, worlds_seen
 from ..simulation.scenario import Scenario
 from .scenario_files import scenario_to_json

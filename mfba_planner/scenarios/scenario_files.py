@@ -16,8 +16,9 @@ from ..core.errors import ConfigError
 from ..core.geometry import Point
 from ..core.options import did_you_mean, override
 from ..core.resources import scenario_names, scenario_path
+from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.robot_model import Robot
-from ..simulation.scenario import Kidnapping, Member, Obstacle, Scenario, Turn, Walls
+from ..simulation.scenario import Kidnapping, Member, Scenario
 
 EXAMPLE = "compare config/scenarios/case1.yaml"
 LIMIT = 1e6  # no number in a scenario is larger

@@ -16,7 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
-from ..simulation.scenario import Kidnapping, Member, Obstacle, Scenario, Turn, Walls
+from ..simulation.obstacle_motion import Obstacle, Turn, Walls
+from ..simulation.scenario import Kidnapping, Member, Scenario
 from .scenario_files import EXAMPLE, LIMIT, robot_of
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]

@@ -8,7 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from .scenario import Scenario, clearance, stretches_of
+from .contact import clearance
+from .obstacle_motion import stretches_of
+from .scenario import Scenario
 
 Array = np.ndarray
 

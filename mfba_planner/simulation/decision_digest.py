@@ -20,7 +20,7 @@ import math
 import struct
 from collections.abc import Iterable
 
-from ..planning.algorithm_1 import Decision
+from ..core.types import Decision
 
 HEAD = b"mfba decisions 1\n"
 

@@ -11,13 +11,17 @@ import numpy as np
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, bearing, distance, towards
+from ..core.types import NANO, Decision, PathPlanner
 from ..perception.sensory_vector import SensorParams
-from ..planning.algorithm_1 import NANO, Decision, PathPlanner, PlannerParams
+from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import algorithm_1
 from .differential_drive import command
-from .episode import Episode, Look, Outcome, World, look
+from .episode import Episode, Outcome
 from .nearby_obstacles import Found
-from .scenario import Obstacle, Scenario, Turn
+from .obstacle_motion import Obstacle, Turn
+from .planner_observations import Look, look
+from .scenario import Scenario
+from .world import World
 
 FLEET_STREAM = 6  # spawn key of the robots' SeedSequence children; one number per purpose
 DRIFT_M = 1e-12  # by which a way of straight stretches may miss a pose
@@ -192,7 +196,7 @@ def run_fleet(
     brain: MakeBrain | None = None,
     look: Look = look,
 ) -> tuple[Episode, ...]:
-    """simulation.episode.run for every robot of a scenario at once: an Episode each, in its order.
+    """run_episode.run for every robot of a scenario at once: an Episode each, in its order.
 
     brain makes the planner of a robot from its seed. The obstacles of an episode's scenario are
     the scenario's own, then the other robots as they went.

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ..core.geometry import Point, distance
-from ..planning.algorithm_1 import NANO
+from ..core.types import NANO
 from .batched_motion import Array, Motion
 
 AHEAD_TICKS = 64  # whose centres are worked out at once; the paper's trip of 17 m is 57

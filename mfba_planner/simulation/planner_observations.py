@@ -5,17 +5,27 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from ..core.errors import ConfigError
+from ..core.errors import ConfigError, InputError
 from ..core.geometry import Pose2D, distance
 from ..core.options import did_you_mean
-from ..perception.sensory_vector import Ranges, Scan, SensorParams, sense_scan
-from ..planning.algorithm_1 import Circle, Observation
-from .episode import World, sense
+from ..core.types import (
+    Circle,
+    Observation,
+    Ranges,
+    Refused,
+    Scan,
+    observe,
+)
+from ..perception.scan_to_sectors import aligned, sense_scan
+from ..perception.sensory_vector import SensorParams, blind, sense_circles
+from .sensor_noise import Reading
 from .simulated_lidar import cast_rays
+from .world import World
 
 SENSOR_STREAM = 2  # spawn key of the noise's SeedSequence child; the planner's is 1
 BEAMS = {"scan-12": 12, "scan-360": 360}
@@ -25,7 +35,7 @@ Sensed = tuple[tuple[Circle, ...] | None, Scan | None]
 
 
 class Perception:
-    """A look for simulation.episode.run, by name.
+    """A look for simulation.run_episode.run, by name.
 
     sectors: the bits' ranges alone. known: the circles whose enlarged edge is within SR, with
     their true velocities of that moment. scan-12, scan-360: beams from the robot's centre along
@@ -137,3 +147,44 @@ class Perception:
     def _noise(self, stamp_ns: int, count: int) -> np.ndarray:
         sequence = np.random.SeedSequence(self.seed, spawn_key=(SENSOR_STREAM, stamp_ns))
         return np.random.Generator(np.random.PCG64(sequence)).normal(0.0, self.noise_m, count)
+
+
+def sense(world: World, params: SensorParams) -> Ranges:
+    """What the ring of virtual sensors measures at the present tick, of circles or of a scan.
+
+    Raises InputError for a scan that cannot be used.
+    """
+    return _sensed(world, world.read(), params)
+
+
+def _sensed(world: World, seen: Reading, params: SensorParams) -> Ranges:
+    if seen.scan is None:
+        position = seen.received.position
+        _, circles = world.near(params.sensing_range_m, position)
+        return sense_circles(position, circles, params)
+    yaw = seen.received.yaw + world.scenario.robot.lidar.yaw_rad
+    return sense_scan(seen.scan, yaw, world.scenario.robot_radius_m, params)
+
+
+def look(world: World, sensor: SensorParams) -> Observation:
+    """What the paper's planner gets to know at the present tick: pose, sectors, goal."""
+    seen = world.read()
+    ranges: Ranges | Refused
+    try:
+        ranges = _sensed(world, seen, sensor)
+    except InputError:
+        ranges = blind(1, math.nan)  # the sensor says so by sectors of NaN
+    pose = seen.received
+    return observe(world.stamp_ns, pose, ranges, world.scenario.goal_m, pose)
+
+
+def look_at_scan(world: World, sensor: SensorParams) -> Observation:
+    """look(), and the scan itself, in a frame aligned with odom."""
+    obs, scan = look(world, sensor), world.read().scan
+    if scan is None or obs.refused:
+        return obs
+    yaw = obs.pose.yaw + world.scenario.robot.lidar.yaw_rad
+    return replace(obs, scan=aligned(scan, yaw))
+
+
+Look = Callable[[World, SensorParams], Observation]

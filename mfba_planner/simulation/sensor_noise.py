@@ -10,12 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.geometry import Pose2D, carried
-from ..perception.sensory_vector import Scan
+from ..core.types import NANO, Scan
+from .obstacle_motion import Walls
 from .robot_model import Robot
-from .scenario import Walls
 from .simulated_lidar import limited, scan_at
 
-NANO = 1e-9
 ODOM_STREAM, SCAN_STREAM = 4, 5  # spawn keys of SeedSequence children; one number per purpose
 
 Surfaces = Sequence[tuple[float, float, float]]

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.geometry import Point, Pose2D
-from ..perception.sensory_vector import Scan
+from ..core.types import Scan
+from .obstacle_motion import Walls
 from .robot_model import Lidar
-from .scenario import Walls
 
 _RAYS: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 

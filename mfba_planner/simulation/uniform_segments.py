@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .scenario import Scenario, bounce_times, center_at
+from .obstacle_motion import bounce_times, center_at
+from .scenario import Scenario
 
 
 class Legs(NamedTuple):

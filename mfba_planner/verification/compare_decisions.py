@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..planning.algorithm_1 import Decision
+from ..core.types import Decision
 from ..simulation.decision_digest import canonical
 
 

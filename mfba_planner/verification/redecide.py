@@ -12,9 +12,11 @@ from typing import Any
 
 from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point, Pose2D
-from ..perception.sensory_vector import Ranges, SensorParams, aligned, sense_scan
-from ..planning.algorithm_1 import Decision, PlannerParams, Refused, observe
+from ..core.types import Decision, Ranges, Refused, observe
+from ..perception.scan_to_sectors import aligned, sense_scan
+from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import brain
+from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions import DECISION, SECTORS, deciders
 from ..recording.file_integrity import check_data

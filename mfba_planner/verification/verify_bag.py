@@ -13,8 +13,9 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..perception.sensory_vector import aligned, sense_circles, sense_scan, sensory_vector
-from ..planning.algorithm_1 import Decision, Mode, Observation, observe
+from ..core.types import Decision, Mode, Observation, observe
+from ..perception.scan_to_sectors import aligned, sense_scan
+from ..perception.sensory_vector import sense_circles, sensory_vector
 from ..planning.planner_factory import brain
 from ..recording.bag_reader import BagReader
 from ..recording.file_integrity import check_data

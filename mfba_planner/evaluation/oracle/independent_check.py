@@ -11,7 +11,8 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from ...simulation.scenario import Obstacle, Scenario, Walls
+from ...simulation.obstacle_motion import Obstacle, Walls
+from ...simulation.scenario import Scenario
 from .solution import Waypoint
 
 Fault = str

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ...simulation.scenario import Walls
+from ...simulation.obstacle_motion import Walls
 from ...simulation.uniform_segments import Legs
 from .polyline import gaps, lengths, one_way_gaps, pair_gaps, within
 from .tangent_search import CLEAR_M

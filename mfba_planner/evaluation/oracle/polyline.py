@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...core.geometry import Point
-from ...simulation.scenario import Walls
+from ...simulation.obstacle_motion import Walls
 from ...simulation.uniform_segments import Legs
 
 Leg = tuple[float, float, float, float, float, float, float]  # Legs, but for the obstacle

@@ -10,7 +10,8 @@ import numpy as np
 
 from ...core.errors import ConfigError
 from ...core.geometry import distance
-from ...simulation.scenario import Scenario, Walls
+from ...simulation.obstacle_motion import Walls
+from ...simulation.scenario import Scenario
 from ...simulation.uniform_segments import Legs, uniform_legs
 from .independent_check import inspect
 from .infeasibility_proof import unreachable

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...core.geometry import Point
-from ...simulation.scenario import Walls
+from ...simulation.obstacle_motion import Walls
 from ...simulation.uniform_segments import Legs
 from .polyline import edge_gaps, within
 

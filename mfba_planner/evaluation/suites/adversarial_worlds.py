@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ...core.geometry import Point, bearing, distance, towards
-from ...simulation.scenario import Obstacle, Turn
+from ...simulation.obstacle_motion import Obstacle, Turn
 from .trip import OBSTACLE_RADIUS_M, ROBOT_RADIUS_M, Trip, leaves_room
 
 ENLARGED_M = OBSTACLE_RADIUS_M + ROBOT_RADIUS_M

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.errors import ConfigError
 from ...core.options import check, option
-from ...simulation.scenario import Obstacle, Turn
+from ...simulation.obstacle_motion import Obstacle, Turn
 from .trip import OBSTACLE_RADIUS_M, ROOM, leaves_room
 
 _TRIES = 10_000

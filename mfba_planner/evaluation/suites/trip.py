@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ...core.geometry import Point, distance
-from ...simulation.scenario import Obstacle, Scenario, Walls
+from ...simulation.obstacle_motion import Obstacle, Walls
+from ...simulation.scenario import Scenario
 
 START_M: Point = (0.0, 0.0)
 GOAL_M: Point = (12.0, 12.0)

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...core.geometry import Point, bearing, distance, wrap_angle
-from ...planning.algorithm_1 import Decision
+from ...core.types import Decision
 from ...recording.messages import bits_text
 from ...simulation.batched_motion import Motion
 from ...simulation.episode import Episode, Outcome
-from ...simulation.scenario import velocity_at
+from ...simulation.obstacle_motion import velocity_at
 from ..contacts_and_clearances import Conduct
 from ..metrics import Result, assess, within_range
 from .single_run import Played

@@ -10,7 +10,7 @@ from typing import Any
 from ...core.errors import ConfigError, InputError
 from ...core.options import override
 from ...perception.sensory_vector import SensorParams
-from ...planning.algorithm_1 import PlannerParams
+from ...planning.planner_params import PlannerParams
 from ..study.chunk_store import code_digest, read_manifest, read_part
 from .chunks import parts_of
 from .columns import Row

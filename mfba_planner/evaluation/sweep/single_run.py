@@ -7,9 +7,13 @@ from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from ...planning.algorithm_1 import NANO, Observation, Planner, Swarm, fly_together
+from ...core.types import NANO, Observation
+from ...planning.algorithm_1 import Planner, fly_together
+from ...planning.planner_params import Swarm
 from ...planning.planner_registry import known
-from ...simulation.episode import Episode, Look, Outcome, course, ended, look, to_the_end
+from ...simulation.episode import Episode, Outcome
+from ...simulation.planner_observations import Look, look
+from ...simulation.run_episode import course, ended, to_the_end
 from .planner_sandbox import Guard, HungError, PlannerFault
 from .sweep_spec import Run, Setting
 

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 
 from ...core.errors import ConfigError
 from ...core.options import flatten
+from ...core.types import PathPlanner
 from ...perception.sensory_vector import SensorParams
-from ...planning.algorithm_1 import PathPlanner, PlannerParams
+from ...planning.planner_params import PlannerParams
 from ...planning.planner_registry import Factory, known, preset_of
 from ...simulation.planner_observations import Perception
 from ...simulation.scenario import Scenario

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...core.options import Scalar, flatten
 from ...evaluation.metrics import assess
-from ...planning.algorithm_1 import PlannerParams
-from ...simulation.episode import run
+from ...planning.planner_params import PlannerParams
+from ...simulation.run_episode import run
 from ...simulation.scenario import Scenario
 from ...swarm.bat_swarm import BatParams
 from ...swarm.batched_swarms import BatchResult, minimize_batch

@@ -10,7 +10,8 @@ import numpy as np
 from ...core.geometry import distance
 from ...evaluation import statistics as stats
 from ...evaluation.statistics import Array, Comparison
-from ...simulation.scenario import Scenario, step_clearances
+from ...simulation.contact import step_clearances
+from ...simulation.scenario import Scenario
 from .. import published
 from ..readings import PLANNERS
 from ..study.plan import LAWS, PLANNER_READINGS, trip_sample

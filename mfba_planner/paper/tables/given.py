@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 from ...core.geometry import distance
 from ...perception.sensory_vector import SensorParams
-from ...planning.algorithm_1 import PlannerParams
 from ...planning.gap_vector import gap_vector
+from ...planning.planner_params import PlannerParams
 from ...simulation.scenario import Scenario
 from .. import published
 from ..functions import FUNCTIONS, STEEPNESS

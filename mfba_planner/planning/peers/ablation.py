@@ -10,10 +10,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from ...core.geometry import Point, wrap_angle
+from ...core.types import NANO, Circle, Observation
 from ...perception.obstacle_memory import MemoryParams
 from ...perception.sensory_vector import SensorParams
-from ..algorithm_1 import NANO, Circle, Event, Observation, PlannerParams
 from ..base_planner import Move
+from ..mode_transitions import Event
+from ..planner_params import PlannerParams
 from ..predictive import Predictive, PredictiveParams
 from ..trajectory_cost import Prediction, RiskParams, Way
 

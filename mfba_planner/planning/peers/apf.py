@@ -8,8 +8,9 @@ import math
 import numpy as np
 
 from ...core.geometry import Point
-from ..algorithm_1 import Event, Observation
+from ...core.types import Observation
 from ..base_planner import Move, Steering
+from ..mode_transitions import Event
 from .observed_circles import discs
 
 REPULSION = 0.3  # of the pull, at the distance where 1/d - 1/SR is 1 per metre

@@ -8,8 +8,9 @@ import math
 import numpy as np
 
 from ...core.geometry import Point
-from ..algorithm_1 import NANO, Event, Observation
+from ...core.types import NANO, Observation
 from ..base_planner import Move, Steering
+from ..mode_transitions import Event
 from .observed_circles import discs
 
 HEADINGS, SPEEDS = 36, (1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...core.types import Observation
 from ...simulation.scenario import Scenario
-from ..algorithm_1 import Observation
 
 ROBOT_RADIUS_M: float = Scenario.__dataclass_fields__["robot_radius_m"].default  # type: ignore
 

@@ -7,9 +7,11 @@ import math
 
 from ...core.errors import ConfigError
 from ...core.geometry import Point
+from ...core.types import NANO, Observation
 from ...perception.sensory_vector import SensorParams
-from ..algorithm_1 import NANO, Event, Observation, PlannerParams
 from ..base_planner import Move, Steering
+from ..mode_transitions import Event
+from ..planner_params import PlannerParams
 
 HORIZON_S = 3.0
 MARGIN_M = 0.06

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from ...core.geometry import Point
-from ..algorithm_1 import Observation
+from ...core.types import Observation
 from ..base_planner import Move, Steering
 
 

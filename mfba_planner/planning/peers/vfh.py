@@ -8,8 +8,9 @@ import math
 import numpy as np
 
 from ...core.geometry import Point, bearing
-from ..algorithm_1 import Event, Observation
+from ...core.types import Observation
 from ..base_planner import Move, Steering
+from ..mode_transitions import Event
 from .observed_circles import discs
 
 HEADINGS = 72

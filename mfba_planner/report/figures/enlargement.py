@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from mfba_planner.core.geometry import Point
-from mfba_planner.simulation.scenario import Obstacle, Scenario
+from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.scenario import Scenario
 
 from .. import style
 from ..draw_scene import Z_MARK, line, patch

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
 from mfba_planner.core.geometry import bearing, towards
-from mfba_planner.perception.sensory_vector import Bits
+from mfba_planner.core.types import Bits
 from mfba_planner.planning.gap_vector import gap_heading, gap_vector, nearest_free_gap
 
 from .. import style

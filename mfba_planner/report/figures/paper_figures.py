@@ -8,7 +8,8 @@ from typing import Any
 
 from ...paper import readings
 from ...scenarios.scenario_files import load_scenario
-from ...simulation.episode import Episode, run
+from ...simulation.episode import Episode
+from ...simulation.run_episode import run
 
 FIGURES = {
     "fig2": "beta of eq. 10 over the iterations, for several rho",

@@ -10,13 +10,10 @@ from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
 from mfba_planner.core.geometry import Point, towards
-from mfba_planner.perception.sensory_vector import (
-    Bits,
-    SensorParams,
-    sense_circles,
-    sensory_vector,
-)
-from mfba_planner.simulation.scenario import Obstacle, Scenario
+from mfba_planner.core.types import Bits
+from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
+from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.scenario import Scenario
 
 from .. import style
 from ..draw_scene import Z_MARK, Z_OBSTACLE, Z_RING, draw_sectors, line, patch

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from mfba_planner.core.errors import InputError
+from mfba_planner.core.types import Mode
 from mfba_planner.evaluation.metrics import Result, evaluate, within_range
-from mfba_planner.planning.algorithm_1 import Mode
 from mfba_planner.simulation.episode import Episode
 
 from .. import format_values, legend, style

@@ -17,7 +17,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mfba_planner.planning.algorithm_1 import Mode
+from mfba_planner.core.types import Mode
 from mfba_planner.report import style
 from mfba_planner.report.run_events import stretches
 from mfba_planner.simulation.episode import Episode

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from mfba_planner.core.options import walk
+from mfba_planner.core.types import Bits, Mode
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances, within_range
-from mfba_planner.perception.sensory_vector import Bits, SensorParams
-from mfba_planner.planning.algorithm_1 import Mode, PlannerParams
+from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.odometry_jump import carried_off
+from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report import format_values
 from mfba_planner.report.result_table import result_rows
 from mfba_planner.report.run_events import closest_passes
@@ -26,7 +27,7 @@ from mfba_planner.report.view_bounds import View, choose_view
 from mfba_planner.simulation.batched_motion import Motion
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
-from mfba_planner.simulation.scenario import velocity_at
+from mfba_planner.simulation.obstacle_motion import velocity_at
 
 MOST_RUNS = 6  # side by side
 MOST_ROBOTS = 36  # of a fleet in one scene: as many lines can be told apart

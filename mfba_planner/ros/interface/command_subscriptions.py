@@ -12,7 +12,7 @@ from geometry_msgs.msg import TwistStamped
 from ...core.errors import InputError
 from ...core.geometry import Point
 from ...recording.messages import stamp_ns, told
-from ...simulation.episode import World
+from ...simulation.world import World
 from ..runtime.command_matching import Answers
 from ..runtime.command_timeout import Deadman
 from ..runtime.node_runtime import GraphNode, Refusals

@@ -17,8 +17,8 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
 from ...core.geometry import Point, Pose2D, half_turn
-from ...perception.sensory_vector import Bits, Ranges, Scan, SensorParams, longest_range_m
-from ...planning.algorithm_1 import Decision, Mode
+from ...core.types import Bits, Decision, Mode, Ranges, Scan
+from ...perception.sensory_vector import SensorParams, longest_range_m
 from ...planning.odometry_jump import carried_off
 from ...recording.messages import SECOND_NS, bits_text, body_velocity, points_text, rotated
 from ...simulation.episode import Outcome

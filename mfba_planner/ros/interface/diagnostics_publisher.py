@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from ...planning.algorithm_1 import NANO
+from ...core.types import NANO
 from ..runtime.node_runtime import GraphNode
 from . import conversions, topics
 from .health import Status

@@ -9,8 +9,8 @@ from typing import Any
 
 from rclpy.serialization import serialize_message
 
+from ...core.types import Decision
 from ...perception.sensory_vector import sense_circles, sensory_vector
-from ...planning.algorithm_1 import Decision
 from ...recording.bag_writer import BagWriter
 from ...recording.configuration import attach_configuration
 from ...scenarios.run_config import Driver, RunConfig, node_parameters, run_facts

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ...core.geometry import Point
-from ...simulation.episode import Outcome, World
+from ...simulation.episode import Outcome
 from ...simulation.fleet import Fleet
 from ...simulation.scenario import Scenario
+from ...simulation.world import World
 from ..runtime.node_runtime import GraphNode, Refusals
 from . import conversions, topics
 from .node_parameters import WorldSimSettings

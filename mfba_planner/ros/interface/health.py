@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import NamedTuple
 
-from ...planning.algorithm_1 import Decision, Mode
+from ...core.types import Decision, Mode
 from ...planning.recovery import Phase
 
 WINDOW = 20  # messages over which a rate is taken

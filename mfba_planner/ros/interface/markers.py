@@ -14,9 +14,8 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ...core.geometry import Point, bearing, towards
-from ...perception.sensory_vector import Ranges
-from ...planning.algorithm_1 import NANO, Decision, Mode
-from ...simulation.episode import World
+from ...core.types import NANO, Decision, Mode, Ranges
+from ...simulation.world import World
 from .conversions import pose_msg, set_header
 
 Rgba = tuple[float, float, float, float]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from ...core.options import check, option
-from ...planning.algorithm_1 import PlannerParams
+from ...planning.planner_params import PlannerParams
 from ...simulation.robot_model import Base, Robot
 from ...simulation.scenario import Scenario
 

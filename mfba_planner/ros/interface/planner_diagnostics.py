@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 
-from ...planning.algorithm_1 import Decision
+from ...core.types import Decision
 from ...planning.supervised_planner import Guarded
 from ...recording.messages import points_text
 from ..runtime.goal_queue import Errands

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from geometry_msgs.msg import Twist, TwistStamped
 
 from ...core.geometry import Point
-from ...planning.algorithm_1 import Decision, Mode
+from ...core.types import Decision, Mode
 from ...planning.odometry_jump import carried_off
 from ..runtime.node_runtime import GraphNode
 from . import conversions, markers, topics

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ...core.geometry import Point
-from ...simulation.episode import Outcome, World
+from ...simulation.episode import Outcome
 from ...simulation.scenario import Scenario
+from ...simulation.world import World
 from ..runtime.node_runtime import GraphNode, Refusals
 from .command_subscriptions import AnswerTopics
 from .node_parameters import WorldSimSettings

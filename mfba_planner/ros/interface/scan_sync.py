@@ -8,8 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 from ...core.errors import InputError
-from ...perception.sensory_vector import Scan, aligned
-from ...planning.algorithm_1 import Observation, PlannerParams
+from ...core.types import Observation, Scan
+from ...perception.scan_to_sectors import aligned
+from ...planning.planner_params import PlannerParams
 from ...recording.messages import laser_scan, stamp_ns
 from ..runtime.node_runtime import GraphNode, Refusals
 from ..runtime.stamp_pairing import StampPairs

@@ -7,8 +7,9 @@ from collections import deque
 from dataclasses import replace
 
 from ...core.geometry import Point, towards
-from ...simulation.episode import Outcome, World
+from ...simulation.episode import Outcome
 from ...simulation.robot_model import Robot
+from ...simulation.world import World
 from ..runtime.node_runtime import GraphNode
 from . import conversions, markers, topics
 from .node_parameters import WorldSimSettings

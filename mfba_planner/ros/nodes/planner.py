@@ -8,8 +8,9 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...core.geometry import Pose2D
-from ...planning.algorithm_1 import NANO, Decision, Mode, PlannerParams, observe
+from ...core.types import NANO, Decision, Mode, observe
 from ...planning.planner_factory import brain
+from ...planning.planner_params import PlannerParams
 from ...planning.recovery import Phase
 from ...recording.messages import robot_pose, sector_ranges, stamp_ns
 from ..interface import parameters, topics

@@ -9,14 +9,9 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...core.geometry import Point, Pose2D
-from ...perception.sensory_vector import (
-    Ranges,
-    Scan,
-    SensorParams,
-    sense_circles,
-    sense_scan,
-    sensory_vector,
-)
+from ...core.types import Ranges, Scan
+from ...perception.scan_to_sectors import sense_scan
+from ...perception.sensory_vector import SensorParams, sense_circles, sensory_vector
 from ...recording.messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
 from ..interface import parameters, topics
 from ..interface.conversions import sectors_msg, sensory_vector_msg

@@ -13,7 +13,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from std_srvs.srv import SetBool, Trigger
 
 from ...core.errors import ConfigError, InputError
-from ...planning.algorithm_1 import NANO
+from ...core.types import NANO
 from ...recording.messages import pose2d
 from ...simulation.episode import stamp_of
 from ..interface import parameters, topics

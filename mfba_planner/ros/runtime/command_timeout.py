@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ...planning.algorithm_1 import NANO
+from ...core.types import NANO
 from ..interface.node_parameters import WorldSimSettings
 
 TICKS = 1.25  # a Twist is meant for a tick: that long it always holds

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 from ...core.errors import StampError
 from ...core.geometry import Pose2D
-from ...perception.sensory_vector import Ranges
-from ...planning.algorithm_1 import Refused
+from ...core.types import Ranges, Refused
 from .stamp_pairing import StampPairs
 
 

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The modes of Algorithm 1 and the events that lead from one to another."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from ..core.types import Mode
+
+
+class Event(Enum):
+    """What the planner has just learned; one event per tick."""
+
+    NO_GOAL = "no_goal"
+    NEW_GOAL = "new_goal"
+    INVALID = "invalid"
+    STALE = "stale"
+    AT_GOAL = "at_goal"
+    CLEAR = "clear"
+    OBSTACLE = "obstacle"
+    NO_GAP = "no_gap"
+
+
+_NEXT = {
+    Event.NO_GOAL: Mode.IDLE,
+    Event.NEW_GOAL: Mode.IDLE,
+    Event.INVALID: Mode.STOPPED,
+    Event.STALE: Mode.STOPPED,
+    Event.AT_GOAL: Mode.ARRIVED,
+    Event.CLEAR: Mode.PATH_GENERATION,
+    Event.OBSTACLE: Mode.OBSTACLE_AVOIDANCE,
+    Event.NO_GAP: Mode.BLOCKED,
+}
+
+
+def transition(mode: Mode, event: Event) -> Mode:
+    """Next mode: Algorithm 1 has no memory, except that it ends on arrival.
+
+    Once ARRIVED, only a new (or withdrawn) goal leads out: the while loop is over.
+    """
+    if mode is Mode.ARRIVED and event not in (Event.NEW_GOAL, Event.NO_GOAL):
+        return Mode.ARRIVED
+    return _NEXT[event]

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What keeps a planner from moving: refused, stale or missing input, no goal, goal reached."""
+
+from __future__ import annotations
+
+import math
+
+from ..core.geometry import distance
+from ..core.types import NANO, Observation
+from .mode_transitions import Event
+from .planner_params import PlannerParams
+
+
+def reason_to_stand(
+    obs: Observation, params: PlannerParams, *, sectors: bool = True
+) -> tuple[Event, str] | None:
+    """What keeps any planner from moving, with its reason; sectors=False: it reads none."""
+    refused = obs.refused or _fault(obs, sectors)
+    if refused:
+        return Event.INVALID, f"refused input: {refused}"
+    age_s = (obs.now_ns - obs.stamp_ns) * NANO
+    if age_s > params.input_timeout_s:
+        return Event.STALE, f"input is {age_s:.3f} s old"
+    if obs.goal is None:
+        return Event.NO_GOAL, "no goal given"
+    if distance(obs.pose.position, obs.goal) <= params.goal_tolerance_m:
+        return Event.AT_GOAL, "goal reached"
+    return None
+
+
+def _fault(obs: Observation, sectors: bool) -> str:
+    """What must never move a robot, "" for nothing; the last of the doors."""
+    pose, goal, ranges = obs.pose, obs.goal or (0.0, 0.0), obs.ranges_m
+    total, ring = sum(pose) + sum(goal), sum(ranges)
+    finite = total - total == 0.0 and ring == ring  # or a sum has overflowed
+    if finite and obs.stamp_ns >= 0 and (len(ranges) > 2 or not sectors):
+        return ""  # the usual case, found in one go
+    for name, numbers in (("pose", obs.pose), ("goal", obs.goal or ())):
+        if not all(map(math.isfinite, numbers)):
+            return f"{name} {tuple(numbers)} is not finite"
+    if sectors and len(obs.ranges_m) < 3:
+        return f"{len(obs.ranges_m)} sectors are fewer than 3"
+    if any(map(math.isnan, obs.ranges_m)):
+        return "a sector's range is NaN"
+    if obs.stamp_ns < 0:
+        return f"stamp {obs.stamp_ns} ns is negative"
+    return ""

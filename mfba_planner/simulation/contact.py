@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Contact between robot and obstacles, continuous in time."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from ..core.geometry import Point, closest_approach
+from .obstacle_motion import Obstacle, bounce_times, center_at
+from .scenario import Scenario
+
+
+def step_clearances(
+    scenario: Scenario, t0_s: float, t1_s: float, start: Point, end: Point
+) -> list[float]:
+    """Smallest gap (m) to each obstacle while the robot moves uniformly from start to end.
+
+    Continuous in time, not only at the ends, and exact through bounces and turns: between two
+    of them both motions are uniform. Negative means contact.
+    """
+    return [
+        clearance(scenario, obstacle, t0_s, t1_s, start, end) for obstacle in scenario.obstacles
+    ]
+
+
+def clearance(
+    scenario: Scenario, obstacle: Obstacle, t0_s: float, t1_s: float, start: Point, end: Point
+) -> float:
+    """step_clearances, for one obstacle."""
+    times = [t0_s, *bounce_times(obstacle, t0_s, t1_s, scenario.walls), t1_s]
+    smallest = math.inf
+    duration = t1_s - t0_s
+    for ta, tb in pairwise(times):
+        sa, sb = ((t - t0_s) / duration if duration else 0.0 for t in (ta, tb))
+        gap = closest_approach(
+            _between(start, end, sa),
+            _between(start, end, sb),
+            center_at(obstacle, ta, scenario.walls),
+            center_at(obstacle, tb, scenario.walls),
+        )
+        smallest = min(smallest, gap)
+    return smallest - scenario.enlarged_radius(obstacle)
+
+
+def _between(a: Point, b: Point, s: float) -> Point:
+    return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]))

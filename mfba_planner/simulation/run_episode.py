@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The core driver: one episode from start to end, without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import TypeVar
+
+from ..core.types import Observation, PathPlanner
+from ..perception.sensory_vector import SensorParams
+from ..planning.planner_params import PlannerParams
+from ..planning.supervised_planner import algorithm_1
+from .differential_drive import command
+from .episode import Episode, Outcome
+from .planner_observations import Look, look
+from .scenario import Scenario
+from .world import World
+
+T = TypeVar("T")
+GoOn = Callable[[World], bool]
+
+
+def to_the_end(_: World) -> bool:
+    """Go on, whatever the world is like."""
+    return True
+
+
+def course(
+    scenario: Scenario,
+    planner: PlannerParams,
+    sensor: SensorParams,
+    seed: int,
+    go_on: GoOn,
+    brain: PathPlanner,
+    look: Look,
+) -> Generator[Observation, None, Episode]:
+    """run(), pausing before every decision: yields what is about to be decided upon."""
+    world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
+    obs = look(world, sensor)
+    yield obs
+    ticks, truth = [brain.plan(obs)], [world.pose]
+    while (outcome := world.outcome()) is None and go_on(world):
+        world.step(command(ticks[-1], scenario.robot, world.tick_ns))
+        obs = look(world, sensor)
+        yield obs
+        ticks.append(brain.plan(obs))
+        truth.append(world.pose)
+    return Episode(
+        scenario=scenario,
+        sensor=sensor,
+        planner=planner,
+        seed=seed,
+        driver="core",
+        ticks=tuple(ticks),
+        outcome=outcome or Outcome.INTERRUPTED,
+        truth=tuple(truth) if scenario.robot.noise.of_odometry else (),
+    )
+
+
+def run(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams | None = None,
+    sensor: SensorParams | None = None,
+    seed: int = 0,
+    go_on: GoOn = to_the_end,
+    brain: PathPlanner | None = None,
+    look: Look = look,
+) -> Episode:
+    """The core driver: Algorithm 1 from start to goal or time limit, without ROS.
+
+    go_on sees the world after every decision and ends the run by returning False. brain takes
+    the decisions instead of Algorithm 1, with planner's speed, step and tolerance; look is what
+    it gets to know.
+    """
+    planner = planner or PlannerParams()
+    brain = brain or algorithm_1(planner, seed)
+    return ended(course(scenario, planner, sensor or SensorParams(), seed, go_on, brain, look))
+
+
+def ended(under_way: Generator[object, None, T]) -> T:
+    """Go on to the end, and return what comes of it."""
+    while True:
+        try:
+            next(under_way)
+        except StopIteration as end:
+            result: T = end.value
+            return result

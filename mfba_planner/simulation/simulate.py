@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An episode with the planner that the parameters name, for one robot or a fleet, without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..perception.sensory_vector import SensorParams
+from ..planning.planner_factory import brain
+from ..planning.planner_params import PlannerParams
+from .episode import Episode
+from .fleet import Fleet, run_fleet
+from .planner_observations import look, look_at_scan
+from .run_episode import run
+from .scenario import Scenario
+from .world import World
+
+
+def simulate(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams,
+    sensor: SensorParams,
+    seed: int,
+    go_on: Callable[[World], bool] = lambda _: True,
+) -> Episode:
+    """simulation.run_episode.run with the planner of planner.method."""
+    return run(
+        scenario,
+        planner=planner,
+        sensor=sensor,
+        seed=seed,
+        go_on=go_on,
+        brain=brain(planner, sensor, seed),
+        look=look_at_scan if planner.tracks_scan else look,
+    )
+
+
+def simulate_fleet(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams,
+    sensor: SensorParams,
+    seed: int,
+    go_on: Callable[[Fleet], bool] = lambda _: True,
+) -> tuple[Episode, ...]:
+    """simulation.fleet.run_fleet with a planner of planner.method for every robot."""
+    return run_fleet(
+        scenario,
+        planner=planner,
+        sensor=sensor,
+        seed=seed,
+        go_on=go_on,
+        brain=lambda child: brain(planner, sensor, child),
+        look=look_at_scan if planner.tracks_scan else look,
+    )

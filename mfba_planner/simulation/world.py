@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated world between two ticks: robot, obstacles, sensors, outcome; without ROS."""
+
+from __future__ import annotations
+
+from ..core.errors import ConfigError
+from ..core.geometry import Point, Pose2D, distance
+from ..core.types import NANO
+from .batched_motion import Motion
+from .differential_drive import Speeds, obey
+from .episode import Outcome, stamp_of
+from .nearby_obstacles import Found, Nearby
+from .obstacle_motion import velocity_at
+from .scenario import Scenario
+from .sensor_noise import Instruments, Reading
+
+DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
+
+
+def advance(pose: Pose2D, velocity: Point, tick_ns: int) -> Pose2D:
+    """The omnidirectional robot after one tick at constant velocity (m/s); yaw is kept."""
+    dt = tick_ns * NANO
+    return Pose2D(pose.x + velocity[0] * dt, pose.y + velocity[1] * dt, pose.yaw)
+
+
+class World:
+    """The simulated world between two ticks: all that world_sim knows, without ROS."""
+
+    def __init__(
+        self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float, seed: int = 0
+    ) -> None:
+        """Put the robot at the start, at tick 0; the seed is its instruments'.
+
+        Raises ConfigError for a scenario of several robots.
+        """
+        if scenario.robots:
+            raise ConfigError(
+                f"scenario {scenario.name!r}: names {len(scenario.robots)} robots, which share a "
+                "world; use simulation.fleet"
+            )
+        self.scenario = scenario
+        self.tick_ns = tick_ns
+        self.goal_tolerance_m = goal_tolerance_m
+        self.tick = 0
+        self.pose = Pose2D(*scenario.start_m)
+        self.speeds = Speeds()  # of a differential drive
+        self._instruments = Instruments(scenario.robot, scenario.walls, tick_ns, seed)
+        self._read: tuple[int, Reading] | None = None
+        self._nearby = Nearby(Motion(scenario), tick_ns)
+
+    def near(self, reach_m: float, position: Point | None = None) -> Found:
+        """Indices, and (centre, enlarged radius), of whoever may be within reach of its edge now.
+
+        In the scenario's order; nobody who is within reach is missing.
+        """
+        return self._nearby.at(self.tick, position or self.pose.position, reach_m)
+
+    def centers(self) -> list[Point]:
+        """Centres of all that is around, now: the scenario's obstacles in its order."""
+        return self.scenario.centers(self.time_s)
+
+    @property
+    def left_m(self) -> float:
+        """How far the goal is."""
+        return distance(self.pose.position, self.scenario.goal_m)
+
+    def radius_m(self, index: int) -> float:
+        """Radius of whoever near() calls by that index, not enlarged."""
+        return self.scenario.obstacles[index].radius_m
+
+    def velocity(self, index: int) -> Point:
+        """(vx, vy) in m/s, now, of whoever near() calls by that index."""
+        return velocity_at(self.scenario.obstacles[index], self.time_s, self.scenario.walls)
+
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp of the present tick."""
+        return stamp_of(self.tick, self.tick_ns)
+
+    @property
+    def time_s(self) -> float:
+        """Time of the obstacles' motion, 0 at tick 0."""
+        return self.tick * self.tick_ns * NANO
+
+    def outcome(self) -> Outcome | None:
+        """How the run has ended by the present tick, None while it goes on."""
+        # Who sees itself there need not be: the robot stops where its odometry says so.
+        doubt_m = DOUBTS * self.scenario.robot.noise.odom_m
+        if self.left_m <= self.goal_tolerance_m + doubt_m:
+            return Outcome.GOAL_REACHED
+        if self.time_s >= self.scenario.time_limit_s:
+            return Outcome.TIME_LIMIT
+        return None
+
+    def step(self, told: Point) -> None:
+        """Move robot and time on by one tick; told is what differential_drive.command gives."""
+        robot = self.scenario.robot
+        if robot.turns:
+            self.pose, self.speeds = obey(self.pose, self.speeds, told, robot, self.tick_ns)
+        else:
+            self.pose = advance(self.pose, told, self.tick_ns)
+        before_s = self.time_s
+        self.tick += 1
+        for kidnapping in self.scenario.kidnappings:
+            if before_s < kidnapping.at_s <= self.time_s:
+                self.put(Pose2D(*kidnapping.to_m, self.pose.yaw))
+
+    def put(self, pose: Pose2D) -> None:
+        """Put the robot somewhere else, at rest."""
+        self.pose, self.speeds, self._read = pose, Speeds(), None
+
+    def read(self) -> Reading:
+        """What the robot's instruments say at the present tick: the same however often."""
+        robot = self.scenario.robot
+        if not (robot.lidar.beams or robot.noise.of_odometry):
+            return Reading(self.pose, None)
+        if self._read is None or self._read[0] != self.tick:
+            surfaces: list[tuple[float, float, float]] = []
+            if robot.lidar.beams:
+                surfaces = [
+                    (*center, self.radius_m(index))
+                    for index, (center, _) in zip(*self.near(robot.lidar.range_max_m))
+                ]
+            self._read = self.tick, self._instruments.read(self.stamp_ns, self.pose, surfaces)
+        return self._read[1]
