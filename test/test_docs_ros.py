@@ -9,7 +9,7 @@ import pytest
 from mfba_planner.core.options import walk
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.recovery import RecoveryParams, longest_s
-from mfba_planner.ros.interface.node_parameters import PlannerSettings, WorldSimSettings
+from mfba_planner.ros.node_parameters import PlannerSettings, WorldSimSettings
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs/ros.md").read_text(encoding="utf-8")

@@ -12,7 +12,8 @@ from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, carried, distance
 from mfba_planner.core.types import Decision, Mode
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario, scenario_to_json
+from mfba_planner.scenarios.plain_data import scenario_to_json
+from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
 from mfba_planner.simulation.differential_drive import Speeds, arc, brake, command, obey, track
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.robot_model import Base, Drive, Lidar, Noise, Robot

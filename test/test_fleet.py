@@ -25,7 +25,8 @@ from mfba_planner.planning.speed_limit import CautionParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.read_episode import read_episode, read_recording
 from mfba_planner.report.result_json import read_result
-from mfba_planner.scenarios.scenario_files import load_scenario, scenario_to_json
+from mfba_planner.scenarios.plain_data import scenario_to_json
+from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import Fleet, alone, run_fleet, seed_of, way

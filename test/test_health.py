@@ -5,7 +5,7 @@ import pytest
 
 from mfba_planner.planning.recovery import Phase
 from mfba_planner.ros.interface.health import Health, Level, Pulse, driving
-from mfba_planner.ros.interface.node_parameters import WorldSimSettings
+from mfba_planner.ros.node_parameters import WorldSimSettings
 from mfba_planner.ros.runtime.command_timeout import Deadman
 from mfba_planner.ros.runtime.goal_queue import Errands
 from mfba_planner.ros.runtime.stale_inputs import watch_period_s

@@ -29,8 +29,9 @@ from mfba_planner.ros.interface.conversions import pose_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
+from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
-from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario, scenario_to_json
+from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.robot_model import Drive

@@ -19,7 +19,7 @@ from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, REPLAY_ARGUMEN
 from mfba_planner.launcher.simulate_launch import ARGUMENTS, told_by_launch
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
-from mfba_planner.ros.interface.node_parameters import Source
+from mfba_planner.ros.node_parameters import Source
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.replaying.replay_arguments import parse

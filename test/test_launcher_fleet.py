@@ -19,8 +19,8 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
 from mfba_planner.recording.read_episode import read_recording
+from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.run_config import OF_ROBOT, Parameters
-from mfba_planner.scenarios.scenario_files import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import run_fleet

@@ -15,8 +15,8 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Circle, Mode, Observation, Scan
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.observed_circles import discs
 from mfba_planner.planning.peers import apf
-from mfba_planner.planning.peers.observed_circles import discs
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
 from mfba_planner.simulation.obstacle_motion import Obstacle

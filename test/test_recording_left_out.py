@@ -23,7 +23,8 @@ from mfba_planner.launcher.stop_request import StopRequest
 from mfba_planner.recording import decisions
 from mfba_planner.recording.read_episode import read_episode, read_recording, summaries, summarize
 from mfba_planner.recording.robot_topics import ALONE
-from mfba_planner.scenarios.scenario_files import load_scenario, scenario_to_json
+from mfba_planner.scenarios.plain_data import scenario_to_json
+from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.robot_model import Lidar, Robot

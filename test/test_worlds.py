@@ -17,7 +17,8 @@ from mfba_planner.evaluation.suites.adversarial_worlds import FAMILIES, hostile
 from mfba_planner.evaluation.suites.random_crowds import CrowdParams, Motion, crowd
 from mfba_planner.evaluation.suites.survivability import first_contact_s, survivability
 from mfba_planner.evaluation.suites.trip import Trip
-from mfba_planner.scenarios.scenario_files import load_scenario, scenario_to_json
+from mfba_planner.scenarios.plain_data import scenario_to_json
+from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.contact import step_clearances
 from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls, center_at
 from mfba_planner.simulation.scenario import Scenario

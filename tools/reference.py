@@ -26,7 +26,7 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_factory import USUAL
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
-from mfba_planner.ros.interface import node_parameters as settings
+from mfba_planner.ros import node_parameters as settings
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios import yaml_schema
 from mfba_planner.simulation.robot_model import Robot

@@ -74,7 +74,7 @@ def report(bag: Path, found: argparse.Namespace) -> int:
 
 
 def _robot(found: argparse.Namespace) -> Robot:
-    from ..ros.interface.node_parameters import VirtualSensorSettings  # a bag of ours does without
+    from ..ros.node_parameters import VirtualSensorSettings  # a bag of ours does without
 
     planner, sensor = with_settings(PlannerParams(), SensorParams(), found.settings)
     told = {"robot_radius_m": found.robot_radius, "scan_yaw": found.scan_yaw}

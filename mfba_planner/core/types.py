@@ -12,6 +12,7 @@ import numpy as np
 from .geometry import Point, Pose2D
 
 NANO = 1e-9  # seconds in a nanosecond
+ROBOT_RADIUS_M = 0.3  # of a robot of which nothing else is known
 Bits = tuple[int, ...]
 Ranges = tuple[float, ...]
 

@@ -18,8 +18,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from ..recording.messages import points, stamp_ns
 from ..recording.robot_topics import ALONE
+from ..ros.endpoints.robot_namespace import below
 from ..ros.interface import topics
-from ..ros.interface.robot_namespace import below
 from ..ros.interface.serialized_message import header_stamp_ns
 from ..ros.interface.topics import Topic
 from ..ros.runtime.node_runtime import GraphNode

@@ -107,3 +107,8 @@ def mark_sectors(ranges: list[float], d: float, radius: float, direction: float)
         index = sector % n
         if r < ranges[index]:
             ranges[index] = r
+
+
+def bits_text(bits: Bits) -> str:
+    """Bits as text, sector 1 first: '110000111000'."""
+    return "".join(map(str, bits))

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.geometry import Point, distance
 from ..core.options import check, option
 from ..core.random_streams import stream
-from ..core.types import NANO, Bits, Circle, Observation
+from ..core.types import NANO, ROBOT_RADIUS_M, Bits, Circle, Observation
 from ..perception.obstacle_memory import Memory, MemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
 from ..perception.sensory_vector import SensorParams
@@ -20,7 +20,6 @@ from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import Move, Steering
 from .mode_transitions import Event
-from .peers.observed_circles import ROBOT_RADIUS_M
 from .planner_params import PlannerParams
 from .trajectory_cost import Prediction, RiskParams, Way, from_sectors, moved
 

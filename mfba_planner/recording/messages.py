@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.errors import FrameError, InputError
 from ..core.geometry import Point, Pose2D, yaw_of
-from ..core.types import Bits, Decision, Mode, Ranges, Refused, Scan
+from ..core.types import Decision, Mode, Ranges, Refused, Scan
 from ..perception.sensory_vector import blind
 from ..simulation.differential_drive import command
 from ..simulation.robot_model import Base
@@ -165,11 +165,6 @@ def told(twist: Any, base: Base, yaw_rad: float) -> Point:
     """The inverse: what World.step takes, of a base with this heading; raises as velocity()."""
     vx, vy, wz = velocity(twist)
     return (vx, wz) if base.turns else rotated((vx, vy), yaw_rad)
-
-
-def bits_text(bits: Bits) -> str:
-    """Bits as text, sector 1 first: '110000111000'."""
-    return "".join(map(str, bits))
 
 
 def points_text(points: Iterable[Point]) -> str:

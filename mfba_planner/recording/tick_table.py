@@ -8,9 +8,9 @@ from itertools import groupby
 from typing import Any
 
 from ..core.types import NANO
+from ..perception.sensory_vector import bits_text
 from .bag_reader import BagReader
 from .decisions import Answer, rising_decisions
-from .messages import bits_text
 from .robot_topics import ALONE
 
 Row = dict[str, Any]

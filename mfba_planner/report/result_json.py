@@ -19,7 +19,7 @@ from mfba_planner.core.errors import InputError
 from mfba_planner.core.options import flatten
 from mfba_planner.core.outputs import write_new
 from mfba_planner.evaluation.metrics import Result, evaluate
-from mfba_planner.scenarios.scenario_files import scenario_to_dict
+from mfba_planner.scenarios.plain_data import scenario_to_dict
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode, Outcome
 

@@ -21,7 +21,7 @@ from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..simulation.fleet import seed_of, worlds_seen
 from ..simulation.scenario import Scenario
-from .scenario_files import scenario_to_json
+from .plain_data import scenario_to_json
 
 Parameters = dict[str, dict[str, Any]]
 

@@ -18,7 +18,7 @@ from ..core.errors import ConfigError
 from ..core.options import did_you_mean
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.scenario import Kidnapping, Member, Scenario
-from .scenario_files import EXAMPLE, LIMIT, robot_of
+from .plain_data import EXAMPLE, LIMIT, robot_of
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
 _Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=LIMIT)]

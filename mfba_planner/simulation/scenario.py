@@ -9,6 +9,7 @@ from itertools import combinations, pairwise
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, distance
+from ..core.types import ROBOT_RADIUS_M
 from .obstacle_motion import Obstacle, Walls, center_at
 from .robot_model import Robot
 
@@ -52,7 +53,7 @@ class Scenario:
     name: str
     start_m: Point
     goal_m: Point
-    robot_radius_m: float = 0.3
+    robot_radius_m: float = ROBOT_RADIUS_M
     obstacles: tuple[Obstacle, ...] = ()
     walls: Walls | None = None
     time_limit_s: float = 120.0

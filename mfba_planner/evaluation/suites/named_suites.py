@@ -77,9 +77,7 @@ _CASES = ("case1", "case2")
 
 
 def _paper(_: Suite, k: int, __: float) -> Scenario:
-    from ...scenarios.scenario_files import (
-        load_scenario,  # takes a third of the start of a process that needs it
-    )
+    from ...scenarios.scenario_files import load_scenario
 
     return load_scenario(_CASES[k])
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.geometry import Point, bearing, distance, wrap_angle
 from ...core.types import Decision
-from ...recording.messages import bits_text
+from ...perception.sensory_vector import bits_text
 from ...simulation.batched_motion import Motion
 from ...simulation.episode import Episode, Outcome
 from ...simulation.obstacle_motion import velocity_at

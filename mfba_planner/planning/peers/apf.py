@@ -11,7 +11,7 @@ from ...core.geometry import Point
 from ...core.types import Observation
 from ..base_planner import Move, Steering
 from ..mode_transitions import Event
-from .observed_circles import discs
+from ..observed_circles import discs
 
 REPULSION = 0.3  # of the pull, at the distance where 1/d - 1/SR is 1 per metre
 NEAREST_M = 0.02  # gaps below this push no harder

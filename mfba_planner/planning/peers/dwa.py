@@ -11,7 +11,7 @@ from ...core.geometry import Point
 from ...core.types import NANO, Observation
 from ..base_planner import Move, Steering
 from ..mode_transitions import Event
-from .observed_circles import discs
+from ..observed_circles import discs
 
 HEADINGS, SPEEDS = 36, (1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0)
 HORIZON_S = 2.0

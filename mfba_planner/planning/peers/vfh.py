@@ -11,7 +11,7 @@ from ...core.geometry import Point, bearing
 from ...core.types import Observation
 from ..base_planner import Move, Steering
 from ..mode_transitions import Event
-from .observed_circles import discs
+from ..observed_circles import discs
 
 HEADINGS = 72
 MARGIN_M = 0.3  # added to every circle: it moves while the robot passes

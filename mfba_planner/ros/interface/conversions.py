@@ -18,9 +18,9 @@ from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
 from ...core.geometry import Point, Pose2D, half_turn
 from ...core.types import Bits, Decision, Mode, Ranges, Scan
-from ...perception.sensory_vector import SensorParams, longest_range_m
+from ...perception.sensory_vector import SensorParams, bits_text, longest_range_m
 from ...planning.odometry_jump import carried_off
-from ...recording.messages import SECOND_NS, bits_text, body_velocity, points_text, rotated
+from ...recording.messages import SECOND_NS, body_velocity, points_text, rotated
 from ...simulation.episode import Outcome
 from ...simulation.robot_model import Base
 from .health import Status

@@ -13,8 +13,8 @@ from ...core.types import Decision
 from ...perception.sensory_vector import sense_circles, sensory_vector
 from ...recording.bag_writer import BagWriter
 from ...recording.configuration import attach_configuration
+from ...scenarios.plain_data import scenario_to_json
 from ...scenarios.run_config import Driver, RunConfig, node_parameters, run_facts
-from ...scenarios.scenario_files import scenario_to_json
 from ...simulation.episode import Episode, Outcome
 from . import conversions, topics
 from .qos_conversion import offered

@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
 """The five nodes, one per file."""
+
+from .. import require_ros  # noqa: F401

@@ -13,12 +13,12 @@ from ...planning.planner_factory import brain
 from ...planning.planner_params import PlannerParams
 from ...planning.recovery import Phase
 from ...recording.messages import robot_pose, sector_ranges, stamp_ns
+from ..endpoints.goal_subscriptions import Goals
+from ..endpoints.planner_diagnostics import PlannerHealth
+from ..endpoints.planner_publishers import PlannerTopics
+from ..endpoints.scan_sync import Sight
 from ..interface import parameters, topics
-from ..interface.goal_subscriptions import Goals
-from ..interface.node_parameters import PlannerSettings, names
-from ..interface.planner_diagnostics import PlannerHealth
-from ..interface.planner_publishers import PlannerTopics
-from ..interface.scan_sync import Sight
+from ..node_parameters import PlannerSettings, names
 from ..runtime.lifecycle_node import ManagedNode
 from ..runtime.node_runtime import Refusals, spin_node
 from ..runtime.stale_inputs import Lockstep, Newest, Ready, watch_period_s

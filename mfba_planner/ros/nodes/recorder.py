@@ -21,11 +21,11 @@ from ...recording.configuration import attach_configuration
 from ...recording.message_definitions import definition_of
 from ...recording.messages import stamp_ns
 from ...recording.qos_profiles import OfferedQos
+from ..endpoints.robot_namespace import everywhere
 from ..interface import parameters, topics
-from ..interface.node_parameters import RecorderSettings, names
 from ..interface.qos_conversion import offered
-from ..interface.robot_namespace import everywhere
 from ..interface.serialized_message import has_header, header_stamp_ns, type_name
+from ..node_parameters import RecorderSettings, names
 from ..runtime.drain import drain
 from ..runtime.node_runtime import GraphNode, spin_node
 from ..runtime.parameter_client import Found, ParameterSurvey

@@ -16,10 +16,10 @@ from ...core.errors import ConfigError, InputError
 from ...core.types import NANO
 from ...recording.messages import pose2d
 from ...simulation.episode import stamp_of
+from ..endpoints.fleet_interface import Company
+from ..endpoints.scenario_parameter import declare_scenario
 from ..interface import parameters, topics
-from ..interface.fleet_interface import Company
-from ..interface.node_parameters import WorldSimSettings, names
-from ..interface.scenario_parameter import declare_scenario
+from ..node_parameters import WorldSimSettings, names
 from ..runtime.node_runtime import GraphNode, Refusals, spin_node
 from ..runtime.tick_control import Pace
 

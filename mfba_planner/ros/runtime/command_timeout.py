@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from ...core.types import NANO
-from ..interface.node_parameters import WorldSimSettings
+from ..node_parameters import WorldSimSettings
 
 TICKS = 1.25  # a Twist is meant for a tick: that long it always holds
 

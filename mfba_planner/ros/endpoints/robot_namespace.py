@@ -10,9 +10,9 @@ from typing import Any
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
+from ..interface.topics import GRAPH, Topic
 from ..runtime.node_runtime import GraphNode
 from ..runtime.polled_subscriptions import Deliver, Letterboxes
-from .topics import GRAPH, Topic
 
 
 def below(namespace: str, topic: Topic) -> Topic:

@@ -10,9 +10,9 @@ from ...core.geometry import Point
 from ...simulation.episode import Outcome
 from ...simulation.scenario import Scenario
 from ...simulation.world import World
+from ..node_parameters import WorldSimSettings
 from ..runtime.node_runtime import GraphNode, Refusals
 from .command_subscriptions import AnswerTopics
-from .node_parameters import WorldSimSettings
 from .robot_namespace import Namespaced
 from .world_publishers import WorldTopics
 

@@ -13,14 +13,14 @@ from ...core.errors import InputError
 from ...core.geometry import Point
 from ...recording.messages import stamp_ns, told
 from ...simulation.world import World
+from ..interface import topics
+from ..interface.serialized_message import header_stamp_ns
+from ..node_parameters import WorldSimSettings
 from ..runtime.command_matching import Answers
 from ..runtime.command_timeout import Deadman
 from ..runtime.node_runtime import GraphNode, Refusals
 from ..runtime.polled_subscriptions import Letter, Letterboxes
-from . import topics
-from .node_parameters import WorldSimSettings
 from .robot_namespace import Namespaced
-from .serialized_message import header_stamp_ns
 
 REST: Point = (0.0, 0.0)
 

@@ -10,9 +10,9 @@ from geometry_msgs.msg import Twist, TwistStamped
 from ...core.geometry import Point
 from ...core.types import Decision, Mode
 from ...planning.odometry_jump import carried_off
+from ..interface import conversions, markers, topics
+from ..node_parameters import PlannerSettings
 from ..runtime.node_runtime import GraphNode
-from . import conversions, markers, topics
-from .node_parameters import PlannerSettings
 
 
 class PlannerTopics:

@@ -10,9 +10,9 @@ from ...core.geometry import Point, towards
 from ...simulation.episode import Outcome
 from ...simulation.robot_model import Robot
 from ...simulation.world import World
+from ..interface import conversions, markers, topics
+from ..node_parameters import WorldSimSettings
 from ..runtime.node_runtime import GraphNode
-from . import conversions, markers, topics
-from .node_parameters import WorldSimSettings
 from .robot_namespace import Namespaced
 
 TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is shown

@@ -8,11 +8,11 @@ import time
 from ...core.types import Decision
 from ...planning.supervised_planner import Guarded
 from ...recording.messages import points_text
+from ..interface.health import Health, driving
+from ..node_parameters import PlannerSettings
 from ..runtime.goal_queue import Errands
 from ..runtime.node_runtime import GraphNode, Refusals
 from .diagnostics_publisher import DiagnosticTopic
-from .health import Health, driving
-from .node_parameters import PlannerSettings
 
 
 class PlannerHealth:

@@ -12,9 +12,9 @@ from ...core.types import Observation, Scan
 from ...perception.scan_to_sectors import aligned
 from ...planning.planner_params import PlannerParams
 from ...recording.messages import laser_scan, stamp_ns
+from ..interface import topics
 from ..runtime.node_runtime import GraphNode, Refusals
 from ..runtime.stamp_pairing import StampPairs
-from . import topics
 
 
 class Sight:

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import time
 
+from ..interface.health import Health
+from ..node_parameters import VirtualSensorSettings
 from ..runtime.node_runtime import GraphNode, Refusals
 from ..runtime.stale_inputs import watch_period_s
 from .diagnostics_publisher import DiagnosticTopic
-from .health import Health
-from .node_parameters import VirtualSensorSettings
 
 
 class SensorHealth:

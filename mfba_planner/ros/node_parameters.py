@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ...core.options import check, option
-from ...planning.planner_params import PlannerParams
-from ...simulation.robot_model import Base, Robot
-from ...simulation.scenario import Scenario
+from ..core.options import check, option
+from ..core.types import ROBOT_RADIUS_M
+from ..planning.planner_params import PlannerParams
+from ..simulation.robot_model import Base, Robot
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
 _WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause lets it go"
@@ -89,7 +89,7 @@ class VirtualSensorSettings:
 
     source: Source = option(Source.OBSTACLES, "obstacles (the paper) or scan (any LaserScan)")
     robot_radius_m: float = option(
-        Scenario.__dataclass_fields__["robot_radius_m"].default,
+        ROBOT_RADIUS_M,
         "added to every obstacle (Fig. 4)",
         unit="m",
         minimum=0.0,

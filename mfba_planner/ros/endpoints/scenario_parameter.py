@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ...scenarios.scenario_files import load_scenario, scenario_to_json
+from ...scenarios.plain_data import scenario_to_json
+from ...scenarios.scenario_files import load_scenario
 from ...simulation.scenario import Scenario
+from ..interface import parameters
+from ..node_parameters import Rig
 from ..runtime.node_runtime import GraphNode
-from . import parameters
-from .node_parameters import Rig
 
 
 def declare_scenario(node: GraphNode, source: str) -> Scenario:

@@ -10,9 +10,9 @@ from ...simulation.episode import Outcome
 from ...simulation.fleet import Fleet
 from ...simulation.scenario import Scenario
 from ...simulation.world import World
+from ..interface import conversions, topics
+from ..node_parameters import WorldSimSettings
 from ..runtime.node_runtime import GraphNode, Refusals
-from . import conversions, topics
-from .node_parameters import WorldSimSettings
 from .robot_interface import Seat
 
 

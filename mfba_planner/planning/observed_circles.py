@@ -5,10 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.types import Observation
-from ...simulation.scenario import Scenario
-
-ROBOT_RADIUS_M: float = Scenario.__dataclass_fields__["robot_radius_m"].default  # type: ignore
+from ..core.types import ROBOT_RADIUS_M, Observation
 
 
 def discs(obs: Observation) -> np.ndarray:

@@ -7,10 +7,10 @@ import time
 from typing import Any
 
 from ...core.types import NANO
+from ..interface import conversions, topics
+from ..interface.health import Status
+from ..node_parameters import PlannerSettings, VirtualSensorSettings
 from ..runtime.node_runtime import GraphNode
-from . import conversions, topics
-from .health import Status
-from .node_parameters import PlannerSettings, VirtualSensorSettings
 
 
 class DiagnosticTopic:
