@@ -22,7 +22,7 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.run_episode import run
 
-MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
+MFBA = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.mfba())"
 
 
 def recorded(scenario: str, algorithm: str, seed: int, driver: str, out: Path) -> Episode | None:

@@ -29,7 +29,7 @@ from mfba_planner.scenarios.run_config import RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.run_episode import run
 
-MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
+MFBA = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.mfba())"
 
 
 def write_bag(path: Path, size_bytes: int) -> int:

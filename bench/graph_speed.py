@@ -124,7 +124,7 @@ def graph(driver: str, seed: int, root: Path) -> float:
         f"--driver={driver}",
         f"--seed={seed}",
     ]
-    code = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
+    code = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.mfba())"
     subprocess.run(
         [sys.executable, "-c", code, *command, "--out", str(out), "--no-picture"],
         check=False,  # a collision ends a run as a failure; its speed counts all the same

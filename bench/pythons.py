@@ -17,8 +17,8 @@ ROOT = Path(__file__).parents[1]
 
 DIGESTS = """
 import hashlib, platform, numpy
-from mfba_planner.core.digest import digest
-from mfba_planner.core.episode import run
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.run_episode import run
 from mfba_planner.core.options import override
 from mfba_planner.paper.readings import PLANNERS
 from mfba_planner.scenarios import load_scenario

@@ -33,7 +33,7 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 
 ROOT = Path(__file__).parents[1]
 FOREIGN = ROOT / "test/data/rosbag2_foreign_scan"
-REPLAY = "import sys; from mfba_planner import entry; sys.exit(entry.replay())"
+REPLAY = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.replay())"
 
 Times = dict[str, list[int]]  # ns, by topic, in order
 

@@ -33,7 +33,7 @@ from mfba_planner.recording.bag_reader import BagReader
 
 ROOT = Path(__file__).resolve().parents[1]
 FOREIGN_BAG = ROOT / "test" / "data" / "rosbag2_foreign_scan"
-PROGRAM = "import sys; from mfba_planner import entry; sys.exit(entry.{}())"
+PROGRAM = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.{}())"
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 END_WITHIN_S = 15.0
 

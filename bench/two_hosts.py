@@ -18,7 +18,7 @@ from pathlib import Path
 
 HOSTS = {"mfba-a": "10.77.0.1", "mfba-b": "10.77.0.2"}
 ADDRESS = f"tcp://{HOSTS['mfba-a']}:8786"
-MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
+MFBA = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.mfba())"
 COUNT = """
 from collections import Counter
 from distributed import Client

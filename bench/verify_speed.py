@@ -18,7 +18,7 @@ from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.verification.verify_bag import verify
 
-MFBA = "import sys; from mfba_planner import entry; sys.exit(entry.mfba())"
+MFBA = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.mfba())"
 
 
 def main() -> None:

@@ -15,7 +15,7 @@ from helpers import wait_until
 ROOT = Path(__file__).parents[1]
 MARK = "MFBA_TEST_MARK"
 INSTALLED = Path(sys.executable).parent
-PROGRAM = "import sys; from mfba_planner import entry; sys.exit(entry.{}())"
+PROGRAM = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.{}())"
 # Thousands of ticks: long enough to be caught in the middle of it.
 LONG = ["case1", "--planner", "paper", "--seed", "1", "--no-picture"]
 LONG += ["--set", "planner.step_length_m=0.002"]

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 def start(code: str, **options: object) -> "subprocess.Popen[str]":
     """Run a few lines of Python in a process of their own, so that signals and pipes are real."""
     return subprocess.Popen(  # type: ignore[call-overload, no-any-return]
-        [sys.executable, "-c", f"import sys\nfrom mfba_planner import entry\n{code}"],
+        [sys.executable, "-c", f"import sys\nfrom mfba_planner import entry_points\n{code}"],
         cwd=ROOT,
         text=True,
         stderr=subprocess.PIPE,
@@ -125,7 +125,7 @@ def test_loading_the_doors_loads_nothing_heavy() -> None:
 def test_a_reader_that_left_is_no_error(size: int) -> None:
     reader, writer = os.pipe()
     os.close(reader)
-    code = f"sys.exit(entry.guarded_main(lambda: int(bool(print('x' * {size}))), 'mfba'))"
+    code = f"sys.exit(entry_points.guarded_main(lambda: int(bool(print('x' * {size}))), 'mfba'))"
     try:
         assert outcome(start(code, stdout=writer)) == (141, None, "")
     finally:
@@ -134,7 +134,7 @@ def test_a_reader_that_left_is_no_error(size: int) -> None:
 
 @pytest.mark.parametrize("size", [1, 100_000])
 def test_a_full_disk_behind_stdout_is_one_line(size: int) -> None:
-    code = f"sys.exit(entry.guarded_main(lambda: int(bool(print('x' * {size}))), 'mfba'))"
+    code = f"sys.exit(entry_points.guarded_main(lambda: int(bool(print('x' * {size}))), 'mfba'))"
     with open("/dev/full", "w", encoding="utf-8") as full:
         status, _, err = outcome(start(code, stdout=full))
     assert (status, err) == (
@@ -147,8 +147,8 @@ SLOW_IMPORT = """
 def slow(name):
     print("importing", flush=True)
     sys.stdin.read()
-entry.import_module = slow
-sys.exit(entry.{door}())
+entry_points.import_module = slow
+sys.exit(entry_points.{door}())
 """
 
 
@@ -177,9 +177,9 @@ def main(argv):
         sys.stdin.read()
     finally:
         print("closed", flush=True)
-entry.import_module = lambda name: SimpleNamespace(main=main)
+entry_points.import_module = lambda name: SimpleNamespace(main=main)
 sys.argv = ["mfba", "run"]
-sys.exit(entry.mfba())
+sys.exit(entry_points.mfba())
 """
 
 
@@ -207,7 +207,7 @@ def test_a_signal_unwinds_a_running_command(signum: int, code: int) -> None:
     ],
 )
 def test_a_node_without_ros_says_so_in_one_line(before: str, line: str) -> None:
-    code, out, err = outcome(start(f"{before}; sys.exit(entry.planner())"))
+    code, out, err = outcome(start(f"{before}; sys.exit(entry_points.planner())"))
     assert (code, out) == (1, "")
     assert err.startswith(line)
     assert len(err.splitlines()) == 1

@@ -3,7 +3,7 @@
 
 
 class MfbaError(Exception):
-    """Anything the user can mend; entry.py turns it into one line and exit code 1."""
+    """Anything the user can mend; entry_points.py turns it into one line and exit code 1."""
 
 
 class ConfigError(MfbaError):

@@ -18,10 +18,10 @@ LAST_LINES = 8
 _BOOT = """\
 import sys
 sys.path[:] = {path!r}
-from mfba_planner.leash import end_with_parent
+from mfba_planner.core.child_process import end_with_parent
 end_with_parent({parent})
-from mfba_planner import entry
-sys.exit(entry.{program}())
+from mfba_planner import entry_points
+sys.exit(entry_points.{program}())
 """
 _LOGGING = {
     "RCUTILS_CONSOLE_OUTPUT_FORMAT": "{severity}: {message}",
@@ -36,7 +36,7 @@ class Child:
     """A running node; its output goes to sink(name, line), line by line."""
 
     def __init__(self, name: str, args: list[str], sink: Callable[[str, str], None]) -> None:
-        """Start a program (a function of entry.py) with args; name is its own, or NAMESPACE/it."""
+        """Start a program (a function of entry_points.py) with args; name is its own, or NAMESPACE/it."""
         namespace, _, program = name.rpartition("/")
         if namespace:
             args = [*args, "-r", f"__ns:=/{namespace}"]
