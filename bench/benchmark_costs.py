@@ -21,7 +21,7 @@ from stepwise_dwa import StepwiseDwa
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Observation, PathPlanner
 from mfba_planner.evaluation.sweep.run_sweep import sweep
-from mfba_planner.evaluation.sweep.sweep_spec import Order
+from mfba_planner.evaluation.sweep.sweep_spec import SweepSpec
 from mfba_planner.evaluation.sweep.worker import Lost, each
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_registry import make
@@ -67,7 +67,7 @@ def measure_rates(
     found: dict[str, list[float]] = {entry.label: [] for entry in entries}
     for _ in range(RATE_ROUNDS):
         for entry in entries:
-            order = Order(
+            order = SweepSpec(
                 suite=RATE_SUITE, planners=(entry.planner,), worlds=worlds, oracle=False,
                 setting=entry.setting,
             )  # fmt: skip

@@ -17,7 +17,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullForma
 from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.evaluation.sweep.columns import Row
 from mfba_planner.evaluation.sweep.explain_run import contact_index, explain
-from mfba_planner.evaluation.sweep.single_run import play
+from mfba_planner.evaluation.sweep.single_run import run_one
 from mfba_planner.evaluation.sweep.sweep_spec import Run
 from mfba_planner.report import style
 from mfba_planner.report.figure_canvas import EDGE, Sheet, to_bytes
@@ -213,7 +213,7 @@ def _example(
         return
     suite, world = found[0]
     run = Run(suite, world, loser.planner, 0)
-    played = play(run, loser.setting)
+    played = run_one(run, loser.setting)
     headline = explain(played)[0]
     index = contact_index(played.episode)
     assert index is not None, "it collided in the sweep"
@@ -243,7 +243,7 @@ def _shorter(
         return
     points, suite, world = max(found)
     run = Run(suite, world, loser.planner, 0)
-    ways = [play(Run(suite, world, e.planner, 0), e.setting).episode for e in (winner, loser)]
+    ways = [run_one(Run(suite, world, e.planner, 0), e.setting).episode for e in (winner, loser)]
     file = f"benchmark-{winner.label}-wins.png"
     legend = f"dash-dotted: {loser.label}, {points:.0f} points longer"
     figure = run_figure(ways[0], ways[1], f"{winner.label}; {legend}")

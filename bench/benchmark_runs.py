@@ -13,11 +13,11 @@ from mfba_planner.evaluation.study.chunk_store import Store
 from mfba_planner.evaluation.study.compute_chunks import compute
 from mfba_planner.evaluation.suites import suite as suite_of
 from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
-from mfba_planner.evaluation.sweep.chunks import Optima, parts_of
+from mfba_planner.evaluation.sweep.chunks import Optima, chunks_of
 from mfba_planner.evaluation.sweep.columns import Row, judged
 from mfba_planner.evaluation.sweep.run_sweep import open_store, sweep
 from mfba_planner.evaluation.sweep.summary import Standing, Versus, standings, versus
-from mfba_planner.evaluation.sweep.sweep_spec import Order, Setting
+from mfba_planner.evaluation.sweep.sweep_spec import Setting, SweepSpec
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
 
@@ -114,23 +114,23 @@ class Results:
 
     def judge(self, suite: str, worlds: int) -> None:
         """Ask the oracle about a suite."""
-        order = Order(
+        order = SweepSpec(
             suite=suite, planners=("straight",), worlds=worlds, first=self.first, setting=FINE
         )
-        parts = [part for part in parts_of(order) if isinstance(part, Optima)]
+        chunks = [part for part in chunks_of(order) if isinstance(part, Optima)]
         facts = {"suite": suite, "first": self.first, "worlds": worlds}
         store = Store(
-            self.out / f"{suite}-optima", parts, facts, command="benchmark", packages=ORACLE
+            self.out / f"{suite}-optima", chunks, facts, command="benchmark", packages=ORACLE
         )
-        found = compute(parts, workers=self.workers, executor=self.executor, store=store, say=say)
-        columns = [found[part.name] for part in parts]
+        found = compute(chunks, workers=self.workers, executor=self.executor, store=store, say=say)
+        columns = [found[part.name] for part in chunks]
         rows = [dict(zip(some, values)) for some in columns for values in zip(*some.values())]
         self._optima[suite] = {row["world"]: row for row in rows}
 
     def make(self, suite: str, entry: Entry, worlds: int) -> None:
         """Make the runs of one line."""
         key = (suite, entry.planner, entry.setting)
-        order = Order(
+        order = SweepSpec(
             suite=suite, planners=(entry.planner,), worlds=worlds, first=self.first,
             oracle=False, setting=entry.setting,
         )  # fmt: skip

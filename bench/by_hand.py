@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any
 
 from mfba_planner.launcher.graph_monitor import Monitor
-from mfba_planner.launcher.node_processes import Crew
+from mfba_planner.launcher.node_processes import NodeProcesses
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios.run_config import (
@@ -41,7 +41,7 @@ class ByHand:
         domain = self._stack.enter_context(private_domain())
         self.monitor = self._stack.enter_context(Monitor(domain))
         hear = lambda name, line: self._lines.append(f"{name}: {line}")  # noqa: E731
-        self.crew = self._stack.enter_context(Crew(hear, lambda: False))
+        self.crew = self._stack.enter_context(NodeProcesses(hear, lambda: False))
         self._deadline = time.monotonic() + TIMEOUT_S
         return self
 

@@ -20,7 +20,7 @@ import numpy as np
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.random_streams import stream
 from mfba_planner.core.types import Mode, Observation
-from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.run_episode import run
@@ -50,7 +50,7 @@ def floor(params: BatParams) -> Callable[[int], object]:
 
 def decisions(ranges_m: tuple[float, ...], mode: Mode) -> Callable[[int], object]:
     """Decisions of one planner on ever new stamps, somewhere on the way."""
-    planner = Planner(PlannerParams(), seed=1)
+    planner = Algorithm1(PlannerParams(), seed=1)
 
     def once(stamp: int) -> object:
         pose = Pose2D(1.0 + 1e-4 * (stamp % 50_000), 2.0)

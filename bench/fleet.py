@@ -19,14 +19,19 @@ import numpy as np
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.statistics import share_interval
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.peers.orca import Orca
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import Predictive, PredictiveParams, preset
 from mfba_planner.planning.trajectory_cost import RiskParams
 from mfba_planner.simulation.episode import Outcome
-from mfba_planner.simulation.fleet import MakeBrain, run_fleet
-from mfba_planner.simulation.planner_observations import Look, Perception, look, look_at_scan
+from mfba_planner.simulation.fleet import MakePlanner, run_fleet
+from mfba_planner.simulation.planner_observations import (
+    Observe,
+    Perception,
+    observe_scan,
+    observe_sectors,
+)
 from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.scenario import Member, Scenario
 
@@ -59,23 +64,23 @@ class Way:
     planner: PlannerParams
     sensor: SensorParams = SensorParams()
     robot: Robot = Robot()
-    make: Callable[[PlannerParams, SensorParams], MakeBrain]
-    look: Callable[[], Look] = lambda: look
+    make: Callable[[PlannerParams, SensorParams], MakePlanner]
+    observe: Callable[[], Observe] = lambda: observe_sectors
 
 
-def _paper(params: PlannerParams, _: SensorParams) -> MakeBrain:
-    return lambda seed: Planner(params, seed)
+def _paper(params: PlannerParams, _: SensorParams) -> MakePlanner:
+    return lambda seed: Algorithm1(params, seed)
 
 
-def _predictive(params: PlannerParams, sensor: SensorParams) -> MakeBrain:
+def _predictive(params: PlannerParams, sensor: SensorParams) -> MakePlanner:
     return lambda seed: Predictive(params, sensor, seed)
 
 
-def _wide(params: PlannerParams, sensor: SensorParams) -> MakeBrain:
+def _wide(params: PlannerParams, sensor: SensorParams) -> MakePlanner:
     return lambda seed: Predictive(params, sensor, seed, WIDE)
 
 
-def _orca(params: PlannerParams, sensor: SensorParams) -> MakeBrain:
+def _orca(params: PlannerParams, sensor: SensorParams) -> MakePlanner:
     return lambda seed: Orca(params, sensor, seed)
 
 
@@ -85,7 +90,7 @@ FAR = SensorParams(sensing_range_m=3.0)
 LIDAR = Robot(lidar=Lidar(beams=360))
 
 
-def _known() -> Look:
+def _known() -> Observe:
     return Perception("known", sectors=False)
 
 
@@ -95,18 +100,18 @@ WAYS: dict[str, Way] = {
         planner=replace(PlannerParams(), step_length_m=0.08), make=_paper
     ),
     "predictive, sectors": Way(planner=preset(), make=_predictive),
-    "predictive, known within 0.8 m": Way(planner=preset(), make=_predictive, look=_known),
+    "predictive, known within 0.8 m": Way(planner=preset(), make=_predictive, observe=_known),
     "predictive, known within 3 m": Way(
-        planner=preset(), sensor=FAR, make=_predictive, look=_known
+        planner=preset(), sensor=FAR, make=_predictive, observe=_known
     ),
-    "predictive, known, wide berth": Way(planner=preset(), make=_wide, look=_known),
+    "predictive, known, wide berth": Way(planner=preset(), make=_wide, observe=_known),
     "predictive, lidar, tracked": Way(
         planner=replace(preset(), scan_radius_m=0.35),
         robot=LIDAR,
         make=_predictive,
-        look=lambda: look_at_scan,
+        observe=lambda: observe_scan,
     ),
-    "orca, known within 3 m": Way(planner=preset(), sensor=FAR, make=_orca, look=_known),
+    "orca, known within 3 m": Way(planner=preset(), sensor=FAR, make=_orca, observe=_known),
 }
 
 
@@ -120,8 +125,8 @@ def measure(name: str, way: Way, robots: int, radius_m: float, seeds: range) -> 
             planner=way.planner,
             sensor=way.sensor,
             seed=seed,
-            brain=way.make(way.planner, way.sensor),
-            look=_each(way.look),
+            path_planner=way.make(way.planner, way.sensor),
+            observe=_each(way.observe),
         )
         results = [evaluate(episode) for episode in done]
         there = sum(result.outcome is Outcome.GOAL_REACHED for result in results)
@@ -140,9 +145,9 @@ def measure(name: str, way: Way, robots: int, radius_m: float, seeds: range) -> 
     )
 
 
-def _each(make: Callable[[], Look]) -> Look:
+def _each(make: Callable[[], Observe]) -> Observe:
     """A look of its own for every robot: some remember."""
-    looks: dict[int, Look] = {}
+    looks: dict[int, Observe] = {}
     return lambda world, sensor: looks.setdefault(id(world), make())(world, sensor)
 
 

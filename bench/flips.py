@@ -35,7 +35,7 @@ def main() -> int:
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     made: Counter[str] = Counter()
-    noticed: Counter[str] = Counter()
+    detect: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as root:
         bag = record(Path(root) / "bag", "case2", 4)
         ticks = len(verify(bag).recorded)
@@ -48,11 +48,11 @@ def main() -> int:
             if verify(edited).is_identical:
                 print(f"NOT noticed: {what}, message {place}")
             else:
-                noticed[what] += 1
+                detect[what] += 1
     for what, count in sorted(made.items()):
-        print(f"{what:<28} {noticed[what]:>4} of {count:>4} noticed")
-    print(f"{noticed.total()} of {made.total()} noticed")
-    return int(noticed.total() < made.total())
+        print(f"{what:<28} {detect[what]:>4} of {count:>4} noticed")
+    print(f"{detect.total()} of {made.total()} noticed")
+    return int(detect.total() < made.total())
 
 
 def flip(rng: np.random.Generator) -> tuple[str, str, Callable[[Any], None]]:
@@ -69,10 +69,10 @@ def flip(rng: np.random.Generator) -> tuple[str, str, Callable[[Any], None]]:
         return text[:sector] + "10"[int(text[sector])] + text[sector + 1 :]
 
     def last_bit(text: str) -> str:
-        parts = [float(part) for part in text.split(",")]
-        raw = np.float64(parts[axis]).view(np.uint64) ^ np.uint64(1)
-        parts[axis] = float(raw.view(np.float64))
-        return ",".join(map(repr, parts))
+        chunks = [float(part) for part in text.split(",")]
+        raw = np.float64(chunks[axis]).view(np.uint64) ^ np.uint64(1)
+        chunks[axis] = float(raw.view(np.float64))
+        return ",".join(map(repr, chunks))
 
     def mode(text: str) -> str:
         others = [other.value for other in Mode if other.value != text]

@@ -21,7 +21,7 @@ from mfba_planner.core.types import NANO
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.ros_domain import claim_domain
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.odometry_jump import carried_off
+from mfba_planner.planning.odometry_jump import is_jump_reason
 from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
@@ -81,19 +81,19 @@ def main() -> None:
     parser.add_argument("--graph", type=int, default=0)
     found = parser.parse_args()
     for name, (robot, params) in ROWS.items():
-        arrived = clean = noticed = equal = 0
+        arrived = clean = detect = equal = 0
         for k in range(found.count):
             scenario = kidnapped(k, robot, params)
             episode = play(scenario, params, k)
             arrived += episode.outcome is Outcome.GOAL_REACHED
             clean += evaluate(episode).success
-            noticed += any(carried_off(tick.reason) for tick in episode.ticks)
+            detect += any(is_jump_reason(tick.reason) for tick in episode.ticks)
             if k < found.graph:
                 equal += by_graph(scenario, params, k) == digest(episode.ticks)
         graph = f"; graph: {equal} of {found.graph} digests equal" if found.graph else ""
         print(
             f"{name:36} arrived {arrived} of {found.count}, without contact {clean}, "
-            f"noticed {noticed}{graph}",
+            f"noticed {detect}{graph}",
             flush=True,
         )
 

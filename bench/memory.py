@@ -21,7 +21,7 @@ os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 from mfba_planner.core.geometry import distance
 from mfba_planner.core.types import NANO
 from mfba_planner.launcher.graph_monitor import Monitor, Question
-from mfba_planner.launcher.node_processes import Crew
+from mfba_planner.launcher.node_processes import NodeProcesses
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.ros.interface.topics import RECORDER
@@ -58,7 +58,7 @@ def measure(ticks: int) -> dict[str, list[float]]:
         tempfile.TemporaryDirectory() as root,
         private_domain() as domain,
         Monitor(domain) as monitor,
-        Crew(lambda name, line: None, lambda: False) as crew,
+        NodeProcesses(lambda name, line: None, lambda: False) as crew,
     ):
         told = node_parameters(config, peers)
         told["world_sim"] |= {
@@ -92,7 +92,7 @@ def measure(ticks: int) -> dict[str, list[float]]:
     return history
 
 
-def agreed(crew: Crew, monitor: Monitor, question: Question) -> None:
+def agreed(crew: NodeProcesses, monitor: Monitor, question: Question) -> None:
     """Ask until the answer is yes."""
     while (answer := question.answer()) is None or not answer.success:
         crew.check()

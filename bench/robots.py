@@ -20,7 +20,7 @@ from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.contact import step_clearances
-from mfba_planner.simulation.differential_drive import SUBTICK_NS, Speeds, command, obey
+from mfba_planner.simulation.differential_drive import SUBTICK_NS, Speeds, apply_command, command
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
 from mfba_planner.simulation.scenario import Scenario
@@ -71,7 +71,7 @@ def clearance(episode: Episode) -> float:
         for k in range(count):
             a_s, b_s = (t_s + tick_ns * NANO * (k + j) / count for j in (0, 1))
             if base.turns:
-                after, speeds = obey(now, speeds, told, base, tick_ns // count)
+                after, speeds = apply_command(now, speeds, told, base, tick_ns // count)
             else:
                 after = end
             gaps = step_clearances(scenario, a_s, b_s, now.position, after.position)

@@ -12,7 +12,7 @@ from launch.launch_description import LaunchDescription
 
 from mfba_planner.launcher.launch_actions import describe
 from mfba_planner.launcher.robot_launch import Start
-from mfba_planner.launcher.simulate_launch import ARGUMENTS, told_by_launch
+from mfba_planner.launcher.simulate_launch import ARGUMENTS, launch_parameters
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -24,5 +24,5 @@ def _starts(given: Mapping[str, str]) -> list[Start]:
     files = (given["params_file"],) if given["params_file"] else ()
     return [
         Start(name=name, parameters=parameters, files=files)
-        for name, parameters in told_by_launch(given).items()
+        for name, parameters in launch_parameters(given).items()
     ]

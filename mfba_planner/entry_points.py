@@ -63,7 +63,9 @@ def mfba() -> int:
     return _command("mfba", "mfba_planner.cli")
 
 
-def guarded_main(run: Callable[[], int], program: str, interrupted: int = _SIGINT_CODE) -> int:
+def run_and_return_exit_code(
+    run: Callable[[], int], program: str, interrupted: int = _SIGINT_CODE
+) -> int:
     """Return run's exit code; an error the user can mend becomes one line on stderr and 1.
 
     Ctrl-C gives `interrupted`, a reader that went away gives 141; a bug keeps its traceback.
@@ -98,7 +100,7 @@ def _judge(error: BaseException, program: str, interrupted: int) -> int:
 def _node(name: str) -> int:
     """Run a node, which ends with 0 on SIGINT and SIGTERM; its runtime takes both over."""
     _start(on_sigint=0, on_sigterm=0)
-    code = guarded_main(
+    code = run_and_return_exit_code(
         lambda: int(import_module(f"mfba_planner.ros.nodes.{name}").main(sys.argv[1:])),
         name,
         interrupted=0,
@@ -119,7 +121,7 @@ def _command(name: str, module: str) -> int:
         signal.signal(signal.SIGTERM, _unwind)
         return int(main(sys.argv[1:]))
 
-    code = guarded_main(run, name)
+    code = run_and_return_exit_code(run, name)
     # The process ends: a last search for garbage would cost each command 0.02 s for nothing.
     gc.freeze()
     return code

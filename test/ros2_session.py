@@ -204,8 +204,8 @@ class Session:
         writer = self.graph.probe.create_publisher(type(message), name, 10)
         self._until(lambda: writer.get_subscription_count() > 0)
         writer.publish(message)
-        legs = f"1 of {len(message.poses)}"
-        self._until(lambda: legs in (v.value for s in self._driving() for v in s.values))
+        segments = f"1 of {len(message.poses)}"
+        self._until(lambda: segments in (v.value for s in self._driving() for v in s.values))
 
     def _driving(self) -> list[Any]:
         return [s for m in self.health for s in m.status if s.name == "planner: driving"]

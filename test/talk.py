@@ -55,7 +55,7 @@ class Talk:
             self.goal.publish(goal(*at))  # latched
         self.node = graph.start(PlannerNode, parameters)
         if at:
-            graph.until(lambda: self.node.goals.errands.goal is not None)
+            graph.until(lambda: self.node.goals.goal_queue.goal is not None)
 
     def answers(self, *messages: Any) -> list[Any]:
         """Publish in this order and return the decisions that come of it."""

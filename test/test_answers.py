@@ -4,11 +4,11 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.ros.runtime.command_matching import Answers
+from mfba_planner.ros.runtime.command_matching import CommandMatching
 
 
 def test_a_twist_belongs_to_the_goal_step_before_it() -> None:
-    heard = Answers()
+    heard = CommandMatching()
     heard.goal_step(7, sent_ns=10)
     assert heard.take(7) is None
     heard.cmd_vel("a", sent_ns=11)
@@ -18,7 +18,7 @@ def test_a_twist_belongs_to_the_goal_step_before_it() -> None:
 
 
 def test_order_of_arrival_does_not_matter() -> None:
-    heard = Answers()
+    heard = CommandMatching()
     heard.cmd_vel("a", sent_ns=11)
     assert heard.take(7) is None
     heard.goal_step(7, sent_ns=10)
@@ -26,7 +26,7 @@ def test_order_of_arrival_does_not_matter() -> None:
 
 
 def test_a_twist_older_than_every_goal_step_is_nobodys() -> None:
-    heard = Answers()
+    heard = CommandMatching()
     heard.cmd_vel("of a planner that is gone", sent_ns=9)
     heard.goal_step(7, sent_ns=10)
     assert heard.take(7) is None
@@ -35,7 +35,7 @@ def test_a_twist_older_than_every_goal_step_is_nobodys() -> None:
 
 
 def test_a_twist_that_was_taken_answers_nothing_sent_in_its_nanosecond() -> None:
-    heard = Answers()
+    heard = CommandMatching()
     heard.goal_step(7, sent_ns=10)
     heard.cmd_vel("seven", sent_ns=11)
     assert heard.take(7) == "seven"
@@ -45,7 +45,7 @@ def test_a_twist_that_was_taken_answers_nothing_sent_in_its_nanosecond() -> None
 
 
 def test_a_second_answer_to_one_tick_is_none_to_the_next() -> None:
-    heard = Answers()
+    heard = CommandMatching()
     for sent_ns in (10, 20):
         heard.goal_step(7, sent_ns)
         heard.cmd_vel("seven", sent_ns + 1)
@@ -64,16 +64,16 @@ ARRIVE = st.sampled_from(["goal_step", "cmd_vel"])
 @given(st.lists(ANSWER | ARRIVE, max_size=40))
 def test_no_twist_is_ever_taken_for_another_ticks(events: list[tuple[bool, bool] | str]) -> None:
     """A planner answers the open tick any number of times; each topic keeps its own order."""
-    heard = Answers()
-    under_way: dict[str, list[tuple[int, int]]] = {"goal_step": [], "cmd_vel": []}
+    heard = CommandMatching()
+    running: dict[str, list[tuple[int, int]]] = {"goal_step": [], "cmd_vel": []}
     tick = 1
     for now, event in enumerate(events):
         if isinstance(event, tuple):
-            for later, (queue, arrives) in enumerate(zip(under_way.values(), event)):
+            for later, (queue, arrives) in enumerate(zip(running.values(), event)):
                 if arrives:
                     queue.append((tick, 10 * now + later))
-        elif under_way[event]:
-            about, sent_ns = under_way[event].pop(0)
+        elif running[event]:
+            about, sent_ns = running[event].pop(0)
             if event == "goal_step":
                 heard.goal_step(about, sent_ns)
             else:

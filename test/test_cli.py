@@ -13,7 +13,7 @@ import pytest
 from launching import PROGRAM, ROOT, complete
 
 from mfba_planner import __version__, cli
-from mfba_planner.entry_points import guarded_main
+from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.run_episode import run
 
@@ -21,7 +21,7 @@ Said = pytest.CaptureFixture[str]
 
 
 def mfba(said: Said, *args: str) -> tuple[int, str, str]:
-    code = guarded_main(lambda: cli.main([*args]), "mfba")
+    code = run_and_return_exit_code(lambda: cli.main([*args]), "mfba")
     return code, *said.readouterr()
 
 

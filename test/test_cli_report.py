@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mfba_planner import cli
-from mfba_planner.entry_points import guarded_main
+from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.report.result_json import result_to_dict, write_result
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode
@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def report(said: Said, *args: str | Path) -> tuple[int, str, str]:
-    code = guarded_main(lambda: cli.main(["report", *map(str, args)]), "mfba")
+    code = run_and_return_exit_code(lambda: cli.main(["report", *map(str, args)]), "mfba")
     return code, *said.readouterr()
 
 
@@ -77,7 +77,10 @@ def test_a_result_is_made_again(capsys: Said, kept: Path, episode: Episode) -> N
 def test_a_result_holds_its_world(capsys: Said, tmp_path: Path) -> None:
     world = tmp_path / "mine.yaml"
     world.write_text("name: mine\nstart_m: [0.0, 0.0]\ngoal_m: [2.0, 0.0]\n")
-    assert guarded_main(lambda: cli.main(["sim", str(world), "--out", "run"]), "mfba") == 0
+    assert (
+        run_and_return_exit_code(lambda: cli.main(["sim", str(world), "--out", "run"]), "mfba")
+        == 0
+    )
     world.unlink()
     capsys.readouterr()
     assert report(capsys, "run") == (0, "wrote report.html\n", "")
@@ -139,7 +142,9 @@ def test_what_is_there_is_not_overwritten(capsys: Said, kept: Path) -> None:
 
 
 def test_several_runs_keep_their_order(capsys: Said, kept: Path) -> None:
-    assert guarded_main(lambda: cli.main(["sim", "case1", "--out", "other"]), "mfba") == 0
+    assert (
+        run_and_return_exit_code(lambda: cli.main(["sim", "case1", "--out", "other"]), "mfba") == 0
+    )
     capsys.readouterr()
     assert report(capsys, "other", kept)[0] == 0
     assert [told["name"] for told in data_of(Path("report.html"))["runs"]] == ["other", "kept"]

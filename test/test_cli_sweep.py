@@ -14,11 +14,11 @@ from launching import Program, complete
 
 from mfba_planner import cli
 from mfba_planner.cli.sweep import command
-from mfba_planner.entry_points import guarded_main
+from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
 from mfba_planner.evaluation.sweep import chunks as parts
 from mfba_planner.evaluation.sweep.run_sweep import sweep
-from mfba_planner.evaluation.sweep.sweep_spec import Order, Setting
+from mfba_planner.evaluation.sweep.sweep_spec import Setting, SweepSpec
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
@@ -30,7 +30,7 @@ SMALL = ["random-3", "--planner", "paper", "--planner", "straight", "--worlds", 
 
 
 def mfba(*args: str) -> int:
-    return guarded_main(lambda: cli.main(list(args)), "mfba")
+    return run_and_return_exit_code(lambda: cli.main(list(args)), "mfba")
 
 
 def refused(said: Said, *args: str) -> str:
@@ -67,7 +67,7 @@ def test_a_sweep_leaves_table_timings_report_and_parts(swept: Path) -> None:
     assert len(rows(swept)) == 8
     report = (swept / "report.md").read_text(encoding="utf-8")
     assert "`mfba sweep random-3 --planner paper --planner straight --worlds 4`" in report
-    order = Order(suite="random-3", planners=("paper", "straight"), worlds=4)
+    order = SweepSpec(suite="random-3", planners=("paper", "straight"), worlds=4)
     assert f"sorted hash of the table `{sweep(order).hash}`" in report
     assert re.search(r"^\| paper \| 4 \| 100\.00 % \[51\.01, 100\.00\] \|", report, re.MULTILINE)
 
@@ -167,7 +167,7 @@ def test_the_command_of_a_report_makes_the_same_order() -> None:
         suite_seed=7,
         patience_s=9.0,
     )
-    order = Order(
+    order = SweepSpec(
         suite="dense", planners=("paper", "ba"), worlds=3, first=4, seeds=2, oracle=False,
         setting=setting,
     )  # fmt: skip
@@ -228,7 +228,7 @@ def test_after_ctrl_c_it_goes_on_where_it_was(tmp_path: Path) -> None:
     assert {name: after[name] for name in kept} == kept, "what was finished is not done again"
     found = HASH.search(again.stdout)
     assert found
-    order = Order(suite="random-3", planners=("straight",), worlds=1500, oracle=False)
+    order = SweepSpec(suite="random-3", planners=("straight",), worlds=1500, oracle=False)
     assert found.group(1) == sweep(order).hash
 
 
@@ -246,7 +246,7 @@ def test_one_worker_killed_is_named_and_the_sweep_goes_on(tmp_path: Path) -> Non
     assert "its worker process may have died; trying it again alone" in program.stderr
     found = HASH.search(program.stdout)
     assert found
-    order = Order(suite="random-3", planners=("straight",), worlds=600, oracle=False)
+    order = SweepSpec(suite="random-3", planners=("straight",), worlds=600, oracle=False)
     assert found.group(1) == sweep(order).hash
 
 

@@ -23,7 +23,7 @@ from helpers import wait_until
 from launching import PROGRAM, Program, complete
 
 from mfba_planner import __version__, cli
-from mfba_planner.entry_points import guarded_main
+from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.paper import doubts, published
 from mfba_planner.paper.readings import PLANNERS
 from mfba_planner.paper.tables.model import Verdict
@@ -40,7 +40,7 @@ Said = pytest.CaptureFixture[str]
 
 def refused(said: Said, *args: str) -> str:
     """The one line that a mistake costs."""
-    code = guarded_main(lambda: cli.main(["tables", *args]), "mfba")
+    code = run_and_return_exit_code(lambda: cli.main(["tables", *args]), "mfba")
     out, err = said.readouterr()
     assert (code, out, err.count("\n")) == (1, "", 1)
     return err
@@ -53,7 +53,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     page = out.parent / "page.md"
     page.write_text(PAGE.read_text(encoding="utf-8"), encoding="utf-8")
     arguments = ["tables", "--quick", "--workers", "2", "--out", str(out), "--update", str(page)]
-    assert guarded_main(lambda: cli.main(arguments), "mfba") == 0
+    assert run_and_return_exit_code(lambda: cli.main(arguments), "mfba") == 0
     return out
 
 
@@ -350,7 +350,7 @@ def test_mistakes_cost_one_line(capsys: Said, tmp_path: Path) -> None:
 
 
 def tables(*args: str) -> int:
-    return guarded_main(lambda: cli.main(["tables", *args]), "mfba")
+    return run_and_return_exit_code(lambda: cli.main(["tables", *args]), "mfba")
 
 
 def test_a_directory_belongs_to_one_command(capsys: Said, tmp_path: Path) -> None:

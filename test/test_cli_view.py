@@ -12,7 +12,7 @@ import pytest
 
 from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
-from mfba_planner.launcher.run_arguments import read_order
+from mfba_planner.launcher.run_arguments import read_request
 from mfba_planner.report.html.data import clearances
 from mfba_planner.report.rerun_viewer import save
 from mfba_planner.scenarios.scenario_files import load_scenario
@@ -76,7 +76,7 @@ def test_without_a_screen_or_a_viewer(monkeypatch: pytest.MonkeyPatch, tmp_path:
     with pytest.raises(ConfigError, match=r"^no screen .*--save FILE.rrd"):
         cli.main(["view", "made"])
     with pytest.raises(ConfigError, match=r"^no screen "):  # before anything is run
-        read_order(["case1", "--view"], "mfba run")
+        read_request(["case1", "--view"], "mfba run")
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(ConfigError, match=r"rerun is not installed; pip install 'mfba_planner\[v"):
         cli.main(["view", "made", "--save", "made.rrd"])

@@ -390,7 +390,7 @@ def test_the_unrolled_plane_is_the_general_flight_to_the_last_bit(
 ) -> None:
     fast = minimize(sphere, region, p, generator(seed))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Law, "_fly_in_the_plane", Law._fly_anywhere)
+        patch.setattr(Law, "_fly_in_the_plane", Law._iterate_in_d_dimensions)
         slow = minimize(sphere, region, p, generator(seed))
     assert (fast.best_x, fast.best_value) == (slow.best_x, slow.best_value)
     assert fast.candidates == slow.candidates
@@ -644,7 +644,7 @@ def test_resettle_draws_bats_and_best_into_the_new_region_and_values_them_again(
     p = params(bounds=Bounds.CLAMP, **WALKING)
     swarm, _, rng = start(p, [3.0, 1.0])
     away = Box((7.0, 10.0), (8.0, 12.0))
-    swarm.resettle(away, lambda x: x[0] + x[1])
+    swarm.change_region(away, lambda x: x[0] + x[1])
     y = [x[1] for x in BatSwarm(p, BOX, generator()).ask()]
     assert swarm.best_x == [7.0, min(y)]
     assert swarm.best_value == 7.0 + min(y)
@@ -657,7 +657,7 @@ def test_resettle_draws_bats_and_best_into_the_new_region_and_values_them_again(
 
 def test_resettle_leaves_unbounded_bats_where_they_are() -> None:
     swarm, x, _ = start(params(), [3.0, 1.0])
-    swarm.resettle(Box((70.0, 70.0), (80.0, 80.0)), lambda x: 5.0)
+    swarm.change_region(Box((70.0, 70.0), (80.0, 80.0)), lambda x: 5.0)
     assert (swarm.best_x, swarm.best_value) == (x[1].tolist(), 5.0)
 
 
@@ -665,12 +665,12 @@ def test_resettle_has_its_moment() -> None:
     swarm = BatSwarm(params(), BOX, generator())
     for _ in range(3):
         with pytest.raises(InputError, match="resettle before tell: tell the values"):
-            swarm.resettle(BOX, sphere)
+            swarm.change_region(BOX, sphere)
         swarm.ask()
         with pytest.raises(InputError, match="resettle before tell: tell the values"):
-            swarm.resettle(BOX, sphere)
+            swarm.change_region(BOX, sphere)
         swarm.tell([1.0, 2.0])
-        swarm.resettle(BOX, sphere)
+        swarm.change_region(BOX, sphere)
         swarm.ask()
 
 

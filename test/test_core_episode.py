@@ -13,7 +13,7 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Mode, Observation
 from mfba_planner.evaluation.metrics import Result, evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
-from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode, Outcome, stamp_of
@@ -79,11 +79,11 @@ def test_the_driver_is_sense_decide_move() -> None:
     episode = run(scenario, planner=params, sensor=sensor, seed=3)
     assert (episode.scenario, episode.planner, episode.sensor) == (scenario, params, sensor)
     assert (episode.seed, episode.driver) == (3, "core")
-    brain, pose = Planner(params, 3), Pose2D(0.0, 0.0)
+    path_planner, pose = Algorithm1(params, 3), Pose2D(0.0, 0.0)
     for k, tick in enumerate(episode.ticks):
         stamp, t = (k + 1) * params.tick_ns, k * params.tick_ns * 1e-9
         ranges = sense_circles(pose.position, scenario.enlarged(t), sensor)
-        assert tick == brain.plan(
+        assert tick == path_planner.plan(
             Observation(
                 stamp_ns=stamp, now_ns=stamp, pose=pose, ranges_m=ranges, goal=(12.0, 12.0)
             )

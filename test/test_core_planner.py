@@ -17,7 +17,7 @@ from mfba_planner.core.types import Decision, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.paper import readings
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Planner, decide
+from mfba_planner.planning.algorithm_1 import Algorithm1, decide
 from mfba_planner.planning.mode_transitions import Event, transition
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.scenarios.scenario_files import load_scenario
@@ -253,7 +253,7 @@ def test_the_velocity_leads_to_the_waypoint_and_never_too_fast(
     assume(math.hypot(gx - x, gy - y) > 0.05)
     bat = BatParams(bounds=bounds, schedule=Schedule.RAW)
     params = PlannerParams(speed_mps=speed, step_length_m=step, swarm=swarm, bat=bat)
-    planner = Planner(params, seed)
+    planner = Algorithm1(params, seed)
     decision = planner.plan(observe(pose=Pose2D(x, y), goal=(gx, gy), ranges_m=ring))
     assert decision.mode in (Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE)
     dt = params.tick_ns * 1e-9
@@ -270,7 +270,7 @@ def test_the_velocity_leads_to_the_waypoint_and_never_too_fast(
 def test_the_last_step_is_cut_to_the_goal(kind: Swarm) -> None:
     params = PlannerParams(step_length_m=0.25, swarm=kind)
     for goal, exact in (((1.25, 2.0), True), ((1.1, 2.1), True), ((1.2500001, 2.0), False)):
-        decision = Planner(params, 0).plan(observe(goal=goal))
+        decision = Algorithm1(params, 0).plan(observe(goal=goal))
         assert decision.mode is Mode.PATH_GENERATION
         assert (decision.waypoint == goal) is exact
         assert bool(decision.candidates) is not exact
@@ -299,14 +299,14 @@ def test_the_stream_of_a_decision_is_named_by_seed_purpose_and_stamp() -> None:
 
 def test_negative_seeds_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"^seed=-1: negative; give a whole number from 0 up$"):
-        Planner(PARAMS, -1)
-    assert Planner(PARAMS, 0).mode is Mode.IDLE
+        Algorithm1(PARAMS, -1)
+    assert Algorithm1(PARAMS, 0).mode is Mode.IDLE
 
 
 # --- memory ---------------------------------------------------------------------------------
 
 
-def drive(planner: Planner, scenario: Scenario, ticks: int) -> list[Decision]:
+def drive(planner: Algorithm1, scenario: Scenario, ticks: int) -> list[Decision]:
     """Drive a planner as the core driver does, for so many ticks."""
     world = World(scenario, planner.params.tick_ns, planner.params.goal_tolerance_m)
     decisions = []
@@ -327,7 +327,7 @@ def drive(planner: Planner, scenario: Scenario, ticks: int) -> list[Decision]:
 def test_a_planner_that_is_restarted_decides_as_the_first_one_did(name: str) -> None:
     episode = run(load_scenario(name), seed=5)
     for k in (1, 7, 20, len(episode.ticks) - 1):
-        restarted = Planner(PARAMS, 5)
+        restarted = Algorithm1(PARAMS, 5)
         for tick in episode.ticks[k:]:
             again = restarted.plan(
                 observe(
@@ -343,7 +343,7 @@ def test_a_planner_that_is_restarted_decides_as_the_first_one_did(name: str) -> 
 
 def test_decisions_depend_on_the_seed_and_on_the_stamp() -> None:
     ways = {
-        Planner(PARAMS, seed).plan(observe(stamp_ns=stamp, now_ns=stamp)).waypoint
+        Algorithm1(PARAMS, seed).plan(observe(stamp_ns=stamp, now_ns=stamp)).waypoint
         for seed in range(5)
         for stamp in (1, 2, 10**18)
     }
@@ -351,7 +351,7 @@ def test_decisions_depend_on_the_seed_and_on_the_stamp() -> None:
 
 
 def test_a_planner_remembers_its_mode_until_the_goal_changes() -> None:
-    planner = Planner(PARAMS, 0)
+    planner = Algorithm1(PARAMS, 0)
     assert planner.plan(observe(goal=(1.0, 2.0))).mode is Mode.ARRIVED
     away = {"pose": Pose2D(5.0, 5.0)}
     assert planner.plan(observe(goal=(1.0, 2.0), **away)).mode is Mode.ARRIVED
@@ -363,7 +363,7 @@ def test_a_planner_remembers_its_mode_until_the_goal_changes() -> None:
 
 
 def test_reset_forgets_arrival() -> None:
-    planner = Planner(PARAMS, 0)
+    planner = Algorithm1(PARAMS, 0)
     planner.plan(observe(goal=(1.0, 2.0)))
     planner.reset()
     assert planner.mode is Mode.IDLE
@@ -378,21 +378,21 @@ FIG1 = readings.planner("fig1")
 
 def test_fig_1_keeps_its_swarm_over_the_trip() -> None:
     scenario = load_scenario("empty")
-    fresh, kept = Planner(FIG1, 3), Planner(FIG1, 3)
+    fresh, kept = Algorithm1(FIG1, 3), Algorithm1(FIG1, 3)
     trip = drive(kept, scenario, 10)
     assert drive(fresh, scenario, 10) == trip
     tick = trip[5]
     obs = observe(
         stamp_ns=tick.stamp_ns, now_ns=tick.stamp_ns, pose=tick.pose, goal=scenario.goal_m
     )
-    assert Planner(FIG1, 3).plan(obs).candidates != tick.candidates, "it has a memory"
+    assert Algorithm1(FIG1, 3).plan(obs).candidates != tick.candidates, "it has a memory"
     for restart in (fresh.reset, lambda: fresh.plan(replace(obs, goal=(0.0, 9.0)))):
         restart()
-        assert fresh.plan(obs) == Planner(FIG1, 3).plan(obs)
+        assert fresh.plan(obs) == Algorithm1(FIG1, 3).plan(obs)
 
 
 def test_fig_1_steps_one_bat_iteration_at_a_time_to_the_best_point_seen() -> None:
-    planner = Planner(FIG1, 3)
+    planner = Algorithm1(FIG1, 3)
     best = math.inf
     for decision in drive(planner, load_scenario("empty"), 12):
         assert len(decision.candidates) == 5
@@ -416,7 +416,7 @@ def test_fig_1_spreads_the_schedule_of_eq_10_over_the_trip() -> None:
     bat = BatParams(iterations=1, population=2, r0=1.0, rho=0.0, f_max=1.0, bounds=Bounds.NONE)
     params = replace(FIG1, bat=bat)
     # 0.95 m to go in steps of 0.1 m: T = 10
-    planner, goal = Planner(params, 1), (1.95, 2.0)
+    planner, goal = Algorithm1(params, 1), (1.95, 2.0)
     first = planner.plan(observe(goal=goal))
     second = planner.plan(observe(goal=goal))
     best = min(first.candidates, key=lambda c: math.dist(c, goal))

@@ -13,8 +13,8 @@ from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.options import override
 from mfba_planner.core.types import Decision, Mode, Observation
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
-from mfba_planner.planning.algorithm_1 import Planner
-from mfba_planner.planning.planner_factory import brain
+from mfba_planner.planning.algorithm_1 import Algorithm1
+from mfba_planner.planning.planner_factory import make_planner
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.recovery import (
     Phase,
@@ -24,8 +24,8 @@ from mfba_planner.planning.recovery import (
     longest_s,
     most_room,
 )
-from mfba_planner.planning.speed_limit import CautionParams, allowed_share
-from mfba_planner.planning.supervised_planner import Guarded
+from mfba_planner.planning.speed_limit import SpeedLimitParams, allowed_speed_share
+from mfba_planner.planning.supervised_planner import SupervisedPlanner
 
 S = 1_000_000_000
 INF = math.inf
@@ -146,7 +146,7 @@ def seen(tick: int, ranges: tuple[float, ...] = BLOCKED, x: float = 0.0) -> Obse
 
 def test_by_default_every_decision_is_passed_on_unchanged() -> None:
     params = PlannerParams()
-    bare, guarded = Planner(params, 3), Guarded(Planner(params, 3))
+    bare, guarded = Algorithm1(params, 3), SupervisedPlanner(Algorithm1(params, 3))
     for tick in range(20):
         ranges = BLOCKED if tick % 3 else (0.3,) + (INF,) * 11
         assert guarded.plan(seen(tick, ranges, x=0.1 * tick)) == bare.plan(
@@ -155,13 +155,13 @@ def test_by_default_every_decision_is_passed_on_unchanged() -> None:
     assert guarded.phase is Phase.FREE
 
 
-def drive(guarded: Guarded, ticks: int) -> list[Decision]:
+def drive(guarded: SupervisedPlanner, ticks: int) -> list[Decision]:
     return [guarded.plan(seen(tick)) for tick in range(ticks)]
 
 
 def test_blocked_it_waits_backs_off_replans_and_gives_up_until_there_is_a_goal() -> None:
     params = override(PlannerParams(), {"recovery.enabled": True, "recovery.attempts": 1})
-    guarded = brain(params, seed=1)
+    guarded = make_planner(params, seed=1)
     decisions = drive(guarded, 9)
     reasons = [decision.reason for decision in decisions]
     assert reasons[0].endswith("every gap is closed; waiting for 0.0 s")
@@ -180,7 +180,7 @@ def test_blocked_it_waits_backs_off_replans_and_gives_up_until_there_is_a_goal()
 
 def test_who_is_carried_off_has_not_been_blocked_before() -> None:
     params = override(PlannerParams(), {"recovery.enabled": True, "recovery.attempts": 1})
-    guarded = brain(params, seed=1)
+    guarded = make_planner(params, seed=1)
     assert drive(guarded, 9)[-1].reason.startswith("gave up")
     there = guarded.plan(seen(9, x=5.0))
     assert there.reason.startswith("carried off 5 m in 1 s")
@@ -190,7 +190,7 @@ def test_who_is_carried_off_has_not_been_blocked_before() -> None:
 
 def test_what_cannot_be_trusted_moves_nobody_in_any_phase() -> None:
     params = override(PlannerParams(), {"recovery.enabled": True})
-    guarded = brain(params, seed=1)
+    guarded = make_planner(params, seed=1)
     drive(guarded, 2)
     blind = replace(seen(2), refused="sector 1 holds nan", ranges_m=())
     assert guarded.plan(blind).velocity == (0.0, 0.0)
@@ -200,14 +200,14 @@ def test_what_cannot_be_trusted_moves_nobody_in_any_phase() -> None:
     ("nearest", "share"), [(INF, 1.0), (0.8, 1.0), (0.4, 0.5), (0.1, 0.2), (0.0, 0.2)]
 )
 def test_the_speed_falls_with_the_clearance(nearest: float, share: float) -> None:
-    caution = CautionParams(slow_within_m=0.8, least_share=0.2)
+    speed_limit = SpeedLimitParams(slow_within_m=0.8, least_share=0.2)
     ranges = (INF, nearest, INF)
-    assert allowed_share(ranges, caution) == pytest.approx(share)
-    assert allowed_share(ranges, CautionParams()) == 1.0
-    params = PlannerParams(caution=caution)
+    assert allowed_speed_share(ranges, speed_limit) == pytest.approx(share)
+    assert allowed_speed_share(ranges, SpeedLimitParams()) == 1.0
+    params = PlannerParams(speed_limit=speed_limit)
     one_sided = (INF,) * 6 + (nearest,) + (INF,) * 5
-    full = brain(PlannerParams()).plan(seen(0, one_sided))
-    slow = brain(params).plan(seen(0, one_sided))
+    full = make_planner(PlannerParams()).plan(seen(0, one_sided))
+    slow = make_planner(params).plan(seen(0, one_sided))
     assert slow.waypoint == pytest.approx([share * w for w in full.waypoint])
     assert math.hypot(*slow.velocity) == pytest.approx(share * math.hypot(*full.velocity))
     if share < 1.0:
@@ -219,4 +219,4 @@ def test_options_out_of_range_are_refused() -> None:
         with pytest.raises(ConfigError):
             RecoveryParams(**options)  # type: ignore[arg-type]
     with pytest.raises(ConfigError):
-        CautionParams(least_share=1.5)
+        SpeedLimitParams(least_share=1.5)

@@ -14,8 +14,8 @@ from mfba_planner.core.geometry import Point, Pose2D
 from mfba_planner.core.random_streams import stream
 from mfba_planner.core.types import Observation
 from mfba_planner.planning import algorithm_1 as module
-from mfba_planner.planning.algorithm_1 import FEW, Planner, fly_together
-from mfba_planner.planning.path_generation import Start, Step, fresh_step, fresh_steps
+from mfba_planner.planning.algorithm_1 import FEW, Algorithm1, generate_paths_together
+from mfba_planner.planning.path_generation import Start, Step, generate_step, generate_steps
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.swarm.bat_swarm import BatParams, Bounds, Disc, Schedule, minimize
 
@@ -34,7 +34,7 @@ STARTS = st.builds(
 
 def test_a_fresh_swarm_searches_the_disc_of_one_step() -> None:
     bat = BatParams(population=7, iterations=3)
-    waypoint, candidates = fresh_step(Start((1.0, 2.0), (4.0, 6.0), 3, 77), STEP_M, bat)
+    waypoint, candidates = generate_step(Start((1.0, 2.0), (4.0, 6.0), 3, 77), STEP_M, bat)
 
     def cost(x: list[float]) -> float:
         return math.hypot(x[0] - 3.0, x[1] - 4.0)
@@ -49,7 +49,7 @@ def test_a_fresh_swarm_searches_the_disc_of_one_step() -> None:
 
 def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
     bat = BatParams(bounds=Bounds.NONE, schedule=Schedule.RAW)
-    waypoint, candidates = fresh_step(Start((1.0, 2.0), GOAL, 0, 1), STEP_M, bat)
+    waypoint, candidates = generate_step(Start((1.0, 2.0), GOAL, 0, 1), STEP_M, bat)
     assert max(math.dist((1.0, 2.0), c) for c in candidates) > STEP_M
     assert math.dist((1.0, 2.0), waypoint) == pytest.approx(STEP_M)
     swarm = minimize(
@@ -64,13 +64,13 @@ def test_many_steps_at_once_are_the_same_steps(
     starts: list[Start], bat: BatParams, step_m: float
 ) -> None:
     starts.append(Start((1.0, 2.0), (1.0 + 0.9 * step_m, 2.0), 0, 1))  # the last of its trip
-    assert fresh_steps(starts, step_m, bat) == [fresh_step(s, step_m, bat) for s in starts]
+    assert generate_steps(starts, step_m, bat) == [generate_step(s, step_m, bat) for s in starts]
 
 
 def test_a_start_among_others_of_its_seed_is_the_same() -> None:
     starts = [Start((0.1 * k, 2.0), GOAL, 5, 2**33) for k in range(20)]
-    assert fresh_steps(starts, STEP_M, BatParams()) == [
-        fresh_step(s, STEP_M, BatParams()) for s in starts
+    assert generate_steps(starts, STEP_M, BatParams()) == [
+        generate_step(s, STEP_M, BatParams()) for s in starts
     ]
 
 
@@ -91,14 +91,14 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> list[Start]:
 
     def noted(start: Start, step_length_m: float, bat: BatParams) -> Step:
         made.append(start)
-        return fresh_step(start, step_length_m, bat)
+        return generate_step(start, step_length_m, bat)
 
     monkeypatch.setattr(module, "fresh_step", noted)
     return made
 
 
-def planners(seeds: Sequence[int], params: PlannerParams | None = None) -> list[Planner]:
-    return [Planner(params or PlannerParams(), seed) for seed in seeds]
+def planners(seeds: Sequence[int], params: PlannerParams | None = None) -> list[Algorithm1]:
+    return [Algorithm1(params or PlannerParams(), seed) for seed in seeds]
 
 
 def test_planners_find_their_bats_flown_and_decide_the_same(alone: list[Start]) -> None:
@@ -107,7 +107,7 @@ def test_planners_find_their_bats_flown_and_decide_the_same(alone: list[Start]) 
     blocked = (0.5, *FREE[1:])
     seen[1], seen[2] = observed(1, blocked), observed(2, goal=None)
     ours, theirs = planners(seeds), planners(seeds)
-    fly_together(ours, seen)
+    generate_paths_together(ours, seen)
     decided = [planner.plan(obs) for planner, obs in zip(ours, seen)]
     assert alone == []
     assert decided == [planner.plan(obs) for planner, obs in zip(theirs, seen)]
@@ -120,7 +120,7 @@ def test_planners_find_their_bats_flown_and_decide_the_same(alone: list[Start]) 
 def test_few_fly_alone(alone: list[Start]) -> None:
     ours = planners(range(FEW - 1))
     seen = [observed(k) for k in range(FEW - 1)]
-    fly_together(ours, seen)
+    generate_paths_together(ours, seen)
     for planner, obs in zip(ours, seen):
         planner.plan(obs)
     assert len(alone) == FEW - 1
@@ -129,7 +129,7 @@ def test_few_fly_alone(alone: list[Start]) -> None:
 def test_whoever_is_elsewhere_or_has_other_options_flies_alone(alone: list[Start]) -> None:
     ours = planners(range(FEW))
     seen = [observed(k) for k in range(FEW)]
-    fly_together(ours, seen)
+    generate_paths_together(ours, seen)
     ours[1].params = replace(ours[1].params, step_length_m=0.2)
     ours[2].params = replace(ours[2].params, bat=BatParams())  # an equal one
     ours[3].seed = 77
@@ -139,14 +139,14 @@ def test_whoever_is_elsewhere_or_has_other_options_flies_alone(alone: list[Start
     decided = [planner.plan(obs) for planner, obs in zip(ours, seen)]
     assert [start.seed for start in alone] == [1, 77, 4, 5, 6]
     for mine, planner, obs in zip(decided, ours, seen):
-        assert mine == Planner(planner.params, planner.seed).plan(obs)
+        assert mine == Algorithm1(planner.params, planner.seed).plan(obs)
 
 
 def test_a_swarm_that_lives_on_is_not_flown_for_its_planner(alone: list[Start]) -> None:
     params = PlannerParams(swarm=Swarm.PERSISTENT)
     ours, theirs = planners(range(FEW), params), planners(range(FEW), params)
     seen = [observed(k) for k in range(FEW)]
-    fly_together(ours, seen)
+    generate_paths_together(ours, seen)
     assert [p.plan(o) for p, o in zip(ours, seen)] == [p.plan(o) for p, o in zip(theirs, seen)]
     assert [planner.start(obs) for planner, obs in zip(ours, seen)] == [None] * FEW
     assert alone == []

@@ -14,7 +14,14 @@ from mfba_planner.core.types import Decision, Mode
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
-from mfba_planner.simulation.differential_drive import Speeds, arc, brake, command, obey, track
+from mfba_planner.simulation.differential_drive import (
+    Speeds,
+    apply_command,
+    arc,
+    brake,
+    command,
+    track,
+)
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.robot_model import Base, Drive, Lidar, Noise, Robot
 from mfba_planner.simulation.run_episode import run
@@ -109,7 +116,7 @@ def test_a_quarter_of_a_circle() -> None:
 def test_limits_hold_whatever_it_is_told(
     told: tuple[float, float], v: float, omega: float
 ) -> None:
-    pose, now = obey(Pose2D(0.0, 0.0), Speeds(v, omega), told, BASE, TICK_NS)
+    pose, now = apply_command(Pose2D(0.0, 0.0), Speeds(v, omega), told, BASE, TICK_NS)
     assert abs(now.v) <= BASE.max_speed_mps
     assert abs(now.omega) <= BASE.max_turn_radps
     assert abs(now.v - v) <= BASE.max_accel_mps2 * 0.1 + 1e-9

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mfba_planner.core.errors import BagError
-from mfba_planner.entry_points import guarded_main
+from mfba_planner.entry_points import run_and_return_exit_code
 
 ROOT = Path(__file__).parents[1]
 
@@ -53,8 +53,8 @@ def rclpy_init(*args: str) -> Callable[[], int]:
 
 
 def test_a_program_that_ends_well_keeps_its_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
-    assert guarded_main(lambda: 0, "mfba") == 0
-    assert guarded_main(lambda: 3, "mfba") == 3
+    assert run_and_return_exit_code(lambda: 0, "mfba") == 0
+    assert run_and_return_exit_code(lambda: 3, "mfba") == 3
     assert capsys.readouterr() == ("", "")
 
 
@@ -86,7 +86,7 @@ def test_a_program_that_ends_well_keeps_its_exit_code(capsys: pytest.CaptureFixt
 def test_what_a_user_can_mend_becomes_one_line(
     run: Callable[[], int], line: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert guarded_main(run, "mfba") == 1
+    assert run_and_return_exit_code(run, "mfba") == 1
     said = [text for text in capfd.readouterr().err.splitlines() if "[rcl]" not in text]
     assert len(said) == 1
     assert said[0].startswith(f"mfba: {line}")
@@ -103,7 +103,7 @@ def test_what_a_user_can_mend_becomes_one_line(
 )
 def test_a_bug_keeps_its_traceback(bug: Exception) -> None:
     with pytest.raises(type(bug)) as raised:
-        guarded_main(raiser(bug), "mfba")
+        run_and_return_exit_code(raiser(bug), "mfba")
     assert raised.value is bug
 
 
@@ -111,7 +111,7 @@ def test_a_bug_keeps_its_traceback(bug: Exception) -> None:
 def test_ctrl_c_is_quiet(
     interrupted: dict[str, int], code: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert guarded_main(raiser(KeyboardInterrupt()), "mfba", **interrupted) == code
+    assert run_and_return_exit_code(raiser(KeyboardInterrupt()), "mfba", **interrupted) == code
     assert capsys.readouterr() == ("", "")
 
 

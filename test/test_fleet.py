@@ -21,7 +21,7 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.planner_registry import make
 from mfba_planner.planning.predictive import preset
-from mfba_planner.planning.speed_limit import CautionParams
+from mfba_planner.planning.speed_limit import SpeedLimitParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.read_episode import read_episode, read_recording
 from mfba_planner.report.result_json import read_result
@@ -29,7 +29,7 @@ from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
-from mfba_planner.simulation.fleet import Fleet, alone, run_fleet, seed_of, way
+from mfba_planner.simulation.fleet import Fleet, alone, robot_seed, run_fleet, way
 from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at
 from mfba_planner.simulation.planner_observations import Perception
 from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
@@ -97,7 +97,7 @@ def test_a_contact_between_two_ticks_is_seen_by_both() -> None:
     """They change places within one tick: apart at every tick, through each other between."""
     scenario = fleet_of(((-0.7, 0.0), (3.0, 0.0)), ((0.7, 0.0), (-3.0, 0.0)))
     params = PlannerParams(step_length_m=1.5)
-    done = run_fleet(scenario, planner=params, brain=Blind)
+    done = run_fleet(scenario, planner=params, path_planner=Blind)
     for mine, other in zip(done, done[::-1]):
         assert all(distance(a.pose.position, b.pose.position) > 0.6
                    for a, b in zip(mine.ticks, other.ticks))  # fmt: skip
@@ -110,7 +110,7 @@ def test_a_contact_between_two_ticks_is_seen_by_both() -> None:
 
 def test_who_has_arrived_is_still_in_the_way() -> None:
     scenario = fleet_of(((1.5, 0.0), (2.0, 0.0)), ((-4.0, 0.0), (6.0, 0.0)))
-    near, far = run_fleet(scenario, brain=Blind, planner=PlannerParams(step_length_m=1.5))
+    near, far = run_fleet(scenario, path_planner=Blind, planner=PlannerParams(step_length_m=1.5))
     assert len(near.ticks) < len(far.ticks)
     assert evaluate(far).collisions == 1
     assert evaluate(near).collisions == 0  # its own run was over
@@ -121,10 +121,10 @@ def test_time_goes_on_around_who_has_arrived() -> None:
     ends = (((0.0, 0.0), (0.3, 0.0)), ((0.0, 5.0), (8.0, 5.0)))
     fleet = Fleet(fleet_of(*ends, obstacles=(obstacle,)), TICK_NS, 0.01, 0)
     fleet.step({0: (0.3 / (TICK_NS * 1e-9), 0.0), 1: (0.1, 0.0)})
-    assert fleet.under_way == [1]
+    assert fleet.running == [1]
     for _ in range(3):
         fleet.step({1: (0.1, 0.0)})
-    here = fleet.places[0]
+    here = fleet.robot_worlds[0]
     assert here.tick == fleet.tick == 4
     _, circles = here.near(10.0)
     assert circles[0][0] == pytest.approx(center_at(obstacle, 4 * TICK_NS * 1e-9))
@@ -169,22 +169,22 @@ def test_equal_seeds_equal_decisions_and_streams_of_their_own() -> None:
     one, same, other = (run_fleet(scenario, seed=seed) for seed in (5, 5, 6))
     assert [digest(e.ticks) for e in one] == [digest(e.ticks) for e in same]
     assert [digest(e.ticks) for e in one] != [digest(e.ticks) for e in other]
-    assert len({seed_of(seed, n) for seed in range(50) for n in range(10)}) == 500
-    assert all(0 <= seed_of(seed, n) < 2**63 for seed in range(50) for n in range(10))
+    assert len({robot_seed(seed, n) for seed in range(50) for n in range(10)}) == 500
+    assert all(0 <= robot_seed(seed, n) < 2**63 for seed in range(50) for n in range(10))
 
 
 def test_a_fleet_of_one_is_a_robot_alone() -> None:
     case = load_scenario("case1")
     only = Member(name="a", start_m=case.start_m, goal_m=case.goal_m)
     (episode,) = run_fleet(replace(case, robots=(only,)), seed=4)
-    assert digest(episode.ticks) == digest(run(case, seed=seed_of(4, 0)).ticks)
+    assert digest(episode.ticks) == digest(run(case, seed=robot_seed(4, 0)).ticks)
 
 
 def test_obstacles_and_robots_are_seen_alike() -> None:
     still = Obstacle(center_m=(0.0, 1.0), radius_m=0.2)
     scenario = fleet_of(((0.0, 0.0), (9.0, 0.0)), ((1.0, 0.0), (9.0, 5.0)), obstacles=(still,))
     fleet = Fleet(scenario, TICK_NS, 0.02)
-    first, second = fleet.places
+    first, second = fleet.robot_worlds
     assert first.near(3.0)[1] == [((0.0, 1.0), 0.5), ((1.0, 0.0), 0.6)]
     assert second.near(3.0)[1] == [((0.0, 1.0), 0.5), ((0.0, 0.0), 0.6)]
     assert [first.radius_m(k) for k in (0, 1)] == [0.2, 0.3]
@@ -201,7 +201,7 @@ def test_obstacles_and_robots_are_seen_alike() -> None:
 def test_a_lidar_sees_the_other_robots(beams: int) -> None:
     scenario = fleet_of(((0.0, 0.0), (9.0, 0.0)), ((1.5, 0.0), (9.0, 5.0)),
                         robot=Robot(lidar=Lidar(beams=beams)))  # fmt: skip
-    scan = Fleet(scenario, TICK_NS, 0.02).places[0].read().scan
+    scan = Fleet(scenario, TICK_NS, 0.02).robot_worlds[0].read().scan
     assert (scan is None) == (beams == 0)
     if scan is not None:
         assert float(min(scan.ranges_m)) == pytest.approx(1.2, abs=1e-3)
@@ -237,17 +237,17 @@ def test_the_others_are_seen_and_remembered_in_the_scenario_s_order() -> None:
     fleet = Fleet(scenario, TICK_NS, 0.02)
     starts = [member.start_m for member in scenario.robots]
     without_the_third = starts[:2] + starts[3:]
-    assert fleet.places[2].centers() == without_the_third
-    assert [center for center, _ in fleet.places[2].near(1.0)[1]] == without_the_third
+    assert fleet.robot_worlds[2].centers() == without_the_third
+    assert [center for center, _ in fleet.robot_worlds[2].near(1.0)[1]] == without_the_third
     third = run_fleet(scenario, seed=0, go_on=lambda fleet: fleet.tick < 3)[2]
     assert [o.center_m for o in third.scenario.obstacles] == without_the_third
 
 
 def test_options_of_the_planner_count_in_a_fleet_without_a_brain_of_its_own() -> None:
-    params = PlannerParams(caution=CautionParams(slow_within_m=0.8))
+    params = PlannerParams(speed_limit=SpeedLimitParams(slow_within_m=0.8))
     own = run_fleet(head_on(), planner=params, seed=3)
-    named = simulate_fleet(head_on(), planner=params, sensor=SensorParams(), seed=3)
-    assert [e.ticks for e in own] == [e.ticks for e in named]
+    params_for_method = simulate_fleet(head_on(), planner=params, sensor=SensorParams(), seed=3)
+    assert [e.ticks for e in own] == [e.ticks for e in params_for_method]
     assert any("% speed so near" in tick.reason for e in own for tick in e.ticks)
 
 
@@ -357,7 +357,7 @@ def test_a_result_for_each_robot_and_one_picture(driven: Path) -> None:
     assert told["digest"] == digest(core[0].ticks)
     assert told["result"]["success"]
     assert told["extra"]["fleet_seed"] == 3
-    assert told["seed"] == seed_of(3, 0)
+    assert told["seed"] == robot_seed(3, 0)
 
 
 def test_what_knows_one_robot_only_says_so(driven: Path) -> None:

@@ -4,24 +4,24 @@
 import pytest
 
 from mfba_planner.planning.recovery import Phase
-from mfba_planner.ros.interface.health import Health, Level, Pulse, driving
+from mfba_planner.ros.interface.health import Health, InputRate, Level, driving
 from mfba_planner.ros.node_parameters import WorldSimSettings
-from mfba_planner.ros.runtime.command_timeout import Deadman
-from mfba_planner.ros.runtime.goal_queue import Errands
+from mfba_planner.ros.runtime.command_timeout import CommandTimeout
+from mfba_planner.ros.runtime.goal_queue import GoalQueue
 from mfba_planner.ros.runtime.stale_inputs import watch_period_s
 
 
 def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
-    pulse = Pulse()
-    assert (pulse.age_s(5.0), pulse.rate_hz(5.0)) == (None, 0.0)
+    rate = InputRate()
+    assert (rate.age_s(5.0), rate.rate_hz(5.0)) == (None, 0.0)
     for k in range(100):
-        pulse.beat(k, 0.1 * k)
-    assert round(pulse.rate_hz(9.9), 6) == 10.0
-    assert round(pulse.age_s(10.9) or 0.0, 6) == 1.0
-    assert 6.0 < pulse.rate_hz(10.9) < 7.0
-    pulse.beat(99, 11.0)
-    assert pulse.age_s(11.0) is not None, "the same stamp is no news"
-    assert round(pulse.age_s(11.0) or 0.0, 6) == 1.1
+        rate.add(k, 0.1 * k)
+    assert round(rate.rate_hz(9.9), 6) == 10.0
+    assert round(rate.age_s(10.9) or 0.0, 6) == 1.0
+    assert 6.0 < rate.rate_hz(10.9) < 7.0
+    rate.add(99, 11.0)
+    assert rate.age_s(11.0) is not None, "the same stamp is no news"
+    assert round(rate.age_s(11.0) or 0.0, 6) == 1.1
 
 
 def test_inputs_are_sound_stale_or_refused() -> None:
@@ -50,55 +50,55 @@ A, B, C = (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)
 
 
 def test_goals_are_visited_in_their_order() -> None:
-    errands = Errands()
-    assert (errands.goal, errands.leg) == (None, "")
-    assert errands.order((A, B, C), over=False)
-    assert (errands.goal, errands.leg, errands.number) == (A, "1 of 3", 1)
-    assert errands.pass_by((0.5, 0.0), 0.1) == 0
-    assert errands.pass_by((0.95, 0.0), 0.1) == 1
-    assert (errands.goal, errands.leg, errands.number) == (B, "2 of 3", 1)
-    assert errands.pass_by(B, 0.1) == 1
-    assert errands.pass_by(C, 0.1) == 0, "the last one is for the planner to reach"
-    assert errands.goal == C
+    goal_queue = GoalQueue()
+    assert (goal_queue.goal, goal_queue.leg) == (None, "")
+    assert goal_queue.order((A, B, C), over=False)
+    assert (goal_queue.goal, goal_queue.leg, goal_queue.number) == (A, "1 of 3", 1)
+    assert goal_queue.pass_by((0.5, 0.0), 0.1) == 0
+    assert goal_queue.pass_by((0.95, 0.0), 0.1) == 1
+    assert (goal_queue.goal, goal_queue.leg, goal_queue.number) == (B, "2 of 3", 1)
+    assert goal_queue.pass_by(B, 0.1) == 1
+    assert goal_queue.pass_by(C, 0.1) == 0, "the last one is for the planner to reach"
+    assert goal_queue.goal == C
 
 
 def test_goals_at_one_place_are_passed_at_once() -> None:
-    errands = Errands()
-    errands.order((A, A, A, B), over=False)
-    assert errands.pass_by(A, 0.1) == 3
+    goal_queue = GoalQueue()
+    goal_queue.order((A, A, A, B), over=False)
+    assert goal_queue.pass_by(A, 0.1) == 3
 
 
 def test_the_same_order_is_none_unless_the_last_is_over() -> None:
-    errands = Errands()
-    errands.order((A, B), over=False)
-    errands.pass_by(A, 0.1)
-    assert not errands.order((A, B), over=False)
-    assert (errands.goal, errands.number) == (B, 1)
-    assert errands.order((A, B), over=True)
-    assert (errands.goal, errands.number) == (A, 2)
-    assert errands.order((B,), over=False)
-    assert errands.leg == "1 of 1"
+    goal_queue = GoalQueue()
+    goal_queue.order((A, B), over=False)
+    goal_queue.pass_by(A, 0.1)
+    assert not goal_queue.order((A, B), over=False)
+    assert (goal_queue.goal, goal_queue.number) == (B, 1)
+    assert goal_queue.order((A, B), over=True)
+    assert (goal_queue.goal, goal_queue.number) == (A, 2)
+    assert goal_queue.order((B,), over=False)
+    assert goal_queue.leg == "1 of 1"
 
 
 def test_cancelled_there_is_no_goal_and_the_same_may_be_ordered_anew() -> None:
-    errands = Errands()
-    assert errands.cancel() is None
-    errands.order((A,), over=False)
-    assert errands.cancel() == A
-    assert (errands.goal, errands.number) == (None, 2)
-    assert errands.cancel() is None
-    assert errands.order((A,), over=False)
+    goal_queue = GoalQueue()
+    assert goal_queue.cancel() is None
+    goal_queue.order((A,), over=False)
+    assert goal_queue.cancel() == A
+    assert (goal_queue.goal, goal_queue.number) == (None, 2)
+    assert goal_queue.cancel() is None
+    assert goal_queue.order((A,), over=False)
 
 
 def test_a_twist_holds_for_the_timeout_but_never_less_than_its_tick() -> None:
     def holds(timeout_s: float, after_s: float, tick_s: float = 0.1, factor: float = 1.0) -> bool:
-        deadman = Deadman(
+        command_timeout = CommandTimeout(
             WorldSimSettings(
                 cmd_vel_timeout_s=timeout_s, tick_ns=round(tick_s * 1e9), speed_factor=factor
             )
         )
-        deadman.heard(100.0)
-        return not deadman.lets_go(100.0 + after_s)
+        command_timeout.heard(100.0)
+        return not command_timeout.has_expired(100.0 + after_s)
 
     assert holds(0.5, 0.49)
     assert not holds(0.5, 0.51)

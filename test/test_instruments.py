@@ -17,17 +17,17 @@ from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.perception.scan_to_sectors import sense_scan
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
-from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.scenarios.run_config import Driver, RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.obstacle_motion import Walls
-from mfba_planner.simulation.planner_observations import look, sense
+from mfba_planner.simulation.planner_observations import observe_sectors, sense
 from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
 from mfba_planner.simulation.scenario import Scenario
-from mfba_planner.simulation.sensor_noise import Instruments
+from mfba_planner.simulation.sensor_noise import NoisySensors
 from mfba_planner.simulation.simulate import simulate
 from mfba_planner.simulation.simulated_lidar import cast_walls, rays, scan_at
 from mfba_planner.simulation.world import World
@@ -43,9 +43,14 @@ def seen(scan: Any, k: int) -> float:
 
 
 @pytest.mark.parametrize(("left_m", "there"), [(0.49, True), (0.51, False)])
-def test_who_errs_may_miss_the_goal_by_four_deviations_more(left_m: float, there: bool) -> None:
+def test_who_errs_may_miss_the_goal_by_four_deviations_more(
+    distance_to_goal_m: float, there: bool
+) -> None:
     scenario = Scenario(
-        name="x", start_m=(0.0, 0.0), goal_m=(left_m, 0.0), robot=Robot(noise=Noise(odom_m=0.1))
+        name="x",
+        start_m=(0.0, 0.0),
+        goal_m=(distance_to_goal_m, 0.0),
+        robot=Robot(noise=Noise(odom_m=0.1)),
     )
     assert World(scenario, TICK_NS, 0.1).outcome() is (Outcome.GOAL_REACHED if there else None)
 
@@ -109,9 +114,9 @@ def test_walls_lie_where_the_beams_end(x: float, y: float) -> None:
         assert np.isfinite(ranges).all()
 
 
-def instruments(seed: int = 0, **noise: float) -> Instruments:
+def instruments(seed: int = 0, **noise: float) -> NoisySensors:
     robot = Robot(lidar=Lidar(beams=360), noise=Noise(**noise))
-    return Instruments(robot, None, TICK_NS, seed)
+    return NoisySensors(robot, None, TICK_NS, seed)
 
 
 WAY = [Pose2D(0.1 * k, 0.0, 0.1 * k) for k in range(200)]
@@ -187,10 +192,10 @@ def test_a_tick_is_read_once_however_often_it_is_asked() -> None:
 def test_a_robot_that_sees_nothing_stops_until_it_does() -> None:
     robot = Robot(lidar=Lidar(beams=12), noise=Noise(scan_loss=0.5))
     world = World(replace(load_scenario("case1"), robot=robot), TICK_NS, 0.02, seed=3)
-    planner = Planner(PlannerParams(), seed=0)
+    planner = Algorithm1(PlannerParams(), seed=0)
     modes = set()
     for _ in range(20):
-        seen = look(world, SensorParams())
+        seen = observe_sectors(world, SensorParams())
         decision = planner.plan(seen)
         assert (decision.mode is Mode.STOPPED) == bool(seen.refused)
         assert (decision.velocity == (0.0, 0.0)) == bool(seen.refused)

@@ -18,9 +18,9 @@ from mfba_planner.core.types import Mode, observe
 from mfba_planner.evaluation.metrics import assess, evaluate, tick_clearances
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.algorithm_1 import Planner
-from mfba_planner.planning.odometry_jump import carried_off
-from mfba_planner.planning.planner_factory import brain
+from mfba_planner.planning.algorithm_1 import Algorithm1
+from mfba_planner.planning.odometry_jump import is_jump_reason
+from mfba_planner.planning.planner_factory import make_planner
 from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
@@ -50,7 +50,7 @@ PLANNERS = {
 
 
 def carried(episode: Episode) -> list[int]:
-    return [k for k, tick in enumerate(episode.ticks) if carried_off(tick.reason)]
+    return [k for k, tick in enumerate(episode.ticks) if is_jump_reason(tick.reason)]
 
 
 def played(scenario: Scenario, planner: PlannerParams) -> Episode:
@@ -61,13 +61,13 @@ def played(scenario: Scenario, planner: PlannerParams) -> Episode:
 def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams) -> None:
     episode = played(KIDNAPPED, planner)
     assert evaluate(episode).success
-    noticed = carried(episode)
-    times_s = [episode.time_s(episode.ticks[k].stamp_ns) for k in noticed]
+    detect = carried(episode)
+    times_s = [episode.time_s(episode.ticks[k].stamp_ns) for k in detect]
     tick_s = planner.tick_ns * 1e-9
     assert [t - at.at_s for t, at in zip(times_s, KIDNAPPED.kidnappings)] == pytest.approx(
         [tick_s / 2] * 2, abs=tick_s / 2 + 1e-9
     )
-    for k, kidnapping in zip(noticed, KIDNAPPED.kidnappings):
+    for k, kidnapping in zip(detect, KIDNAPPED.kidnappings):
         assert episode.ticks[k].pose.position == kidnapping.to_m
         assert ", beginning anew; " in episode.ticks[k].reason
 
@@ -77,7 +77,7 @@ def test_afterwards_it_decides_as_one_that_knows_of_nothing(planner: PlannerPara
     """What a planner remembers must not outlive the jump: a fresh one decides the same."""
     episode = played(KIDNAPPED, planner)
     first, second = carried(episode)
-    fresh = brain(planner, SensorParams(), seed=1)
+    fresh = make_planner(planner, SensorParams(), seed=1)
     for tick in episode.ticks[first:second]:
         seen = observe(tick.stamp_ns, tick.pose, tick.ranges_m, tick.goal, tick.pose)
         own = fresh.plan(seen)
@@ -97,14 +97,14 @@ def test_being_carried_is_no_way_driven_and_no_contact() -> None:
     (k,) = carried(episode)
     places = [tick.pose.position for tick in episode.ticks]
     steps = [distance(a, b) for a, b in zip(places, places[1:])]
-    result, conduct = assess(episode)
+    result, run_motion = assess(episode)
     assert result.collisions == 0
     assert result.length_m == pytest.approx(sum(steps) - steps[k - 1])
-    assert conduct.jerk_mps3 < 5.0
+    assert run_motion.jerk_mps3 < 5.0
     assert min(map(min, tick_clearances(episode))) == pytest.approx(result.min_clearance_m)
 
 
-def look(stamp_ns: int, x: float) -> Any:
+def observe_sectors(stamp_ns: int, x: float) -> Any:
     return observe(stamp_ns, Pose2D(x, 0.0), FREE, (100.0, 0.0), Pose2D(0.0, 0.0))
 
 
@@ -117,22 +117,24 @@ def look(stamp_ns: int, x: float) -> Any:
 def test_only_what_cannot_have_been_driven_is_a_jump(
     stretch: float, took_s: float, jump_m: float
 ) -> None:
-    planner = Planner(PlannerParams(jump_m=jump_m), seed=0)
-    planner.plan(look(1_000_000_000, 0.0))
+    planner = Algorithm1(PlannerParams(jump_m=jump_m), seed=0)
+    planner.plan(observe_sectors(1_000_000_000, 0.0))
     farthest = planner.params.speed_mps * took_s + jump_m
-    decision = planner.plan(look(1_000_000_000 + round(took_s * 1e9), farthest * stretch))
+    decision = planner.plan(
+        observe_sectors(1_000_000_000 + round(took_s * 1e9), farthest * stretch)
+    )
     if abs(stretch - 1.0) > 1e-6:
-        assert carried_off(decision.reason) is (stretch > 1.0)
+        assert is_jump_reason(decision.reason) is (stretch > 1.0)
 
 
 def test_a_pose_that_was_refused_says_nothing_about_jumps() -> None:
-    planner = Planner(PlannerParams(), seed=0)
-    planner.plan(look(1, 0.0))
+    planner = Algorithm1(PlannerParams(), seed=0)
+    planner.plan(observe_sectors(1, 0.0))
     refused = observe(2, "odom holds nan", FREE, (100.0, 0.0), Pose2D(50.0, 0.0))
     assert planner.plan(refused).mode is Mode.STOPPED
-    assert not carried_off(planner.plan(look(3, 0.1)).reason)
-    assert carried_off(planner.plan(look(4, 9.0)).reason)
-    assert not carried_off(planner.plan(look(3, 0.0)).reason)  # time was set back
+    assert not is_jump_reason(planner.plan(observe_sectors(3, 0.1)).reason)
+    assert is_jump_reason(planner.plan(observe_sectors(4, 9.0)).reason)
+    assert not is_jump_reason(planner.plan(observe_sectors(3, 0.0)).reason)  # time was set back
 
 
 def test_the_graph_is_kidnapped_as_the_core_is(tmp_path: Path, domain_id: int) -> None:
@@ -150,7 +152,7 @@ def start(graph: Graph, scenario: Scenario) -> WorldSim:
     graph.start(VirtualSensor, told["virtual_sensor"])
     planner = graph.start(PlannerNode, told["planner"])
     world = graph.start(WorldSim, told["world_sim"])
-    graph.until(lambda: planner.goals.errands.goal is not None)
+    graph.until(lambda: planner.goals.goal_queue.goal is not None)
     return world
 
 
@@ -168,7 +170,7 @@ def test_initialpose_carries_the_robot_off_and_the_planner_says_so(
     graph.until(lambda: world.over, timeout_s=60.0)
     graph.settle()
     assert world.world.outcome() is Outcome.GOAL_REACHED
-    said = [m.status[0] for m in decisions if carried_off(m.status[0].message)]
+    said = [m.status[0] for m in decisions if is_jump_reason(m.status[0].message)]
     assert len(said) == 1
     assert said[0].level == b"\x01"
 

@@ -16,7 +16,7 @@ from launch_standin import declared, launched
 from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.core.options import flatten
 from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, REPLAY_ARGUMENTS, replayed, robot
-from mfba_planner.launcher.simulate_launch import ARGUMENTS, told_by_launch
+from mfba_planner.launcher.simulate_launch import ARGUMENTS, launch_parameters
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.ros.node_parameters import Source
@@ -38,7 +38,7 @@ def test_defaults_are_case_study_1_in_real_time_and_unrecorded() -> None:
     config = RunConfig(scenario=load_scenario("case1"), planner=usual, real_time=True)
     expected = node_parameters(config, NODES)
     expected["world_sim"]["start_paused"] = False
-    assert told_by_launch(given()) == expected
+    assert launch_parameters(given()) == expected
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_defaults_are_case_study_1_in_real_time_and_unrecorded() -> None:
 def test_what_is_about_algorithm_1_is_given_to_it(
     changes: dict[str, str], method: str, iterations: int
 ) -> None:
-    told = told_by_launch(given(**changes))["planner"]
+    told = launch_parameters(given(**changes))["planner"]
     assert (told["method"], told["bat.iterations"]) == (method, iterations)
 
 
@@ -64,7 +64,7 @@ def test_a_robot_drives_with_the_planner_that_does_not_collide() -> None:
 
 
 def test_arguments_reach_the_nodes() -> None:
-    told = told_by_launch(
+    told = launch_parameters(
         given(
             scenario="case2",
             seed="5",
@@ -87,7 +87,7 @@ def test_arguments_reach_the_nodes() -> None:
 
 
 def test_a_fleet_s_nodes_are_told_in_their_namespaces() -> None:
-    told = told_by_launch(given(scenario="swap", record="true"))
+    told = launch_parameters(given(scenario="swap", record="true"))
     robots = [f"robot{number}" for number in range(10)]
     of_robots = [f"{robot}/{node}" for robot in robots for node in OF_ROBOT]
     assert list(told) == ["recorder", "world_sim", *of_robots]
@@ -109,7 +109,7 @@ def test_a_fleet_s_nodes_are_told_in_their_namespaces() -> None:
 )
 def test_bad_arguments_are_one_line(name: str, value: str, line: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        told_by_launch(given(**{name: value}))
+        launch_parameters(given(**{name: value}))
     assert str(caught.value).startswith(line)
 
 
@@ -228,7 +228,7 @@ def test_the_shipped_parameters_are_taken_by_the_nodes_in_any_namespace(
     sensor = graph.start(VirtualSensor, {}, cli_args=file, namespace=namespace)
     assert sensor.settings.source is Source.SCAN
     for node, found in (
-        ("planner", flatten(planner.settings) | flatten(planner.brain.params)),
+        ("planner", flatten(planner.settings) | flatten(planner.path_planner.params)),
         ("virtual_sensor", flatten(sensor.settings) | flatten(sensor.sensor)),
     ):
         defaults = {k: v for part in reference.NODES[node] for k, v in flatten(part).items()}

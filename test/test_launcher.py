@@ -8,7 +8,7 @@ import pytest
 from launching import Program, complete
 
 from mfba_planner.core.options import override
-from mfba_planner.launcher.run_arguments import read_order
+from mfba_planner.launcher.run_arguments import read_request
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
@@ -74,7 +74,7 @@ def test_in_process_run_is_the_core_s(tmp_path: Path) -> None:
         "launcher", "--driver", "in-process", "--out", "a/b", "--no-picture", cwd=tmp_path
     )
     assert (done.process.returncode, done.stderr) == (0, "")
-    config = read_order([], "launcher").config
+    config = read_request([], "launcher").config
     assert config.planner.method is Method.PREDICTIVE
     expected = simulate(config.scenario, planner=config.planner, sensor=config.sensor, seed=0)
     check_bag(tmp_path / "a/b/bag", expected)

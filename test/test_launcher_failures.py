@@ -12,7 +12,7 @@ from helpers import wait_until
 from launching import LONG, Program, complete
 
 from mfba_planner import launcher
-from mfba_planner.entry_points import guarded_main
+from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.recording.recover import recover
 from mfba_planner.simulation.episode import Outcome
@@ -58,7 +58,7 @@ def test_what_cannot_be_ordered_is_one_line(
     monkeypatch.chdir(tmp_path)
     Path("taken").mkdir()
     Path("file").touch()
-    assert guarded_main(lambda: launcher.main(args), "launcher") == 1
+    assert run_and_return_exit_code(lambda: launcher.main(args), "launcher") == 1
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.startswith(line)

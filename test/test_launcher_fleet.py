@@ -14,7 +14,7 @@ from launching import Program, complete
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.launcher import node_processes
-from mfba_planner.launcher.run_arguments import MOST_ROBOTS, read_order
+from mfba_planner.launcher.run_arguments import MOST_ROBOTS, read_request
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
@@ -81,20 +81,22 @@ def test_whoever_starts_first(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The launcher's own order is one of many; the recorder may come last, too."""
-    start = node_processes.Crew.start
+    start = node_processes.NodeProcesses.start
     told_in: list[list[str]] = []
 
-    def shuffled(self: node_processes.Crew, told: Parameters, more: dict[str, list[str]]) -> None:
+    def shuffled(
+        self: node_processes.NodeProcesses, told: Parameters, more: dict[str, list[str]]
+    ) -> None:
         names = list(told)
         random.Random(len(told_in)).shuffle(names)
         told_in.append(names)
         start(self, {name: told[name] for name in names}, more)
 
-    monkeypatch.setattr(node_processes.Crew, "start", shuffled)
+    monkeypatch.setattr(node_processes.NodeProcesses, "start", shuffled)
     monkeypatch.chdir(here)
     from mfba_planner import launcher
 
-    planner = read_order([], "launcher").config.planner  # who drives where nobody says
+    planner = read_request([], "launcher").config.planner  # who drives where nobody says
     core = simulate_fleet(PAIR, planner=planner, sensor=SensorParams(), seed=1)
     for place in ("one", "two"):
         args = ["pair.json", "--seed", "1", *PROCESSES[:-1], place]
@@ -149,6 +151,6 @@ def test_more_than_find_each_other_are_refused(tmp_path: Path) -> None:
     many = Scenario(name="many", start_m=first.start_m, goal_m=first.goal_m, robots=robots)
     file.write_text(scenario_to_json(many), encoding="utf-8")
     with pytest.raises(ConfigError, match=r"15 robots would be 32 processes of .*; give --dr"):
-        read_order([str(file), "--driver", "multi-process"], "launcher")
+        read_request([str(file), "--driver", "multi-process"], "launcher")
     file.write_text(scenario_to_json(replace(many, robots=robots[:-1])), encoding="utf-8")
-    read_order([str(file), "--driver", "multi-process"], "launcher")
+    read_request([str(file), "--driver", "multi-process"], "launcher")

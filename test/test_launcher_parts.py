@@ -20,11 +20,11 @@ from rclpy.node import Node
 from mfba_planner.core.errors import GraphError, OutputError
 from mfba_planner.core.options import flatten
 from mfba_planner.launcher import node_process as child_module
-from mfba_planner.launcher.console import Screen
-from mfba_planner.launcher.node_process import Child
-from mfba_planner.launcher.node_processes import Crew, parameters_yaml
+from mfba_planner.launcher.console import RunConsole
+from mfba_planner.launcher.node_process import NodeProcess
+from mfba_planner.launcher.node_processes import NodeProcesses, parameters_yaml
 from mfba_planner.launcher.ros_domain import DOMAINS, claim_domain, private_domain, require_network
-from mfba_planner.launcher.run_arguments import read_order
+from mfba_planner.launcher.run_arguments import read_request
 from mfba_planner.launcher.run_directory import RunDirectory
 from mfba_planner.launcher.set_option import option_rows
 from mfba_planner.launcher.stop_request import StoppedError, StopRequest
@@ -37,7 +37,7 @@ from mfba_planner.swarm.bat_swarm import Algorithm
 
 
 def test_order_without_arguments_is_case_study_1() -> None:
-    order = read_order([], "launcher")
+    order = read_request([], "launcher")
     usual = preset(PlannerParams(method=Method.PREDICTIVE))
     assert order.config == RunConfig(scenario=load_scenario("case1"), planner=usual)
     assert order.config.driver is Driver.MULTI_PROCESS
@@ -48,7 +48,7 @@ def test_order_without_arguments_is_case_study_1() -> None:
 
 
 def test_order_takes_readings_then_algorithm_then_single_options() -> None:
-    order = read_order(
+    order = read_request(
         ["--reading=fig1", "--swarm=table3", "--algorithm=ba", "--set=planner.bat.rho=7"]
         + ["--set=planner.swarm=fresh", "--set=sensor.sectors=16", "--set=planner.speed_mps=1"],
         "launcher",
@@ -69,7 +69,7 @@ def test_every_option_can_be_set_to_its_default() -> None:
     settings = [setting.replace("True", "true") for setting in settings]
     assert len(settings) > 10
     paper = ["--planner=paper"]  # whose defaults they are
-    told, plain = (read_order([*paper, *more], "launcher").config for more in (settings, []))
+    told, plain = (read_request([*paper, *more], "launcher").config for more in (settings, []))
     assert told == plain
 
 
@@ -89,13 +89,13 @@ def test_every_option_can_be_set_to_its_default() -> None:
 def test_what_is_about_algorithm_1_is_given_to_it(
     args: list[str], method: str, step_m: float
 ) -> None:
-    planner = read_order(args, "launcher").config.planner
+    planner = read_request(args, "launcher").config.planner
     assert (planner.method.value, planner.step_length_m) == (method, step_m)
     assert (planner.bat.algorithm is Algorithm.BA) == ("--algorithm=ba" in args)
 
 
 def test_speed_means_real_time_and_time_enough() -> None:
-    order = read_order(["--speed=0.1"], "launcher")
+    order = read_request(["--speed=0.1"], "launcher")
     assert order.config.real_time
     assert order.config.speed_factor == 0.1
     assert order.timeout_s > order.config.scenario.time_limit_s / 0.1
@@ -103,7 +103,7 @@ def test_speed_means_real_time_and_time_enough() -> None:
 
 def test_node_arguments_are_split_as_in_a_shell() -> None:
     args = ["--planner-args=-p a:='x y'", "--planner-args", "--log-level debug"]
-    assert read_order(args, "launcher").node_args["planner"] == [
+    assert read_request(args, "launcher").node_args["planner"] == [
         "-p",
         "a:=x y",
         "--log-level",
@@ -134,7 +134,7 @@ def test_parameter_files_are_read_so_by_ros(tmp_path: Path, domain_id: int) -> N
     from rclpy.context import Context
     from rclpy.node import Node
 
-    config = read_order(["case2", "--seed", str(2**63 - 1)], "launcher").config
+    config = read_request(["case2", "--seed", str(2**63 - 1)], "launcher").config
     told = node_parameters(config, ("planner", "recorder"))
     told["planner"]["bat.rho"] = 1e-5
     for name, parameters in told.items():
@@ -270,11 +270,11 @@ class Lines:
 @pytest.mark.usefixtures("programs")
 def test_child_says_everything_and_how_it_ended() -> None:
     lines = Lines()
-    child = Child("talker", [], lines)
+    child = NodeProcess("talker", [], lines)
     assert child.ended_within(10.0)
     assert lines.all == [("talker", "one"), ("talker", "two")]
-    assert child.fate() == "exit code 3"
-    garbled = Child("garbled", [], lines)
+    assert child.how_it_ended() == "exit code 3"
+    garbled = NodeProcess("garbled", [], lines)
     assert garbled.ended_within(10.0)
     assert lines.all[-1] == ("garbled", "\ufffd\ufffd ok")
 
@@ -283,54 +283,57 @@ def test_child_says_everything_and_how_it_ended() -> None:
 def test_crew_ends_even_those_who_do_not_listen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mfba_planner.launcher.node_processes.GRACE_S", 0.2)
     lines = Lines()
-    crew = Crew(lines, lambda: False)
-    crew.start({"deaf": {}, "patient": {}}, {})
-    children = [*crew.children]
+    node_processes = NodeProcesses(lines, lambda: False)
+    node_processes.start({"deaf": {}, "patient": {}}, {})
+    children = [*node_processes.children]
     wait_until(lambda: len(lines.all) == 2, timeout_s=10.0)
-    with pytest.raises(RuntimeError, match="inside"), crew:
+    with pytest.raises(RuntimeError, match="inside"), node_processes:
         raise RuntimeError("inside")
-    assert [child.fate() for child in children] == ["killed by SIGKILL", "killed by SIGTERM"]
+    assert [child.how_it_ended() for child in children] == [
+        "killed by SIGKILL",
+        "killed by SIGTERM",
+    ]
 
 
 @pytest.mark.usefixtures("programs")
 def test_crew_does_not_wait_for_the_deaf_when_in_a_hurry() -> None:
     lines, hurry = Lines(), threading.Event()
-    crew = Crew(lines, hurry.is_set)
-    crew.start({"deaf": {}}, {})
+    node_processes = NodeProcesses(lines, hurry.is_set)
+    node_processes.start({"deaf": {}}, {})
     wait_until(lambda: bool(lines.all), timeout_s=10.0)
-    children = [*crew.children]
+    children = [*node_processes.children]
     hurry.set()
-    crew.stop()
-    assert children[0].fate() == "killed by SIGKILL"
+    node_processes.stop()
+    assert children[0].how_it_ended() == "killed by SIGKILL"
 
 
 @pytest.mark.usefixtures("programs")
 def test_crew_tells_of_a_death_and_of_a_bad_end() -> None:
     with pytest.raises(GraphError, match=r"^talker ended \(exit code 3\); it said last: two$"):
-        _crew_of_one("talker", check=True)
+        _one_process("talker", check=True)
     with pytest.raises(GraphError, match=r"^talker ended \(exit code 3\)"):
-        _crew_of_one("talker", check=False)
+        _one_process("talker", check=False)
 
 
-def _crew_of_one(name: str, check: bool) -> None:
-    with Crew(Lines(), lambda: False) as crew:
-        crew.start({name: {}}, {})
-        wait_until(lambda: not crew.has(name), timeout_s=10.0)
+def _one_process(name: str, check: bool) -> None:
+    with NodeProcesses(Lines(), lambda: False) as node_processes:
+        node_processes.start({name: {}}, {})
+        wait_until(lambda: not node_processes.has(name), timeout_s=10.0)
         if check:
-            crew.check()
+            node_processes.check()
 
 
 def test_lines_are_not_torn(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    screen = Screen()
-    screen.log_to(tmp_path / "log.txt")
+    console = RunConsole()
+    console.log_to(tmp_path / "log.txt")
 
     def talk(who: str) -> None:
         for k in range(200):
-            screen.line(who, f"{k} " + who * 50)
+            console.line(who, f"{k} " + who * 50)
 
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(talk, "abcd"))
-    screen.close()
+    console.close()
     said = capfd.readouterr().out
     assert sorted(said.splitlines()) == sorted(
         f"[{who}] {k} " + who * 50 for who in "abcd" for k in range(200)

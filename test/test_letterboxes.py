@@ -11,7 +11,7 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from mfba_planner.ros.runtime import polled_subscriptions
-from mfba_planner.ros.runtime.polled_subscriptions import Letterboxes
+from mfba_planner.ros.runtime.polled_subscriptions import PolledSubscriptions
 
 Post = Callable[[str, str], None]
 
@@ -22,12 +22,12 @@ def heard() -> list[str]:
 
 
 @pytest.fixture
-def boxes(graph: Graph, heard: list[str]) -> Letterboxes:
+def boxes(graph: Graph, heard: list[str]) -> PolledSubscriptions:
     """Two topics, late and early; the box of late is looked into first."""
-    made = Letterboxes()
+    made = PolledSubscriptions()
 
-    def deliver(letter: Any) -> None:
-        heard.append(deserialize_message(letter.data, String).data)
+    def deliver(message: Any) -> None:
+        heard.append(deserialize_message(message.data, String).data)
 
     for name in ("late", "early"):
         box = graph.probe.create_subscription(
@@ -43,7 +43,7 @@ def post(graph: Graph) -> Post:
     return lambda name, text: writers[name].publish(String(data=text))
 
 
-def until_heard(boxes: Letterboxes, heard: list[str], count: int) -> None:
+def until_heard(boxes: PolledSubscriptions, heard: list[str], count: int) -> None:
     deadline = time.monotonic() + 5.0
     while len(heard) < count:
         assert time.monotonic() < deadline, heard
@@ -51,7 +51,7 @@ def until_heard(boxes: Letterboxes, heard: list[str], count: int) -> None:
 
 
 def test_letters_are_handed_on_as_they_were_sent(
-    boxes: Letterboxes, heard: list[str], post: Post
+    boxes: PolledSubscriptions, heard: list[str], post: Post
 ) -> None:
     for number in range(6):
         post(("early", "late")[number % 2], str(number))
@@ -60,7 +60,7 @@ def test_letters_are_handed_on_as_they_were_sent(
 
 
 def test_what_was_sent_after_a_round_began_waits_for_the_next(
-    boxes: Letterboxes, heard: list[str], post: Post, monkeypatch: pytest.MonkeyPatch
+    boxes: PolledSubscriptions, heard: list[str], post: Post, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The clock says when a round begins: long before the letters were sent, here."""
     post("early", "first")

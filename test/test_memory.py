@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Point
 from mfba_planner.core.types import Circle
-from mfba_planner.perception.obstacle_memory import Memory, MemoryParams
+from mfba_planner.perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 
 SECOND = 10**9
 RANGE_M = 0.8
@@ -18,58 +18,60 @@ def circle(x: float, y: float = 0.0, velocity: Point = (0.0, 0.0)) -> Circle:
     return Circle(center_m=(x, y), radius_m=0.6, velocity_mps=velocity)
 
 
-def look(memory: Memory, at_s: float, *seen: Circle, position: Point = HERE) -> list[Circle]:
+def observe_sectors(
+    memory: ObstacleMemory, at_s: float, *seen: Circle, position: Point = HERE
+) -> list[Circle]:
     return memory.update(round(at_s * SECOND), position, RANGE_M, seen)
 
 
 def test_who_has_left_is_followed_on() -> None:
-    memory = Memory()
-    look(memory, 0.0, circle(1.39, velocity=(0.3, -0.1)))
-    (hidden,) = look(memory, 0.5)
+    memory = ObstacleMemory()
+    observe_sectors(memory, 0.0, circle(1.39, velocity=(0.3, -0.1)))
+    (hidden,) = observe_sectors(memory, 0.5)
     assert hidden.center_m == pytest.approx((1.54, -0.05))
-    (hidden,) = look(memory, 1.5)
+    (hidden,) = observe_sectors(memory, 1.5)
     assert hidden.center_m == pytest.approx((1.84, -0.15))
 
 
 def test_a_ghost_in_sight_is_dropped_for_good() -> None:
-    memory = Memory()
-    look(memory, 0.0, circle(1.3))
-    assert look(memory, 0.1) == []
-    assert look(memory, 0.2, position=(-5.0, 0.0)) == []
+    memory = ObstacleMemory()
+    observe_sectors(memory, 0.0, circle(1.3))
+    assert observe_sectors(memory, 0.1) == []
+    assert observe_sectors(memory, 0.2, position=(-5.0, 0.0)) == []
 
 
 def test_who_is_seen_is_not_remembered_beside_itself() -> None:
-    memory = Memory()
-    look(memory, 0.0, circle(1.39, velocity=(0.2, 0.0)))
+    memory = ObstacleMemory()
+    observe_sectors(memory, 0.0, circle(1.39, velocity=(0.2, 0.0)))
     turned = circle(1.39, velocity=(0.0, 0.2))  # where it would be out of sight, had it not turned
-    assert look(memory, 0.1, turned) == [turned]
+    assert observe_sectors(memory, 0.1, turned) == [turned]
 
 
 def test_who_is_seen_beyond_the_range_is_not_doubled() -> None:
-    memory = Memory()
+    memory = ObstacleMemory()
     for tick in range(10):
         seen = [circle(5.0 + 0.02 * tick, velocity=(0.2, 0.0)), circle(3.0)]
-        assert look(memory, 0.1 * tick, *seen) == seen
+        assert observe_sectors(memory, 0.1 * tick, *seen) == seen
 
 
 @pytest.mark.parametrize(("speed_mps", "until_s"), [(0.3, 2.0), (0.1, 6.0), (0.0, 10.0)])
 def test_the_faster_the_sooner_it_is_given_up(speed_mps: float, until_s: float) -> None:
-    memory = Memory(MemoryParams(way_m=0.6, longest_s=10.0))
-    look(memory, 0.0, circle(1.4, velocity=(speed_mps, 0.0)))
-    assert len(look(memory, until_s - 0.01, position=(-1.0, 0.0))) == 1
-    assert look(memory, until_s + 0.01, position=(-1.0, 0.0)) == []
+    memory = ObstacleMemory(ObstacleMemoryParams(path_m=0.6, longest_s=10.0))
+    observe_sectors(memory, 0.0, circle(1.4, velocity=(speed_mps, 0.0)))
+    assert len(observe_sectors(memory, until_s - 0.01, position=(-1.0, 0.0))) == 1
+    assert observe_sectors(memory, until_s + 0.01, position=(-1.0, 0.0)) == []
 
 
 def test_a_clock_that_does_not_rise_begins_anew() -> None:
-    memory = Memory()
-    look(memory, 1.0, circle(1.39, velocity=(0.3, 0.0)))
-    assert look(memory, 1.0) == []
+    memory = ObstacleMemory()
+    observe_sectors(memory, 1.0, circle(1.39, velocity=(0.3, 0.0)))
+    assert observe_sectors(memory, 1.0) == []
 
 
 def test_nothing_is_remembered_for_no_time() -> None:
-    memory = Memory(MemoryParams(longest_s=0.0))
-    look(memory, 0.0, circle(1.39, velocity=(0.3, 0.0)))
-    assert look(memory, 0.1) == []
+    memory = ObstacleMemory(ObstacleMemoryParams(longest_s=0.0))
+    observe_sectors(memory, 0.0, circle(1.39, velocity=(0.3, 0.0)))
+    assert observe_sectors(memory, 0.1) == []
 
 
 @given(
@@ -80,12 +82,12 @@ def test_nothing_is_remembered_for_no_time() -> None:
 def test_a_straight_mover_is_held_once_and_where_it_is(
     x: float, vx: float, vy: float, ticks: list[float]
 ) -> None:
-    memory, t = Memory(), 0.0
+    memory, t = ObstacleMemory(), 0.0
     for dt in (0.0, *ticks):
         t += dt
         true = circle(x + vx * t, vy * t, (vx, vy))
         in_sight = true.center_m[0] ** 2 + true.center_m[1] ** 2 <= 1.4**2
-        held = look(memory, t, *([true] if in_sight else []))
+        held = observe_sectors(memory, t, *([true] if in_sight else []))
         assert len(held) <= 1
         if in_sight:
             assert held == [true]

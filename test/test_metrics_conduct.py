@@ -12,7 +12,7 @@ from trips import SECOND, post, trip
 
 from mfba_planner.core.types import Mode
 from mfba_planner.evaluation import metrics
-from mfba_planner.evaluation.metrics import Tally, assess, conduct, evaluate
+from mfba_planner.evaluation.metrics import MetricsAccumulator, assess, evaluate, run_motion
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode
@@ -29,7 +29,7 @@ def mover(center: tuple[float, float], degrees: float, speed: float = 1.0) -> Ob
 
 def test_a_robot_that_drives_into_a_post_ran_into_it() -> None:
     # enlarged radius 0.8: contact between x = 1 and x = 2
-    found = conduct(trip([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)], obstacles=(post((2.0, 0.0)),)))
+    found = run_motion(trip([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)], obstacles=(post((2.0, 0.0)),)))
     assert (found.hits_moving, found.hits_standing) == (1, 0)
     assert (found.first_contact_with, found.first_contact_s) == (1, 1.0)
 
@@ -37,7 +37,7 @@ def test_a_robot_that_drives_into_a_post_ran_into_it() -> None:
 def test_an_obstacle_that_comes_to_a_standing_robot_ran_into_it() -> None:
     # 3.8 m away it comes at 1 m/s: after 3 s it touches
     far, near = post((9.0, 5.0)), mover((3.8, 0.0), 180.0)
-    found = conduct(trip([(0.0, 0.0)] * 6, obstacles=(far, near)))
+    found = run_motion(trip([(0.0, 0.0)] * 6, obstacles=(far, near)))
     assert (found.hits_moving, found.hits_standing) == (0, 1)
     assert (found.first_contact_with, found.first_contact_s) == (2, 3.0)
 
@@ -46,21 +46,21 @@ def test_hits_of_both_kinds_are_all_collisions() -> None:
     points = [(0.0, 0.0), (1.5, 0.0), (1.5, 0.0), (1.5, 0.0), (1.5, 0.0)]
     obstacles = (post((1.9, 0.0)), mover((1.5, 3.5), -90.0))
     episode = trip(points, obstacles=obstacles)
-    found = conduct(episode)
+    found = run_motion(episode)
     assert (found.hits_moving, found.hits_standing) == (1, 1)
     assert evaluate(episode).collisions == 2
     assert (found.first_contact_with, found.first_contact_s) == (1, 0.0)
 
 
 def test_without_contact_there_is_no_first_one() -> None:
-    found = conduct(trip([(0.0, 0.0), (1.0, 0.0)], obstacles=(post((0.0, 5.0)),)))
+    found = run_motion(trip([(0.0, 0.0), (1.0, 0.0)], obstacles=(post((0.0, 5.0)),)))
     assert (found.first_contact_with, found.first_contact_s) == (0, math.inf)
 
 
 def test_mean_clearance_is_that_of_the_nearest_in_each_step() -> None:
     # nearest during the steps: 2.2 (at x = 1, post 3 m off the end) and 1.2 m
     episode = trip([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)], obstacles=(post((4.0, 0.0)),))
-    found = conduct(episode)
+    found = run_motion(episode)
     assert found.mean_clearance_m == pytest.approx((2.2 + 1.2) / 2)
     assert evaluate(episode).min_clearance_m == pytest.approx(1.2)
     nearer = replace(
@@ -69,21 +69,21 @@ def test_mean_clearance_is_that_of_the_nearest_in_each_step() -> None:
             episode.scenario, obstacles=(*episode.scenario.obstacles, post((0.0, 1.0)))
         ),
     )
-    assert conduct(nearer).mean_clearance_m == pytest.approx((0.2 + math.sqrt(2.0) - 0.8) / 2)
+    assert run_motion(nearer).mean_clearance_m == pytest.approx((0.2 + math.sqrt(2.0) - 0.8) / 2)
 
 
 def test_time_to_collision_when_both_go_on_as_in_the_step() -> None:
     # 5 m apart, closing at 1 + 0.5 m/s, 0.8 m between centres in contact
     head_on = trip([(0.0, 0.0), (1.0, 0.0)], obstacles=(mover((5.0, 0.0), 180.0, 0.5),))
-    assert conduct(head_on).min_ttc_s == pytest.approx(4.2 / 1.5)
+    assert run_motion(head_on).min_ttc_s == pytest.approx(4.2 / 1.5)
     overtaken = trip([(0.0, 0.0), (1.0, 0.0)], obstacles=(mover((-2.0, 0.0), 0.0, 3.0),))
-    assert conduct(overtaken).min_ttc_s == pytest.approx(1.2 / 2.0)
+    assert run_motion(overtaken).min_ttc_s == pytest.approx(1.2 / 2.0)
     passing = trip([(0.0, 0.0), (1.0, 0.0)], obstacles=(post((5.0, 0.81)),))
-    assert conduct(passing).min_ttc_s == math.inf
+    assert run_motion(passing).min_ttc_s == math.inf
     leaving = trip([(0.0, 0.0), (-1.0, 0.0)], obstacles=(post((5.0, 0.0)),))
-    assert conduct(leaving).min_ttc_s == math.inf
+    assert run_motion(leaving).min_ttc_s == math.inf
     inside = trip([(0.0, 0.0), (0.0, 1.0)], obstacles=(post((0.5, 0.0)),))
-    assert conduct(inside).min_ttc_s == 0.0
+    assert run_motion(inside).min_ttc_s == 0.0
 
 
 def test_a_path_with_corners() -> None:
@@ -93,7 +93,7 @@ def test_a_path_with_corners() -> None:
     points += [(1.0 - math.sqrt(0.5), 2.0 + math.sqrt(0.5))]
     x, y = points[-1]
     points.append((x + math.cos(h), y + math.sin(h)))
-    found = conduct(trip(points))
+    found = run_motion(trip(points))
     assert math.degrees(found.turning_rad) == pytest.approx(90.0 + 45.0 + 10.0)
     assert found.heading_changes == 2, "ten degrees are no change, standing still is none"
     assert found.curvature_radpm == pytest.approx(math.radians(145.0) / 5.0)
@@ -103,29 +103,29 @@ def test_turns_are_taken_the_short_way_round() -> None:
     a, b = math.radians(170.0), math.radians(-170.0)
     points = [(0.0, 0.0), (math.cos(a), math.sin(a))]
     points.append((points[1][0] + math.cos(b), points[1][1] + math.sin(b)))
-    assert math.degrees(conduct(trip(points)).turning_rad) == pytest.approx(20.0)
+    assert math.degrees(run_motion(trip(points)).turning_rad) == pytest.approx(20.0)
 
 
 def test_jerk_is_the_third_difference() -> None:
     # x = t^3 / 6 has jerk 1 m/s^3 everywhere
     points = [(k**3 / 6.0, 0.0) for k in range(8)]
-    assert conduct(trip(points)).jerk_mps3 == pytest.approx(1.0)
+    assert run_motion(trip(points)).jerk_mps3 == pytest.approx(1.0)
     half = replace(SECOND, speed_mps=2.0)  # half a second per tick: eight times as much
-    assert conduct(trip(points, planner=half)).jerk_mps3 == pytest.approx(8.0)
-    assert conduct(trip(points[:3])).jerk_mps3 == 0.0
+    assert run_motion(trip(points, planner=half)).jerk_mps3 == pytest.approx(8.0)
+    assert run_motion(trip(points[:3])).jerk_mps3 == 0.0
     # (1, 0) and (0, 1) in turn: |p3 - 3 p2 + 3 p1 - p0| of a square's corners
     square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
-    assert conduct(trip(square)).jerk_mps3 == pytest.approx(2.0)
+    assert run_motion(trip(square)).jerk_mps3 == pytest.approx(2.0)
 
 
 def test_time_in_obstacle_avoidance() -> None:
     modes = [Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE, Mode.OBSTACLE_AVOIDANCE]
-    assert conduct(trip([(0.0, 0.0)] * 3, modes)).avoidance_s == 2.0
+    assert run_motion(trip([(0.0, 0.0)] * 3, modes)).avoidance_s == 2.0
 
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_a_run_without_a_step(count: int) -> None:
-    found = conduct(trip([(1.0, 2.0)] * count, obstacles=(post((1.0, 5.0)),)))
+    found = run_motion(trip([(1.0, 2.0)] * count, obstacles=(post((1.0, 5.0)),)))
     assert found.mean_clearance_m == (pytest.approx(2.2) if count else math.inf)
     assert (found.turning_rad, found.curvature_radpm, found.jerk_mps3) == (0.0, 0.0, 0.0)
     assert (found.hits_moving, found.min_ttc_s) == (0, math.inf)
@@ -151,14 +151,14 @@ def test_a_contact_over_the_edge_of_a_block_is_one(monkeypatch: pytest.MonkeyPat
 
 def test_figures_may_be_asked_for_on_the_way() -> None:
     episode = run(load_scenario("case1"), seed=1)
-    tally = Tally(episode)
+    tally = MetricsAccumulator(episode)
     for k, tick in enumerate(episode.ticks):
         tally.add(tick)
         if k in (0, 1, 17):
             part = replace(episode, ticks=episode.ticks[: k + 1])
             assert tally.result(episode.outcome) == evaluate(part)
     assert tally.result(episode.outcome) == evaluate(episode)
-    assert tally.conduct().turning_rad == conduct(episode).turning_rad
+    assert tally.run_motion().turning_rad == run_motion(episode).turning_rad
 
 
 PLACES = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
@@ -180,7 +180,7 @@ def test_what_is_turned_and_shifted_is_as_smooth_and_as_near(
         return trip([rotate(p) for p in points], obstacles=obstacles)
 
     episode = trip(points, obstacles=(mover((4.0, 0.5), 170.0, 0.7), post((0.0, 6.0))))
-    a, b = conduct(episode), conduct(turned(episode))
+    a, b = run_motion(episode), run_motion(turned(episode))
     assert a.mean_clearance_m == pytest.approx(b.mean_clearance_m, abs=1e-9)
     assert a.jerk_mps3 == pytest.approx(b.jerk_mps3, abs=1e-9)
     assert a.hits_moving + a.hits_standing == evaluate(episode).collisions
@@ -196,5 +196,5 @@ def test_a_pose_that_is_not_finite_has_no_gap() -> None:
 
 def test_no_obstacles_no_contact() -> None:
     scenario = Scenario(name="x", start_m=(0.0, 0.0), goal_m=(1.0, 0.0))
-    found = conduct(run(scenario, seed=1))
+    found = run_motion(run(scenario, seed=1))
     assert (found.mean_clearance_m, found.min_ttc_s) == (math.inf, math.inf)

@@ -89,10 +89,10 @@ def test_one_pose_in_another_frame_spoils_the_route(graph: Graph) -> None:
     mixed = route(A, B)
     mixed.poses[1].header.frame_id = "map"
     talk.answers(mixed)
-    assert talk.node.goals.errands.goal == GOAL
+    assert talk.node.goals.goal_queue.goal == GOAL
     mixed.poses[1].header.frame_id = ""
     talk.answers(mixed)
-    assert talk.node.goals.errands.goal == A
+    assert talk.node.goals.goal_queue.goal == A
 
 
 def test_waypoints_are_heard_from_a_command_line(graph: Graph) -> None:

@@ -148,7 +148,7 @@ def start_loop(graph: Graph, scenario: str, seed: int, **more: Any) -> WorldSim:
     graph.start(VirtualSensor, told["virtual_sensor"])
     planner = graph.start(PlannerNode, {**told["planner"], **more})
     world = graph.start(WorldSim, {**told["world_sim"], **more})
-    graph.until(lambda: planner.goals.errands.goal is not None)
+    graph.until(lambda: planner.goals.goal_queue.goal is not None)
     return world
 
 
@@ -207,7 +207,7 @@ def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph)
     )
     graph.start(VirtualSensor, told["virtual_sensor"])
     first = graph.start(PlannerNode, told["planner"])
-    graph.until(lambda: first.goals.errands.goal is not None)
+    graph.until(lambda: first.goals.goal_queue.goal is not None)
     world.resume()
     graph.until(lambda: world.world.tick > 20)
     graph.stop(first)

@@ -117,10 +117,10 @@ def test_cleaned_up_it_has_forgotten_its_goal_and_hears_the_latched_one(graph: G
     talk = Talk(graph, LOCKSTEP)
     for name in ("deactivate", "cleanup"):
         assert change(graph, name)
-    assert talk.node.goals.errands.goal is None
+    assert talk.node.goals.goal_queue.goal is None
     for name in ("configure", "activate"):
         assert change(graph, name)
-    graph.until(lambda: talk.node.goals.errands.goal == GOAL)
+    graph.until(lambda: talk.node.goals.goal_queue.goal == GOAL)
     assert mode(talk.answer(odom(1), sectors(1))) is Mode.PATH_GENERATION
 
 

@@ -30,7 +30,7 @@ from talk import (
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.types import NANO, Decision, Mode, Observation
-from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.recording.messages import decision as read_decision
 from mfba_planner.recording.messages import stamp_ns
@@ -67,7 +67,7 @@ def test_the_method_can_be_changed_while_it_drives(graph: Graph) -> None:
 def test_decisions_are_the_cores_and_travel_whole(graph: Graph, params: PlannerParams) -> None:
     told = {"speed_mps": params.speed_mps, "step_length_m": params.step_length_m}
     talk = Talk(graph, {**LOCKSTEP, **told, "swarm": params.swarm.value})
-    core = Planner(params, seed=3)
+    core = Algorithm1(params, seed=3)
     rng = np.random.default_rng(4)
     modes = set()
     for stamp in range(1, 61):
@@ -100,7 +100,7 @@ def check_the_rest(talk: Talk, answer: Decision) -> None:
     # The Twist is in the body frame: turned by the yaw it is the way to the goal step.
     vx, vy = talk.velocity
     c, s = math.cos(answer.pose.yaw), math.sin(answer.pose.yaw)
-    dt = talk.node.brain.params.tick_ns * NANO
+    dt = talk.node.path_planner.params.tick_ns * NANO
     there = (
         answer.pose.x + dt * (c * vx - s * vy),
         answer.pose.y + dt * (s * vx + c * vy),
@@ -232,7 +232,7 @@ def test_a_goal_in_another_frame_is_refused_and_in_none_it_is_taken(graph: Graph
         sent.header.frame_id = frame
         talk.goal.publish(sent)
         graph.settle()
-        assert talk.node.goals.errands.goal == expected
+        assert talk.node.goals.goal_queue.goal == expected
 
 
 def test_a_new_goal_counts_at_once_even_after_arrival(graph: Graph) -> None:
@@ -368,7 +368,7 @@ def test_speed_and_algorithm_can_be_set_while_it_runs(graph: Graph) -> None:
     slow = math.hypot(*(talk.answer(odom(1), sectors(1)) and talk.velocity))
     assert graph.set_parameter("planner", "speed_mps", 1.64) == ""
     assert graph.set_parameter("planner", "bat.algorithm", "ba") == ""
-    assert talk.node.brain.params.bat.algorithm is Algorithm.BA
+    assert talk.node.path_planner.params.bat.algorithm is Algorithm.BA
     answer = talk.answer(odom(2), sectors(2))
     assert fields(answer)["algorithm"] == "ba"
     assert math.hypot(*talk.velocity) == pytest.approx(2.0 * slow, rel=0.1)
@@ -392,9 +392,9 @@ def test_what_cannot_be_set_is_refused_with_the_reason(
     graph: Graph, name: str, value: Any, reason: str
 ) -> None:
     talk = Talk(graph, LOCKSTEP)
-    before = talk.node.brain.params
+    before = talk.node.path_planner.params
     assert reason in graph.set_parameter("planner", name, value)
-    assert talk.node.brain.params is before
+    assert talk.node.path_planner.params is before
 
 
 @pytest.mark.parametrize(

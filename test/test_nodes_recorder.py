@@ -254,7 +254,7 @@ def test_an_episode_in_real_time_keeps_the_decision_not_the_stops_after_it(
     recorder = record(graph, tmp_path / "bag")
     recorder.explain({node.get_name(): params.values(node) for node in nodes})
     outcomes = graph.hear(topics.DECISION)
-    graph.until(lambda: planner.goals.errands.goal is not None)
+    graph.until(lambda: planner.goals.goal_queue.goal is not None)
     for _ in range(2):
         graph.call(Trigger, "world_sim/step")
         count = len(outcomes)

@@ -266,7 +266,7 @@ def test_a_planner_that_is_ended_commands_rest_last(graph: Graph) -> None:
 
 
 def test_it_slows_down_where_it_is_narrow_if_asked_to(graph: Graph) -> None:
-    wired = Wired(graph, FAR, **{"caution.slow_within_m": 0.8, "caution.least_share": 0.1})
+    wired = Wired(graph, FAR, **{"speed_limit.slow_within_m": 0.8, "speed_limit.least_share": 0.1})
     wired.drive()
     fast = speed(wired.cmd_vel[-1])
     wired.beams = [INF] * 170 + [0.7] * 20 + [INF] * 170  # 0.4 m behind, enlarged by 0.3 m

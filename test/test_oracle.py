@@ -33,7 +33,7 @@ from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls, center_at
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
-from mfba_planner.simulation.uniform_segments import uniform_legs
+from mfba_planner.simulation.uniform_segments import uniform_segments
 
 ROOM = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 12.0))
 V = 0.8
@@ -219,8 +219,8 @@ def test_three_ways_to_compute_clearance_agree(
     way = timed(points, speed)
     ours = core_clearance(world, way)
     assert clearance(world, way) == pytest.approx(ours, abs=1e-6)
-    legs = uniform_legs(world, way[-1].t_s + 1.0)
-    many = gaps(np.array([points, points[::-1]]), speed, legs)
+    segments = uniform_segments(world, way[-1].t_s + 1.0)
+    many = gaps(np.array([points, points[::-1]]), speed, segments)
     back = core_clearance(world, timed(points[::-1], speed))
     for found, core in zip(many, (ours, back)):
         assert min(found.min(), FAR_M) == pytest.approx(min(core, FAR_M), abs=1e-6)
@@ -277,10 +277,10 @@ def test_a_search_that_shares_no_idea_finds_nothing_shorter(name: str, k: int) -
     world = suite(name).world(k, V)
     best = solve(world, V)
     limit_s = 1.012 * best.length_m / V
-    legs = uniform_legs(world, limit_s + 1.0)
+    segments = uniform_segments(world, limit_s + 1.0)
     params = LatticeParams(step_s=0.6, headings=64, cell_m=0.1, ways=12)
-    ways = lattice_ways(world.start_m, world.goal_m, V, legs, limit_s, params)
-    refined = [way for one in ways if (way := refine(one, V, legs)) is not None]
+    ways = lattice_ways(world.start_m, world.goal_m, V, segments, limit_s, params)
+    refined = [way for one in ways if (way := refine(one, V, segments)) is not None]
     assert refined
     shortest = min(float(lengths(way[None])[0]) for way in refined)
     assert best.length_m <= shortest + 2e-3
@@ -348,8 +348,8 @@ def test_no_proof_against_a_trajectory_at_hand(name: str) -> None:
     for k in range(5):
         world = suite(name).world(k, V)
         assert solve(world, V).certificate is Certificate.FEASIBLE
-        legs = uniform_legs(world, world.time_limit_s)
-        assert unreachable(world, V, legs, coarse) == ""
+        segments = uniform_segments(world, world.time_limit_s)
+        assert unreachable(world, V, segments, coarse) == ""
 
 
 # --- the rest -------------------------------------------------------------------------------
@@ -403,13 +403,13 @@ def test_slow_and_fast_robots(speed: float) -> None:
 
 def test_gaps_of_pairs_and_of_one_way_are_those_of_all_to_the_last_bit() -> None:
     rng = np.random.default_rng(5)
-    legs = uniform_legs(suite("random-20").world(5), 40.0)
+    segments = uniform_segments(suite("random-20").world(5), 40.0)
     points = rng.uniform(0.0, 12.0, (6, 9, 2))
     points[2, 4] = points[2, 3]  # a leg of no length
-    rows, columns = rng.integers(0, 8, 60), rng.integers(0, legs.t0.size, 60)
-    some = type(legs)(*(values[columns] for values in legs))
+    rows, columns = rng.integers(0, 8, 60), rng.integers(0, segments.t0.size, 60)
+    some = type(segments)(*(values[columns] for values in segments))
     found = pair_gaps(points, V, rows, some)
-    assert np.array_equal(found, gaps(points, V, legs)[:, rows, columns])
+    assert np.array_equal(found, gaps(points, V, segments)[:, rows, columns])
     plain = list(zip(*(values.tolist() for values in some[:7])))
     for way, expected in zip(points, found):
         ends = [(x, y) for x, y in way.tolist()]
@@ -419,12 +419,12 @@ def test_gaps_of_pairs_and_of_one_way_are_those_of_all_to_the_last_bit() -> None
 @pytest.mark.parametrize("name", ["random-30", "dynabarn-like"])
 def test_the_lattice_leaves_out_only_what_is_too_far_away(name: str) -> None:
     rng = np.random.default_rng(6)
-    legs = uniform_legs(suite(name).world(6), 40.0)
+    segments = uniform_segments(suite(name).world(6), 40.0)
     angles = np.arange(8) * (math.pi / 4.0)
     u = V * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     for t in (0.0, 3.1, 17.0):
         here, steps = rng.uniform(0.0, 12.0, (80, 2)), rng.permutation(640)[:500]
-        expected = _free(here[steps // 8], u[steps % 8], t, np.full(500, t + 0.6), legs)
-        found = _free_steps(here, u, t, t + 0.6, steps, legs)
+        expected = _free(here[steps // 8], u[steps % 8], t, np.full(500, t + 0.6), segments)
+        found = _free_steps(here, u, t, t + 0.6, steps, segments)
         assert np.array_equal(found, expected)
         assert 0 < found.sum() < 500

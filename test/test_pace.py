@@ -7,16 +7,16 @@ import pytest
 
 from mfba_planner.core.errors import GraphError
 from mfba_planner.ros.node_parameters import WorldSimSettings
-from mfba_planner.ros.runtime.tick_control import Pace
+from mfba_planner.ros.runtime.tick_control import TickControl
 
 
-def pace(**settings: Any) -> Pace:
+def tick_control(**settings: Any) -> TickControl:
     defaults = {"lockstep": True, "answer_timeout_s": 2.0, "answer_retries": 3}
-    return Pace(WorldSimSettings(**(defaults | settings)))
+    return TickControl(WorldSimSettings(**(defaults | settings)))
 
 
 def test_a_tick_stays_open_until_its_answer() -> None:
-    world = pace()
+    world = tick_control()
     assert world.may_move_on()
     world.published(0.0)
     assert world.is_open
@@ -26,7 +26,7 @@ def test_a_tick_stays_open_until_its_answer() -> None:
 
 
 def test_a_pause_keeps_the_answer_for_later() -> None:
-    world = pace()
+    world = tick_control()
     world.published(0.0)
     world.paused = True
     assert world.cannot_step() == "refused: the planner has not answered the present tick yet"
@@ -39,14 +39,14 @@ def test_a_pause_keeps_the_answer_for_later() -> None:
 
 
 def test_after_a_pause_an_open_tick_still_waits() -> None:
-    world = pace(start_paused=True)
+    world = tick_control(start_paused=True)
     world.published(0.0)
     assert not world.resume()
     assert world.answered()
 
 
 def test_a_tick_is_repeated_after_each_timeout_and_then_given_up() -> None:
-    world = pace()
+    world = tick_control()
     assert not world.must_repeat(100.0, 0), "nothing is open"
     world.published(10.0)
     times = [11.9, 12.0, 13.9, 14.1, 15.0, 16.2]
@@ -57,7 +57,7 @@ def test_a_tick_is_repeated_after_each_timeout_and_then_given_up() -> None:
 
 
 def test_an_answer_ends_the_repetitions_and_the_next_tick_has_all_of_them() -> None:
-    world = pace(answer_retries=1)
+    world = tick_control(answer_retries=1)
     for tick in range(3):
         start = 10.0 * tick
         world.published(start)
@@ -67,14 +67,14 @@ def test_an_answer_ends_the_repetitions_and_the_next_tick_has_all_of_them() -> N
 
 
 def test_no_retries_at_all() -> None:
-    world = pace(answer_retries=0)
+    world = tick_control(answer_retries=0)
     world.published(0.0)
     with pytest.raises(GraphError, match="published 1 times"):
         world.must_repeat(2.0, 0)
 
 
 def test_in_real_time_no_tick_is_open_and_no_answer_moves_the_world() -> None:
-    world = pace(lockstep=False)
+    world = tick_control(lockstep=False)
     world.published(0.0)
     assert not world.is_open
     assert not world.may_move_on()

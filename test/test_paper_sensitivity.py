@@ -238,12 +238,12 @@ def test_the_command_goes_on_where_it_was(
 def test_a_terminal_without_these_letters_is_no_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    screen = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    monkeypatch.setattr("sys.stdout", screen)
+    console = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr("sys.stdout", console)
     out = str(tmp_path / "s")
     assert cli.main(["sensitivity", "--quick", "--workers", "1", "--out", out]) == 0
-    screen.seek(0)
-    assert "? the printed row lies within ours" in " ".join(screen.read().split())
+    console.seek(0)
+    assert "? the printed row lies within ours" in " ".join(console.read().split())
 
 
 @pytest.mark.usefixtures("small")

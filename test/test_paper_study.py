@@ -13,11 +13,11 @@ import pytest
 
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.evaluation.metrics import conduct, evaluate
+from mfba_planner.evaluation.metrics import evaluate, run_motion
 from mfba_planner.evaluation.study import chunk_store as storing
 from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.readings import PLANNERS
-from mfba_planner.paper.study.chunk import BENCHMARK_STREAM, Benchmark, Chunk, Trips, chunks
+from mfba_planner.paper.study.chunk import BENCHMARK_STREAM, Benchmark, SampleChunk, Trips, chunks
 from mfba_planner.paper.study.plan import FULL, QUICK, benchmark_plan, trip_plan
 from mfba_planner.paper.study.run import open_store, run_plan
 from mfba_planner.planning.planner_params import PlannerParams
@@ -29,7 +29,7 @@ NEAR = Scenario(name="near", start_m=(0.0, 0.0), goal_m=(1.5, 1.0))
 SWARM = BatParams(population=6, iterations=10)
 
 
-def a_plan(first: int = 3, size: int = 4) -> list[Chunk]:
+def a_plan(first: int = 3, size: int = 4) -> list[SampleChunk]:
     """Two samples of a few cheap runs."""
     return [
         *chunks("a/F5/mfba", Benchmark(function="F5", bat=SWARM), first, 10, size),
@@ -71,14 +71,14 @@ def test_a_trip_of_the_study_is_what_sim_tells_of_its_seed() -> None:
     assert found["length_m"][1] == result.length_m
     assert found["clearance_m"][1] == result.min_clearance_m
     assert found["reached"] == [1, 1]
-    assert found["turning_rad"][1] == conduct(episode).turning_rad > 0.0
+    assert found["turning_rad"][1] == run_motion(episode).turning_rad > 0.0
 
 
 def test_turning_is_the_sum_of_all_turns() -> None:
     episode = run(NEAR, seed=1)
     corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.0, 2.0)]
     ticks = tuple(replace(episode.ticks[0], pose=Pose2D(*corner)) for corner in corners)
-    turned = conduct(replace(episode, ticks=ticks)).turning_rad
+    turned = run_motion(replace(episode, ticks=ticks)).turning_rad
     assert turned == pytest.approx(np.radians(90 + 45))
 
 
@@ -103,13 +103,13 @@ def test_workers_that_cannot_be_are_refused(workers: int) -> None:
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the chunks that are computed from now on."""
     names: list[str] = []
-    compute = Chunk.run
+    compute = SampleChunk.run
 
-    def noted(chunk: Chunk) -> Any:
+    def noted(chunk: SampleChunk) -> Any:
         names.append(chunk.name)
         return compute(chunk)
 
-    monkeypatch.setattr(Chunk, "run", noted)
+    monkeypatch.setattr(SampleChunk, "run", noted)
     return names
 
 
@@ -119,9 +119,9 @@ def test_an_interrupted_study_goes_on_and_gives_the_same(
     plan = a_plan()
     whole = plain(run_plan(plan))
     computed = counted(monkeypatch)
-    seen: list[Chunk] = []
+    seen: list[SampleChunk] = []
 
-    def interrupt(chunk: Chunk) -> None:
+    def interrupt(chunk: SampleChunk) -> None:
         seen.append(chunk)
         if len(seen) == 2:
             raise KeyboardInterrupt
@@ -159,7 +159,7 @@ def test_a_damaged_chunk_is_computed_again(
     assert path.read_text() == text
 
 
-def refusal(directory: Path, plan: list[Chunk], facts: dict[str, Any]) -> str:
+def refusal(directory: Path, plan: list[SampleChunk], facts: dict[str, Any]) -> str:
     with pytest.raises(OutputError) as caught:
         open_store(directory, plan, facts)
     (line,) = str(caught.value).splitlines()

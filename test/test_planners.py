@@ -76,14 +76,14 @@ def test_impossible_perceptions_are_refused(arguments: dict[str, float]) -> None
 def test_paper_is_the_core_s_planner_bit_for_bit_and_ba_differs() -> None:
     case1 = load_scenario("case1")
     plain = digest(run(case1, seed=3).ticks)
-    assert digest(run(case1, seed=3, brain=make("paper", seed=3)).ticks) == plain
-    assert digest(run(case1, seed=3, brain=make("mfba", seed=3)).ticks) == plain
-    assert digest(run(case1, seed=3, brain=make("ba", seed=3)).ticks) != plain
+    assert digest(run(case1, seed=3, path_planner=make("paper", seed=3)).ticks) == plain
+    assert digest(run(case1, seed=3, path_planner=make("mfba", seed=3)).ticks) == plain
+    assert digest(run(case1, seed=3, path_planner=make("ba", seed=3)).ticks) != plain
 
 
 def test_straight_is_the_straight_line() -> None:
     case1 = load_scenario("case1")
-    result = evaluate(run(case1, planner=PARAMS, brain=make("straight", PARAMS)))
+    result = evaluate(run(case1, planner=PARAMS, path_planner=make("straight", PARAMS)))
     assert result.outcome is Outcome.GOAL_REACHED
     assert result.length_m == pytest.approx(12.0 * math.sqrt(2.0), abs=PARAMS.goal_tolerance_m)
 
@@ -219,8 +219,8 @@ def test_noise_is_the_seed_s_and_as_large_as_told(name: str) -> None:
     world = world_with(Obstacle(center_m=(6.0, 5.0), radius_m=0.3))
 
     def errors(seed: int) -> list[float]:
-        look = Perception(name, noise_m=0.02, seed=seed)
-        found, true = look(world, SENSOR), Perception(name)(world, SENSOR)
+        observe_sectors = Perception(name, noise_m=0.02, seed=seed)
+        found, true = observe_sectors(world, SENSOR), Perception(name)(world, SENSOR)
         if found.circles is not None and true.circles is not None:
             pairs = zip(found.circles[0].center_m, true.circles[0].center_m)
             return [a - b for a, b in pairs]
@@ -236,11 +236,19 @@ def test_noise_is_the_seed_s_and_as_large_as_told(name: str) -> None:
 
 def test_a_scan_gives_the_paper_s_planner_its_sectors() -> None:
     case1 = load_scenario("case1")
-    episode = run(case1, planner=PARAMS, brain=make("paper", PARAMS), look=Perception("scan-360"))
+    episode = run(
+        case1, planner=PARAMS, path_planner=make("paper", PARAMS), observe=Perception("scan-360")
+    )
     assert evaluate(episode).success
     blind = Perception("scan-12", sectors=False)
     assert (
-        run(case1, planner=PARAMS, brain=make("paper", PARAMS), look=blind, go_on=lambda _: False)
+        run(
+            case1,
+            planner=PARAMS,
+            path_planner=make("paper", PARAMS),
+            observe=blind,
+            go_on=lambda _: False,
+        )
         .ticks[0]
         .mode
         is Mode.STOPPED

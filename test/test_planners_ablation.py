@@ -9,7 +9,7 @@ import pytest
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Circle, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
-from mfba_planner.evaluation.sweep.single_run import play
+from mfba_planner.evaluation.sweep.single_run import run_one
 from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.peers import ablation
@@ -31,7 +31,7 @@ NAMES = (
 
 def drive(name: str, suite: str = "random-30", world: int = 0) -> Episode:
     planner = name if name == "predictive" else f"{ablation.__name__}:{name}"
-    played = play(Run(suite, world, planner, 0), SETTING)
+    played = run_one(Run(suite, world, planner, 0), SETTING)
     assert played.fault == ""
     return played.episode
 

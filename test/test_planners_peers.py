@@ -86,9 +86,11 @@ def test_an_obstacle_in_the_way_is_passed(name: str, speed_mps: float) -> None:
     world = Scenario(
         name="one", start_m=(0.0, 0.0), goal_m=(9.0, 9.0), obstacles=(obstacle,), time_limit_s=60.0
     )
-    straight = run(world, planner=PARAMS, brain=make("straight", PARAMS))
+    straight = run(world, planner=PARAMS, path_planner=make("straight", PARAMS))
     assert evaluate(straight).collisions == 1
-    episode = run(world, planner=PARAMS, brain=make(name, PARAMS), look=Perception("known"))
+    episode = run(
+        world, planner=PARAMS, path_planner=make(name, PARAMS), observe=Perception("known")
+    )
     result = evaluate(episode)
     assert result.success, result
     assert result.length_m < 1.25 * math.dist(world.start_m, world.goal_m)

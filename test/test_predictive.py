@@ -17,7 +17,7 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
 from mfba_planner.planning.predictive import Predictive, PredictiveParams, preset
-from mfba_planner.planning.trajectory_cost import Prediction, RiskParams, from_sectors, moved
+from mfba_planner.planning.trajectory_cost import RiskParams, TrajectoryCost, from_sectors, moved
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
@@ -38,8 +38,10 @@ def planner(seed: int = 0) -> Predictive:
 
 
 def drive(scenario: Scenario, seed: int = 0, name: str = "known", **kw: float) -> Episode:
-    look = Perception(name, sectors=False, seed=seed, **kw)  # type: ignore[arg-type]
-    return run(scenario, planner=PARAMS, brain=planner(seed), seed=seed, look=look)
+    observe_sectors = Perception(name, sectors=False, seed=seed, **kw)  # type: ignore[arg-type]
+    return run(
+        scenario, planner=PARAMS, path_planner=planner(seed), seed=seed, observe=observe_sectors
+    )
 
 
 def seeing(*circles: Circle, stamp_ns: int = 10**9, goal: Point = GOAL) -> Observation:
@@ -193,11 +195,11 @@ def test_the_same_seed_decides_the_same_and_another_one_differs() -> None:
 
 def test_a_reset_forgets() -> None:
     blocking = Circle(center_m=(2.0, 2.8), radius_m=0.6)
-    brain = planner()
-    first = brain.plan(seeing(blocking))
-    brain.plan(seeing(blocking, stamp_ns=2 * 10**9))
-    brain.reset()
-    assert brain.plan(seeing(blocking)) == first
+    path_planner = planner()
+    first = path_planner.plan(seeing(blocking))
+    path_planner.plan(seeing(blocking, stamp_ns=2 * 10**9))
+    path_planner.reset()
+    assert path_planner.plan(seeing(blocking)) == first
 
 
 def test_without_circles_and_scan_the_sectors_must_do() -> None:
@@ -207,7 +209,9 @@ def test_without_circles_and_scan_the_sectors_must_do() -> None:
         goal_m=(6.0, 6.0),
         obstacles=(Obstacle(center_m=(3.0, 3.1), radius_m=0.3),),
     )
-    result = evaluate(run(scenario, planner=PARAMS, brain=planner(), look=Perception("sectors")))
+    result = evaluate(
+        run(scenario, planner=PARAMS, path_planner=planner(), observe=Perception("sectors"))
+    )
     assert result.success
     (circle,) = from_sectors((1.0, 1.0), (math.inf, 0.5, math.inf, math.inf), 0.3)
     s = 0.8 / math.sqrt(2.0)
@@ -235,7 +239,7 @@ def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
         return
     way = (0.8 * t1 * math.cos(heading), 0.8 * t1 * math.sin(heading))
     goal = (9.0, 1.0)
-    cost = Prediction((0.0, 0.0), [circle], risk, 0.1).cost(way, t1, goal, 0.8)
+    cost = TrajectoryCost((0.0, 0.0), [circle], risk, 0.1).cost(way, t1, goal, 0.8)
     rest = distance(way, goal)
     length = 0.8 * t1 + rest
     smallest = surely = math.inf  # within tau, and so early within it that risk has not faded
@@ -267,7 +271,7 @@ def test_along_the_edge_of_who_is_within_a_margin_is_free_and_deeper_is_not(
     post = Circle(
         center_m=(0.605 * math.cos(bearing), 0.605 * math.sin(bearing)), radius_m=0.6
     )  # a margin is 0.015 m
-    near = Prediction((0.0, 0.0), [post], RiskParams(), 0.1)
+    near = TrajectoryCost((0.0, 0.0), [post], RiskParams(), 0.1)
     for side in (-1.0, 1.0):
         for inward_rad, is_free in ((0.0, True), (1e-6, True), (1e-3, False)):
             heading = bearing + side * (math.pi / 2.0 - inward_rad)
@@ -300,7 +304,7 @@ def test_a_contact_costs_by_what_is_driven_until_then_whichever_leg_it_is_on(
     """x = 1 - s / tau: a contact after 2.1 s, a closest approach, right through, after 2.6 s."""
     risk = RiskParams(horizon_s=3.0, contact_m=3.0, urgent_m=100.0, close_m=0.3)
     ahead = Circle(center_m=(2.6, 0.0), radius_m=0.5)
-    world = Prediction((0.0, 0.0), [ahead], risk, 0.1)
+    world = TrajectoryCost((0.0, 0.0), [ahead], risk, 0.1)
     contact, closest = 1.0 - 2.1 / 3.0, 1.0 - 2.6 / 3.0
     expected = 5.0 + 3.0 * contact**2 + 100.0 * contact**8 + 0.3 * closest
     found = world.cost((waypoint_m, 0.0), waypoint_m, (5.0, 0.0), 1.0)
@@ -311,7 +315,7 @@ def test_a_contact_costs_by_what_is_driven_until_then_whichever_leg_it_is_on(
 def test_a_contact_comes_when_it_begins_wherever_in_it_the_leg_ends(waypoint_m: float) -> None:
     risk = RiskParams(horizon_s=3.0, contact_m=3.0, urgent_m=100.0, close_m=0.3)
     ahead = Circle(center_m=(2.6, 0.0), radius_m=0.5)
-    found = Prediction((0.0, 0.0), [ahead], risk, 0.1).cost(
+    found = TrajectoryCost((0.0, 0.0), [ahead], risk, 0.1).cost(
         (waypoint_m, 0.0), waypoint_m, (5.0, 0.0), 1.0
     )
     contact, end = 1.0 - 2.1 / 3.0, 1.0 - waypoint_m / 3.0
@@ -343,7 +347,7 @@ def test_the_cheapest_of_many_ways_is_found_without_weighing_all(
             q = (length * math.cos(k * math.pi / 6.0), length * math.sin(k * math.pi / 6.0))
             ways.append((length + distance(q, goal), q, length / speed, k))
     ways = [(-math.inf, *ways[first][1:3], -1), *sorted(ways[:first] + ways[first + 1 :])]
-    world = Prediction((0.0, 0.0), circles, RiskParams(), 0.1, speed)
+    world = TrajectoryCost((0.0, 0.0), circles, RiskParams(), 0.1, speed)
     costs = [world.cost(q, t1, goal, speed) for _, q, t1, _ in ways]
     found = world.cheapest(ways, goal, speed, bound)
     if found is None:
@@ -357,7 +361,7 @@ def test_the_cheapest_of_many_ways_is_found_without_weighing_all(
 def test_a_longer_way_in_the_same_direction_may_be_the_better_one() -> None:
     """Who comes nearer slowly is a lesser risk, the later the leg that it is near ends."""
     beside = Circle(center_m=(0.0, 0.74), radius_m=0.6, velocity_mps=(0.8, -0.05))
-    world = Prediction((0.0, 0.0), [beside], RiskParams(), 0.1, 0.8)
+    world = TrajectoryCost((0.0, 0.0), [beside], RiskParams(), 0.1, 0.8)
     ways = [(5.0, (1.0, 0.0), 1.25, 0), (5.0, (2.0, 0.0), 2.5, 0)]
     found = world.cheapest(ways, (5.0, 0.0), 0.8, 5.06)
     assert found is not None
@@ -367,7 +371,7 @@ def test_a_longer_way_in_the_same_direction_may_be_the_better_one() -> None:
 def test_who_is_met_at_the_far_end_of_a_way_is_not_left_out() -> None:
     """A way beyond the goal and back, as near its bound as may be, and who stands behind it."""
     behind = Circle(center_m=(2.05, 0.0), radius_m=0.6)
-    world = Prediction((0.0, 0.0), [behind], RiskParams(), 0.1, 0.8)
+    world = TrajectoryCost((0.0, 0.0), [behind], RiskParams(), 0.1, 0.8)
     ways = [(-math.inf, (0.0, 2.0), 2.5, -1), (2.0, (1.5, 0.0), 1.875, 0)]
     assert world.cheapest(ways, (1.0, 0.0), 0.8, 2.1) is None
 
@@ -384,6 +388,6 @@ def test_who_is_grazed_to_the_last_bit_is_weighed_like_any_other(
     center: Point, velocity: Point
 ) -> None:
     """Rounded one way the closest approach is a contact, rounded the other way it is none."""
-    world = Prediction((0.0, 0.0), [Circle(center_m=center, radius_m=0.6)], RiskParams(), 0.1)
+    world = TrajectoryCost((0.0, 0.0), [Circle(center_m=center, radius_m=0.6)], RiskParams(), 0.1)
     way = (2.5 * velocity[0], 2.5 * velocity[1])
     assert 2.0 < world.cost(way, 2.5, way, 0.8) < math.inf

@@ -13,16 +13,16 @@ from test_fleet_bag import TRIO
 
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError
-from mfba_planner.launcher.console import Screen
-from mfba_planner.launcher.fleet_result import conclude_fleet
-from mfba_planner.launcher.run import Attempt
-from mfba_planner.launcher.run_arguments import read_order
+from mfba_planner.launcher.console import RunConsole
+from mfba_planner.launcher.fleet_result import finish_fleet_run
+from mfba_planner.launcher.run import Run
+from mfba_planner.launcher.run_arguments import read_request
 from mfba_planner.launcher.run_directory import RunDirectory
-from mfba_planner.launcher.run_result import conclude
+from mfba_planner.launcher.run_result import finish_run
 from mfba_planner.launcher.stop_request import StopRequest
 from mfba_planner.recording import decisions
 from mfba_planner.recording.read_episode import read_episode, read_recording, summaries, summarize
-from mfba_planner.recording.robot_topics import ALONE
+from mfba_planner.recording.robot_topics import NO_NAMESPACE
 from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
@@ -93,11 +93,14 @@ def test_decisions_after_the_end_of_their_sectors_are_left_out(
 ) -> None:
     cut = rewrite(bag, tmp_path / "cut", without([SECTORS], *range(-count, 0)))
     whole, (_, _, episodes, missed) = read_episode(bag), read_recording(cut)
-    assert episodes[ALONE].ticks == whole.ticks[:-count]
-    assert (whole.outcome, episodes[ALONE].outcome) == (Outcome.GOAL_REACHED, Outcome.INTERRUPTED)
-    assert missed == {ALONE: said_of(whole, count)}
-    assert read_episode(cut) == episodes[ALONE]
-    assert summarize(cut)[2:] == (digest(whole.ticks[:-count]), missed[ALONE])
+    assert episodes[NO_NAMESPACE].ticks == whole.ticks[:-count]
+    assert (whole.outcome, episodes[NO_NAMESPACE].outcome) == (
+        Outcome.GOAL_REACHED,
+        Outcome.INTERRUPTED,
+    )
+    assert missed == {NO_NAMESPACE: said_of(whole, count)}
+    assert read_episode(cut) == episodes[NO_NAMESPACE]
+    assert summarize(cut)[2:] == (digest(whole.ticks[:-count]), missed[NO_NAMESPACE])
 
 
 def test_a_fleet_s_other_robots_lose_nothing(fleet: Path, tmp_path: Path) -> None:
@@ -135,7 +138,7 @@ def test_sectors_that_changed_places_are_no_hole(
     bag: Path, tmp_path: Path, before_the_end: int
 ) -> None:
     whole = read_recording(bag)
-    index = len(whole.episodes[ALONE].ticks) - before_the_end
+    index = len(whole.episodes[NO_NAMESPACE].ticks) - before_the_end
     assert read_recording(rewrite(bag, tmp_path / "odd", swapped(SECTORS, index))) == whole
 
 
@@ -184,13 +187,13 @@ def test_no_more_decisions_wait_for_the_end_than_can_be_held(
 )
 @pytest.mark.parametrize("count", [1, 2])
 def test_verify_checks_what_is_left(
-    bag: Path, tmp_path: Path, topics: tuple[str, ...], named: str, count: int
+    bag: Path, tmp_path: Path, topics: tuple[str, ...], params_for_method: str, count: int
 ) -> None:
     report = verify(rewrite(bag, tmp_path / "cut", without(topics, *range(-count, 0))))
     whole = read_episode(bag)
     assert (report.faults, report.divergence) == ((), None)
     assert report.recorded == whole.ticks[:-count]
-    assert report.notes == (said_of(whole, count, named),)
+    assert report.notes == (said_of(whole, count, params_for_method),)
 
 
 def test_verify_leaves_out_what_was_decided_on_a_scan_that_is_lost(tmp_path: Path) -> None:
@@ -266,10 +269,10 @@ def test_commands_name_the_robot_of_a_fleet(fleet: Path, tmp_path: Path, capsys:
     )
 
 
-def attempt_at(out: Path, scenario: str) -> Attempt:
+def attempt_at(out: Path, scenario: str) -> Run:
     """A run of which only the bag lacks."""
-    order = read_order([scenario, "--no-picture", "--out", str(out)], "launcher")
-    return Attempt(order, RunDirectory(order.out), Screen(), StopRequest(1.0))
+    order = read_request([scenario, "--no-picture", "--out", str(out)], "launcher")
+    return Run(order, RunDirectory(order.out), RunConsole(), StopRequest(1.0))
 
 
 def test_a_run_that_failed_says_it_and_beside_its_digest(
@@ -277,7 +280,7 @@ def test_a_run_that_failed_says_it_and_beside_its_digest(
 ) -> None:
     alone = attempt_at(tmp_path / "alone", "empty")
     rewrite(bag, alone.directory.bag, without(SENSOR, -1))
-    conclude(alone, None, "virtual_sensor ended")
+    finish_run(alone, None, "virtual_sensor ended")
     whole = read_episode(bag)
     assert f"note: {alone.directory.bag}: {said_of(whole, 1)}\n" in capsys.readouterr().out
     result = json.loads(alone.directory.result.read_text())
@@ -287,7 +290,7 @@ def test_a_run_that_failed_says_it_and_beside_its_digest(
     (tmp_path / "trio.json").write_text(scenario_to_json(TRIO))
     three = attempt_at(tmp_path / "three", str(tmp_path / "trio.json"))
     rewrite(fleet, three.directory.bag, without(of_c(SENSOR), -1))
-    conclude_fleet(three, "c/virtual_sensor ended")
+    finish_fleet_run(three, "c/virtual_sensor ended")
     what = said_of(read_recording(fleet).episodes["c"], 1)
     assert f"note: {three.directory.bag}: c: {what}\n" in capsys.readouterr().out
     extras = {n: json.loads((three.directory.path / f"{n}.json").read_text()) for n in "abc"}

@@ -40,7 +40,7 @@ from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.replaying import bag_player
 from mfba_planner.ros.replaying.replay_arguments import parse
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.verification.redecide import Robot, decide_from_scratch
+from mfba_planner.verification.redecide import Robot, redecide_recording
 
 COUNT = 40
 LATCHED_QOS = topics.LATCHED_QOS
@@ -321,7 +321,7 @@ def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
     assert (len(decisions), len(vectors)) == (133, 133)
     found = [decision(why, sector_ranges(ring)) for why, ring in zip(decisions, sectors)]
     assert {tick.mode for tick in found} == {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE}
-    alone = decide_from_scratch(FOREIGN, Robot(robot_radius_m=0.3))
+    alone = redecide_recording(FOREIGN, Robot(robot_radius_m=0.3))
     assert digest(found) == alone.digest, "verify decides as the nodes do"
 
 

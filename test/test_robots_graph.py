@@ -98,7 +98,7 @@ def start(graph: Graph, config: RunConfig, **more: Any) -> WorldSim:
     graph.start(VirtualSensor, parameters["virtual_sensor"])
     planner = graph.start(PlannerNode, parameters["planner"])
     world = graph.start(WorldSim, {**parameters["world_sim"], **more})
-    graph.until(lambda: planner.goals.errands.goal is not None)
+    graph.until(lambda: planner.goals.goal_queue.goal is not None)
     return world
 
 
@@ -110,7 +110,7 @@ def test_what_a_lidar_robot_says_and_is_told(graph: Graph, beams: int) -> None:
     world = start(graph, told(near(robot), PAPER))
     world.resume()
     graph.until(lambda: world.world.tick >= 6)
-    world.pace.paused = True
+    world.tick_control.paused = True
     graph.settle()
     ticks = world.world.tick + 1
     assert len(scans) == len(odoms) == len(sectors) == len(twists) == ticks

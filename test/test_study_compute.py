@@ -54,7 +54,7 @@ EXPECTED = {f"square-{k}": k * k for k in range(7)}
 def test_any_number_of_workers(workers: int) -> None:
     heard: list[str] = []
     found = compute(
-        [Square(k) for k in range(7)], workers=workers, done=lambda part: heard.append(part.name)
+        [Square(k) for k in range(7)], workers=workers, done=lambda chunk: heard.append(chunk.name)
     )
     assert squares(found) == EXPECTED
     assert sorted(heard) == sorted(EXPECTED)
@@ -70,8 +70,8 @@ def test_a_part_whose_worker_dies_is_named_and_tried_again(tmp_path: Path) -> No
     deaths = tmp_path / "deaths"
     deaths.write_text("2")
     said: list[str] = []
-    parts = [Square(k, deaths if k == 3 else None) for k in range(7)]
-    assert squares(compute(parts, workers=2, say=said.append)) == EXPECTED
+    chunks = [Square(k, deaths if k == 3 else None) for k in range(7)]
+    assert squares(compute(chunks, workers=2, say=said.append)) == EXPECTED
     assert "square-3: its worker process may have died; trying it again alone" in said
     assert deaths.read_text() == "-1"
 
@@ -79,16 +79,16 @@ def test_a_part_whose_worker_dies_is_named_and_tried_again(tmp_path: Path) -> No
 def test_one_that_kills_every_worker_costs_one_line_and_the_rest_is_kept(tmp_path: Path) -> None:
     deaths = tmp_path / "deaths"
     deaths.write_text("1000")
-    parts = [Square(k, deaths if k == 3 else None) for k in range(7)]
-    store = Store(tmp_path / "out", parts, {}, command="x", packages=("core",))
+    chunks = [Square(k, deaths if k == 3 else None) for k in range(7)]
+    store = Store(tmp_path / "out", chunks, {}, command="x", packages=("core",))
     with pytest.raises(MfbaError, match=r"square-3: a worker process died 3 times on it"):
-        compute(parts, workers=2, store=store)
+        compute(chunks, workers=2, store=store)
     assert int(deaths.read_text()) == 1000 - TRIES
-    kept = [part.name for part in parts if store.read(part)]
+    kept = [chunk.name for chunk in chunks if store.read(chunk)]
     assert "square-3" not in kept
     deaths.write_text("0")
     again: list[str] = []
-    found = compute(parts, workers=2, store=store, done=lambda part: again.append(part.name))
+    found = compute(chunks, workers=2, store=store, done=lambda chunk: again.append(chunk.name))
     assert squares(found) == EXPECTED
 
 
@@ -115,8 +115,8 @@ class KilledWorker(Exception):  # noqa: N818
 @pytest.mark.parametrize("error", [BrokenProcessPool(), KilledWorker()])
 def test_a_cluster_that_loses_a_worker(error: Exception) -> None:
     said: list[str] = []
-    parts = [Square(k) for k in range(7)]
-    assert squares(compute(parts, executor=Unlucky(error), say=said.append)) == EXPECTED
+    chunks = [Square(k) for k in range(7)]
+    assert squares(compute(chunks, executor=Unlucky(error), say=said.append)) == EXPECTED
     assert len(said) == 1
 
 

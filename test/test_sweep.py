@@ -23,34 +23,38 @@ from mfba_planner.evaluation.suites import suite
 from mfba_planner.evaluation.suites.survivability import survivability
 from mfba_planner.evaluation.sweep import chunks, worker
 from mfba_planner.evaluation.sweep import single_run as play_module
-from mfba_planner.evaluation.sweep.chunks import make, parts_of
+from mfba_planner.evaluation.sweep.chunks import chunks_of, make
 from mfba_planner.evaluation.sweep.columns import COLUMNS, TIMINGS, Row
 from mfba_planner.evaluation.sweep.run_sweep import Swept, dask_executor, open_store, sweep
-from mfba_planner.evaluation.sweep.single_run import flies_together, play, play_together
+from mfba_planner.evaluation.sweep.single_run import (
+    generates_paths_together,
+    run_one,
+    run_together,
+)
 from mfba_planner.evaluation.sweep.summary import comparisons, standings, versus
-from mfba_planner.evaluation.sweep.sweep_spec import Order, Run, Setting, read_run
+from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, read_run
 from mfba_planner.evaluation.sweep.table import sorted_hash, to_csv, to_parquet, write
-from mfba_planner.evaluation.sweep.worker import Keeper, Lost, each
-from mfba_planner.planning.algorithm_1 import Planner
+from mfba_planner.evaluation.sweep.worker import Lost, Worker, each
+from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.simulation.run_episode import run
 
 
-def an_order(**changes: Any) -> Order:
+def a_request(**changes: Any) -> SweepSpec:
     plain: dict[str, Any] = {
         "suite": "random-3", "planners": ("paper", "straight"), "worlds": 5, "oracle": False,
     }  # fmt: skip
-    return Order(**{**plain, **changes})
+    return SweepSpec(**{**plain, **changes})
 
 
 @pytest.fixture(scope="module")
 def small() -> Swept:
     """Ten runs, judged by the oracle."""
-    return sweep(an_order(oracle=True))
+    return sweep(a_request(oracle=True))
 
 
 @pytest.fixture
-def tiny_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+def tiny_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many parts of few runs; it is the parent who cuts."""
     monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 2)
     monkeypatch.setattr(chunks, "WORLDS_AT_ONCE", 2)
@@ -70,11 +74,11 @@ def test_a_row_is_what_the_core_says_of_the_run(small: Swept) -> None:
     row = next(row for row in small.rows if (row["world"], row["planner"]) == (3, "paper"))
     scenario = suite("random-3").world(3)
     params = PlannerParams(speed_mps=0.8)
-    result, conduct = assess(run(scenario, planner=params, seed=0))
+    result, run_motion = assess(run(scenario, planner=params, seed=0))
     for name in ("length_m", "time_s", "collisions", "min_clearance_m", "ticks", "success"):
         assert row[name] == getattr(result, name), name
-    for name in conduct.__slots__:
-        assert row[name] == getattr(conduct, name), name
+    for name in run_motion.__slots__:
+        assert row[name] == getattr(run_motion, name), name
     optimum = solve(scenario, 0.8)
     assert row["optimum_m"] == round(optimum.length_m, 6)
     assert row["certificate"] == optimum.certificate.value
@@ -99,9 +103,9 @@ def test_timings_are_measured_of_decisions_that_are_taken_alone(small: Swept) ->
 def test_runs_made_together_are_the_runs_made_alone(planner: str) -> None:
     runs = [Run("dense", world, planner, seed) for world in range(6) for seed in range(3)]
     setting = Setting(perception="scan-12", noise_m=0.01)
-    assert flies_together(planner, setting)
-    for run_alone, together in zip(runs, play_together(runs, setting)):
-        played = play(run_alone, setting, whole=False)
+    assert generates_paths_together(planner, setting)
+    for run_alone, together in zip(runs, run_together(runs, setting)):
+        played = run_one(run_alone, setting, whole=False)
         assert played.episode == together.episode
         assert (together.fault, together.times_ns) == ("", ())
         assert len(played.times_ns) == len(played.episode.ticks)
@@ -109,26 +113,26 @@ def test_runs_made_together_are_the_runs_made_alone(planner: str) -> None:
 
 def test_runs_with_many_ticks_are_made_together_in_few(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [Run("random-3", world, "paper", 0) for world in range(7)]
-    under_way: list[int] = []
+    running: list[int] = []
 
-    def noted(planners: Sequence[Planner], seen: Sequence[Observation]) -> None:
-        under_way.append(len(planners))
+    def noted(planners: Sequence[Algorithm1], seen: Sequence[Observation]) -> None:
+        running.append(len(planners))
 
     monkeypatch.setattr(play_module, "fly_together", noted)
     # Of 120 s in ticks of 0.375 s, 320 each.
     monkeypatch.setattr(play_module, "TICKS_HELD", 1000)
-    found = list(play_together(runs, Setting()))
-    assert max(under_way) == 3
-    assert [one.episode for one in found] == [play(run, Setting()).episode for run in runs]
-    assert len(list(play_together(runs, Setting(params=PlannerParams(step_length_m=2.0))))) == 7
-    assert max(under_way) == 7
+    found = list(run_together(runs, Setting()))
+    assert max(running) == 3
+    assert [one.episode for one in found] == [run_one(run, Setting()).episode for run in runs]
+    assert len(list(run_together(runs, Setting(params=PlannerParams(step_length_m=2.0))))) == 7
+    assert max(running) == 7
 
 
 def test_only_fresh_bats_of_ours_fly_together() -> None:
     persistent = Setting(params=PlannerParams(swarm=Swarm.PERSISTENT))
-    assert not flies_together("paper", persistent)
-    assert not flies_together("predictive", Setting())
-    assert not flies_together("mfba_planner.planning.planner_registry:make", Setting())
+    assert not generates_paths_together("paper", persistent)
+    assert not generates_paths_together("predictive", Setting())
+    assert not generates_paths_together("mfba_planner.planning.planner_registry:make", Setting())
 
 
 def dies_among_others(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
@@ -149,9 +153,9 @@ def hangs_among_others(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
 def test_runs_that_are_lost_together_are_made_one_by_one(
     monkeypatch: pytest.MonkeyPatch, lost: Any
 ) -> None:
-    plain = sweep(an_order(planners=("paper",)))
+    plain = sweep(a_request(planners=("paper",)))
     monkeypatch.setattr(chunks, "make", lost)
-    again = sweep(an_order(planners=("paper",), setting=Setting(patience_s=4.0)))
+    again = sweep(a_request(planners=("paper",), setting=Setting(patience_s=4.0)))
     assert again.hash == plain.hash
     assert all(row["decision_us"] > 0.0 for row in again.timings), "each was made alone"
 
@@ -159,7 +163,7 @@ def test_runs_that_are_lost_together_are_made_one_by_one(
 @pytest.mark.usefixtures("tiny_parts")
 @pytest.mark.parametrize("workers", [2, 4])
 def test_processes_change_nothing(small: Swept, workers: int) -> None:
-    again = sweep(an_order(oracle=True), workers=workers)
+    again = sweep(a_request(oracle=True), workers=workers)
     assert again.hash == small.hash
     assert again.rows == small.rows or repr(again.rows) == repr(small.rows)
 
@@ -180,7 +184,7 @@ def scheduler() -> Iterator[str]:
 @pytest.mark.filterwarnings("default")  # of dask's own
 def test_dask_changes_nothing(small: Swept, scheduler: str) -> None:
     with dask_executor(scheduler) as executor:
-        assert sweep(an_order(oracle=True), executor=executor).hash == small.hash
+        assert sweep(a_request(oracle=True), executor=executor).hash == small.hash
 
 
 def test_the_hash_tells_every_bit_but_not_the_order(small: Swept) -> None:
@@ -192,21 +196,21 @@ def test_the_hash_tells_every_bit_but_not_the_order(small: Swept) -> None:
 
 
 def test_worlds_and_seeds_asked_for() -> None:
-    found = sweep(an_order(planners=("paper",), first=2, worlds=2, seeds=3))
+    found = sweep(a_request(planners=("paper",), first=2, worlds=2, seeds=3))
     assert [(row["world"], row["seed"]) for row in found.rows] == [
         (world, seed) for world in (2, 3) for seed in (0, 1, 2)
     ]
-    whole = sweep(an_order(planners=("paper",), worlds=4, seeds=3))
+    whole = sweep(a_request(planners=("paper",), worlds=4, seeds=3))
     assert repr(whole.rows[6:]) == repr(found.rows)
 
 
 def test_a_suite_that_repeats_its_worlds_changes_the_seed() -> None:
-    found = sweep(an_order(suite="paper", planners=("paper",), worlds=4))
+    found = sweep(a_request(suite="paper", planners=("paper",), worlds=4))
     assert [(row["world"], row["seed"]) for row in found.rows] == [(0, 0), (1, 0), (2, 1), (3, 1)]
     assert found.rows[0]["length_m"] != found.rows[2]["length_m"]
     with pytest.raises(ConfigError, match="--seeds=2: paper has 2 worlds, which --worlds repeats"):
-        an_order(suite="paper", seeds=2)
-    judged = sweep(an_order(suite="paper", planners=("paper",), worlds=4, oracle=True)).rows
+        a_request(suite="paper", seeds=2)
+    judged = sweep(a_request(suite="paper", planners=("paper",), worlds=4, oracle=True)).rows
     assert judged[0]["optimum_m"] == judged[2]["optimum_m"] != judged[1]["optimum_m"]
 
 
@@ -226,7 +230,7 @@ def test_a_suite_that_repeats_its_worlds_changes_the_seed() -> None:
 )
 def test_a_faulty_planner_fails_and_the_sweep_goes_on(planner: str, failure: str) -> None:
     faulty = f"faulty_planners:{planner}"
-    found = sweep(an_order(planners=(faulty, "straight"), worlds=2))
+    found = sweep(a_request(planners=(faulty, "straight"), worlds=2))
     assert [row["outcome"] == "failed" for row in found.rows] == [True, False, True, False]
     assert [row["failure"] for row in found.rows] == [failure, "", failure, ""]
     assert {row["success"] for row in found.rows[::2]} == {False}
@@ -237,7 +241,7 @@ def test_a_faulty_planner_fails_and_the_sweep_goes_on(planner: str, failure: str
 
 def test_a_planner_that_cannot_be_made_fails() -> None:
     faulty = "faulty_planners:Unmakeable"
-    found = sweep(an_order(planners=(faulty,), worlds=1, seeds=2))
+    found = sweep(a_request(planners=(faulty,), worlds=1, seeds=2))
     assert [row["failure"] for row in found.rows] == ["", "tick 0: raised KeyError: 'seed'"]
     assert found.rows[1]["ticks"] == 0
 
@@ -254,7 +258,7 @@ def test_one_that_hangs_or_dies_costs_its_run(
     planner: str, failure: str, workers: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 4)
-    order = an_order(
+    order = a_request(
         planners=(f"faulty_planners:{planner}",),
         worlds=2,
         seeds=3,
@@ -266,7 +270,7 @@ def test_one_that_hangs_or_dies_costs_its_run(
     lost = found.rows[1]
     assert (lost["length_m"], lost["collisions"], lost["success"]) == (None, None, False)
     rows = found.rows
-    plain = sweep(an_order(planners=("straight",), worlds=2, seeds=3)).rows
+    plain = sweep(a_request(planners=("straight",), worlds=2, seeds=3)).rows
     for k in (0, 2, 3, 5):
         assert rows[k]["length_m"] == plain[k]["length_m"], "the others are what they always were"
 
@@ -376,7 +380,7 @@ def test_seeds_of_one_world_are_one_case() -> None:
 )
 def test_orders_that_cannot_be(changes: dict[str, Any], reason: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        an_order(**changes)
+        a_request(**changes)
     assert reason in str(caught.value)
 
 
@@ -404,17 +408,17 @@ def test_what_is_no_run(text: str) -> None:
 
 
 def test_perception_reaches_the_planner() -> None:
-    known = sweep(an_order(planners=("paper",), worlds=3)).rows
+    known = sweep(a_request(planners=("paper",), worlds=3)).rows
     scan = sweep(
-        an_order(planners=("paper",), worlds=3, setting=Setting(perception="scan-12"))
+        a_request(planners=("paper",), worlds=3, setting=Setting(perception="scan-12"))
     ).rows
     assert [row["length_m"] for row in known] != [row["length_m"] for row in scan]
 
 
 def test_a_directory_belongs_to_one_order(tmp_path: Path) -> None:
-    order = an_order()
+    order = a_request()
     open_store(tmp_path / "out", order)
-    open_store(tmp_path / "out", an_order())
+    open_store(tmp_path / "out", a_request())
     for other, what in (
         (replace(order, worlds=6), "worlds=5, now 6"),
         (replace(order, planners=("paper",)), "planners=['paper', 'straight'], now ['paper']"),
@@ -427,7 +431,7 @@ def test_a_directory_belongs_to_one_order(tmp_path: Path) -> None:
 
 
 def test_parts_do_not_depend_on_who_computes_them() -> None:
-    names = [part.name for part in parts_of(an_order(worlds=250, oracle=True))]
+    names = [chunk.name for chunk in chunks_of(a_request(worlds=250, oracle=True))]
     assert len(set(names)) == len(names)
     assert names[0] == "random-3-oracle-0-20"
     assert names[-3:] == [
@@ -447,7 +451,7 @@ def test_work_is_done_by_one_thread_whatever_the_workers_are_told(
     names = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"]
     for name in names:
         monkeypatch.setenv(name, "2")
-    child = Keeper()
+    child = Worker()
     try:
         assert list(child.ask(environment, tuple(names), None, 60.0)) == ["1", "1", "1"]
     finally:
@@ -455,7 +459,7 @@ def test_work_is_done_by_one_thread_whatever_the_workers_are_told(
 
 
 def test_one_child_makes_one_part_after_the_other() -> None:
-    first, second = parts_of(an_order())
+    first, second = chunks_of(a_request())
     first.run()
     child = worker._LOCAL.keeper
     second.run()
@@ -469,8 +473,8 @@ def test_a_planner_found_by_a_path_of_after_the_first_sweep(
     (tmp_path / "found_later.py").write_text(
         "from mfba_planner.planning.peers.straight_line import Straight as Later\n"
     )
-    before = sweep(an_order(planners=("straight",)))
+    before = sweep(a_request(planners=("straight",)))
     monkeypatch.syspath_prepend(str(tmp_path))
-    after = sweep(an_order(planners=("found_later:Later",)))
+    after = sweep(a_request(planners=("found_later:Later",)))
     same = [{**row, "planner": "straight"} for row in after.rows]
     assert sorted_hash(same) == sorted_hash(before.rows)

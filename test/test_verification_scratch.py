@@ -22,7 +22,7 @@ from mfba_planner.core.types import Mode
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.ros.interface.serialized_message import type_name
-from mfba_planner.verification.redecide import Robot, decide_from_scratch
+from mfba_planner.verification.redecide import Robot, redecide_recording
 
 ROBOT = Robot(robot_radius_m=0.3)
 TICK_NS = SECOND // 10
@@ -63,7 +63,7 @@ def test_each_scan_is_decided_on_the_odometry_of_its_stamp(tmp_path: Path) -> No
     messages = [goal(0, 10.0, 0.0)]
     for k in range(1, 6):
         messages += [scan(k * TICK_NS, 0.9 if k == 3 else math.inf), odom(k * TICK_NS, 0.1 * k)]
-    found = decide_from_scratch(bag(tmp_path / "bag", *messages), ROBOT)
+    found = redecide_recording(bag(tmp_path / "bag", *messages), ROBOT)
     assert not found.faults
     assert not found.notes
     assert [tick.pose.x for tick in found.decided] == [0.1 * k for k in range(1, 6)]
@@ -83,7 +83,7 @@ def test_without_one_of_its_stamp_the_newest_before_counts(tmp_path: Path) -> No
         odom(4 * TICK_NS, 3.0),
         scan(3 * TICK_NS + 2 * SECOND),
     )
-    found = decide_from_scratch(path, ROBOT)
+    found = redecide_recording(path, ROBOT)
     assert [tick.pose.x for tick in found.decided] == [2.0, 3.0]
     assert [tick.mode for tick in found.decided] == [Mode.PATH_GENERATION, Mode.STOPPED]
     assert found.decided[1].reason == "input is 1.900 s old"
@@ -105,9 +105,9 @@ def test_before_the_goal_the_robot_waits_and_a_new_goal_counts_from_then(tmp_pat
         goal(4 * TICK_NS, 0.0, 5.0),
         scan(4 * TICK_NS),
     )
-    goals = [tick.goal for tick in decide_from_scratch(path, ROBOT).decided]
+    goals = [tick.goal for tick in redecide_recording(path, ROBOT).decided]
     assert goals == [None, (5.0, 0.0), (5.0, 0.0), (0.0, 5.0)]
-    given = decide_from_scratch(path, replace(ROBOT, goal=(7.0, 7.0)))
+    given = redecide_recording(path, replace(ROBOT, goal=(7.0, 7.0)))
     assert {tick.goal for tick in given.decided} == {(7.0, 7.0)}
 
 
@@ -115,7 +115,7 @@ def test_the_robots_size_and_the_scans_yaw_count(tmp_path: Path) -> None:
     path = bag(tmp_path / "bag", goal(0, 10.0, 0.0), odom(TICK_NS), scan(TICK_NS, 1.2))
 
     def bits(**changes: Any) -> list[int]:
-        (tick,) = decide_from_scratch(path, replace(ROBOT, **changes)).decided
+        (tick,) = redecide_recording(path, replace(ROBOT, **changes)).decided
         return [number for number, bit in enumerate(tick.vs, start=1) if bit]
 
     assert bits(robot_radius_m=0.3) == []
@@ -137,7 +137,7 @@ def test_stamps_that_go_back_and_refused_inputs_are_named(tmp_path: Path) -> Non
         odom(4 * TICK_NS),
         scan(4 * TICK_NS, math.nan, beams=1),
     )
-    found = decide_from_scratch(path, ROBOT)
+    found = redecide_recording(path, ROBOT)
     assert found.faults == (
         f"/robot/odom: stamp {TICK_NS} ns comes after {2 * TICK_NS} ns",
         f"/front/scan: stamp {2 * TICK_NS} ns comes after {2 * TICK_NS} ns",
@@ -155,9 +155,9 @@ def test_two_scans_must_be_chosen_from(tmp_path: Path) -> None:
         ("/rear", message, time_ns),
     )  # fmt: skip
     with pytest.raises(BagError, match=r"2 topics of .*LaserScan, /front/scan, /rear; name one"):
-        decide_from_scratch(path, ROBOT)
-    (front,) = decide_from_scratch(path, replace(ROBOT, scan="/front/scan")).decided
-    (rear,) = decide_from_scratch(path, replace(ROBOT, scan="/rear")).decided
+        redecide_recording(path, ROBOT)
+    (front,) = redecide_recording(path, replace(ROBOT, scan="/front/scan")).decided
+    (rear,) = redecide_recording(path, replace(ROBOT, scan="/rear")).decided
     assert (any(front.vs), any(rear.vs)) == (False, True)
 
 
@@ -182,7 +182,7 @@ def transforms(*told: tuple[str, str, tuple[float, ...], tuple[float, float]]) -
     return bytes(STORE.serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
 
 
-def mounted_bag(
+def bag_with_extrinsics(
     path: Path, *told: tuple[str, str, tuple[float, ...], tuple[float, float]]
 ) -> Path:
     """A scan in frame laser with something 0.9 m along its beam 0, odometry of base_link."""
@@ -227,27 +227,27 @@ def test_how_the_lidar_is_mounted_tf_static_says(
     told: list[Any], yaw: float, tmp_path: Path
 ) -> None:
     """Beam 0 sees something 0.9 m away: in the middle of that sector, once the lidar is turned."""
-    path = mounted_bag(tmp_path / "bag", *told)
-    (decided,) = decide_from_scratch(path, ROBOT).decided
+    path = bag_with_extrinsics(tmp_path / "bag", *told)
+    (decided,) = redecide_recording(path, ROBOT).decided
     given = replace(ROBOT, scan_yaw_rad=yaw * math.pi)
-    (expected,) = decide_from_scratch(path, given).decided
+    (expected,) = redecide_recording(path, given).decided
     assert any(decided.vs)
     assert decided.vs == expected.vs
     assert decided.ranges_m == pytest.approx(expected.ranges_m, abs=1e-6)
-    (unturned,) = decide_from_scratch(path, replace(ROBOT, scan_yaw_rad=0.0)).decided
+    (unturned,) = redecide_recording(path, replace(ROBOT, scan_yaw_rad=0.0)).decided
     assert (decided.vs == unturned.vs) == (yaw == 0.0)
 
 
 def test_how_far_the_lidar_is_from_the_middle_is_noted(tmp_path: Path) -> None:
     told = ("base_link", "mast", LEFT, (0.2, 0.0)), ("mast", "laser", LEFT, (0.15, 0.0))
-    found = decide_from_scratch(mounted_bag(tmp_path / "bag", *told), ROBOT)
+    found = redecide_recording(bag_with_extrinsics(tmp_path / "bag", *told), ROBOT)
     # 0.2 ahead, then 0.15 along what is ahead of the mast: to the left.
     assert found.notes == (
         "/tf_static: laser is turned by 3.142 rad in base_link, 0.25 m off its middle: "
         "--robot-radius must allow for that",
     )
-    level = mounted_bag(tmp_path / "level", ("base_link", "laser", LEVEL, HERE))
-    assert decide_from_scratch(level, ROBOT).notes == ()
+    level = bag_with_extrinsics(tmp_path / "level", ("base_link", "laser", LEVEL, HERE))
+    assert redecide_recording(level, ROBOT).notes == ()
 
 
 @pytest.mark.parametrize(
@@ -265,15 +265,15 @@ def test_how_far_the_lidar_is_from_the_middle_is_noted(tmp_path: Path) -> None:
 def test_a_lidar_that_nobody_knows_the_mounting_of_is_refused(
     told: list[Any], what: str, tmp_path: Path
 ) -> None:
-    path = mounted_bag(tmp_path / "bag", *told)
+    path = bag_with_extrinsics(tmp_path / "bag", *told)
     with pytest.raises(BagError, match=re.escape(what)):
-        decide_from_scratch(path, ROBOT)
+        redecide_recording(path, ROBOT)
     assert cli.main(["verify", str(path), "--scan-yaw", "0.3"]) == 0
 
 
 def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["verify", str(FOREIGN)]) == 0
-    expected = decide_from_scratch(FOREIGN, ROBOT)
+    expected = redecide_recording(FOREIGN, ROBOT)
     assert capsys.readouterr().out == (
         "note: /tf_static: laser is turned by 0 rad in base_link, 0.1 m off its middle: "
         "--robot-radius must allow for that\n"

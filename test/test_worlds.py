@@ -22,7 +22,7 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.contact import step_clearances
 from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls, center_at
 from mfba_planner.simulation.scenario import Scenario
-from mfba_planner.simulation.uniform_segments import uniform_legs
+from mfba_planner.simulation.uniform_segments import uniform_segments
 
 # centre, speed and heading of the first obstacle of random-10, world 0
 GOLDEN = (7.269229725556283, 2.5850024987816624, 0.2851093287992198, -3.0053334499216913)
@@ -273,7 +273,7 @@ def test_first_contact_is_where_the_gap_ends(
     world = Scenario(
         name="x", start_m=(99.0, 99.0), goal_m=(98.0, 99.0), obstacles=(obstacle,), walls=walls
     )
-    (first,) = first_contact_s(uniform_legs(world, 20.0), np.array([place]))
+    (first,) = first_contact_s(uniform_segments(world, 20.0), np.array([place]))
     until = min(float(first), 20.0)
     (before,) = step_clearances(world, 0.0, until, place, place)
     assert before >= -1e-6

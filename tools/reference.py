@@ -23,7 +23,7 @@ from typing import Any
 from mfba_planner import cli
 from mfba_planner.core.options import override, walk
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.planner_factory import USUAL
+from mfba_planner.planning.planner_factory import DEFAULT_METHOD
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.ros import node_parameters as settings
@@ -42,7 +42,7 @@ ROBOT: dict[str, dict[str, Any]] = {
         "step_length_m": 0.05,  # a decision is for 0.1 s
         "goal_tolerance_m": 0.1,
         "input_timeout_s": 0.25,
-        "method": USUAL.value,
+        "method": DEFAULT_METHOD.value,
         "bat.iterations": preset().bat.iterations,
         "recovery.enabled": True,
     },
@@ -60,7 +60,7 @@ _YAML_HEAD = """\
 NODES: dict[str, tuple[Any, ...]] = {
     "planner": (settings.PlannerSettings(), PlannerParams()),
     "virtual_sensor": (settings.VirtualSensorSettings(), SensorParams()),
-    "world_sim": (settings.WorldSimSettings(), settings.Rig(robot=Robot())),
+    "world_sim": (settings.WorldSimSettings(), settings.RobotParameters(robot=Robot())),
     "recorder": (settings.RecorderSettings(),),
 }
 

@@ -10,7 +10,7 @@ from ..core.argument_parser import Parser
 from ..core.outputs import bag_in
 from ..recording.omitted_decisions import tell
 from ..recording.read_episode import summaries
-from ..recording.robot_topics import ALONE, chosen
+from ..recording.robot_topics import NO_NAMESPACE, chosen
 from ..report.result_json import read_result
 
 
@@ -35,8 +35,8 @@ def main(args: list[str]) -> int:
 
 def _digests(path: Path, robots: list[str]) -> dict[str, str]:
     if path.suffix == ".json":
-        chosen(path, [ALONE], robots)
-        return {ALONE: str(read_result(path)["digest"])}
+        chosen(path, [NO_NAMESPACE], robots)
+        return {NO_NAMESPACE: str(read_result(path)["digest"])}
     bag = bag_in(path)
     runs = summaries(bag, robots)
     # Not among the lines that others read.

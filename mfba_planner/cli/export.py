@@ -14,7 +14,7 @@ from ..core.argument_parser import Parser
 from ..core.errors import BagError, ConfigError
 from ..core.outputs import bag_in, new_file
 from ..recording.bag_reader import BagReader
-from ..recording.decisions import deciders
+from ..recording.decisions import robots_with_decisions
 from ..recording.omitted_decisions import tell
 from ..recording.robot_topics import chosen
 from ..recording.tick_table import COLUMNS, Row, read_rows
@@ -41,7 +41,7 @@ def main(args: list[str]) -> int:
         raise ConfigError(f"{found.table}: unknown kind of table; give a name in .csv or .parquet")
     missed: dict[str, str] = {}
     with BagReader(bag_in(found.bag)) as reader:
-        robots = chosen(reader.path, deciders(reader), found.robots)
+        robots = chosen(reader.path, robots_with_decisions(reader), found.robots)
         rows = read_rows(reader, robots, missed)
         first = next(rows, None)
         if first is None:

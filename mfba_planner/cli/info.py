@@ -11,7 +11,7 @@ from ..recording.bag_info import describe, format_info
 from ..recording.configuration import ATTACHMENT_NAME
 from ..recording.omitted_decisions import tell
 from ..recording.read_episode import Summary, summaries
-from ..recording.robot_topics import ALONE
+from ..recording.robot_topics import NO_NAMESPACE
 from ..report.fleet_table import fleet_text
 
 
@@ -35,8 +35,8 @@ def main(args: list[str]) -> int:
 
 
 def _show(runs: dict[str, Summary]) -> None:
-    if ALONE in runs:
-        alone = runs[ALONE]
+    if NO_NAMESPACE in runs:
+        alone = runs[NO_NAMESPACE]
         show(alone.episode, alone.result)
     else:
         print(fleet_text(list(runs), [run.result for run in runs.values()]), end="")

@@ -21,7 +21,7 @@ from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..recording.omitted_decisions import tell
 from ..recording.read_episode import Recording, read_recording
-from ..recording.robot_topics import ALONE, chosen
+from ..recording.robot_topics import NO_NAMESPACE, chosen
 from ..report.result_json import read_result
 from ..scenarios.scenario_files import load_scenario
 from ..simulation.decision_digest import digest
@@ -51,7 +51,7 @@ def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> Named:
     """Read or make the runs, and say what is left out of them; raises BagError, InputError."""
     recordings = [_runs(path, robots) for path in paths]
     first = recordings[0]
-    if len(paths) == 1 and ALONE not in first.episodes:
+    if len(paths) == 1 and NO_NAMESPACE not in first.episodes:
         return Named(list(first.episodes.items()), first.scenario.robot_names)
     runs = []
     for path, recording in zip(paths, recordings):
@@ -76,9 +76,9 @@ def _runs(path: Path, robots: Sequence[str]) -> Recording:
         recording = read_recording(bag, robots)
         tell(bag, recording.missed)
         return recording
-    chosen(path, [ALONE], robots)
+    chosen(path, [NO_NAMESPACE], robots)
     episode = _again(path)
-    return Recording(episode.scenario, episode.seed, {ALONE: episode}, {})
+    return Recording(episode.scenario, episode.seed, {NO_NAMESPACE: episode}, {})
 
 
 def _again(path: Path) -> Episode:

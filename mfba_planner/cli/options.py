@@ -9,7 +9,7 @@ from typing import Any
 from ..core.argument_parser import Parser
 from ..core.options import Spec, flatten
 from ..launcher.set_option import option_rows
-from ..planning.planner_factory import named
+from ..planning.planner_factory import params_for_method
 from ..planning.planner_params import PlannerParams
 
 
@@ -24,7 +24,7 @@ def main(args: list[str]) -> int:
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
     for name, default, meaning in rows:
         print(f"{name:<{widths[0]}}  {default:<{widths[1]}}  {meaning}")
-    usual = named(None, PlannerParams(), algorithm_1=False)
+    usual = params_for_method(None, PlannerParams(), algorithm_1=False)
     changes = set(flatten(usual).items()) - set(flatten(PlannerParams()).items())
     own = ", ".join(f"planner.{name}={value}" for name, value in sorted(changes))
     print(f"Unless --planner says otherwise: {own}")

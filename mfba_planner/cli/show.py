@@ -18,8 +18,8 @@ from ..evaluation.sweep.columns import Row, made_row
 from ..evaluation.sweep.explain_run import contact_index, explain
 from ..evaluation.sweep.planner_sandbox import HungError
 from ..evaluation.sweep.read_sweep import ReadSweep, read_sweep
-from ..evaluation.sweep.single_run import Played, play
-from ..evaluation.sweep.sweep_spec import Order, Run, Setting, own_preset, read_run
+from ..evaluation.sweep.single_run import PlayedRun, run_one
+from ..evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, own_preset, read_run
 
 _DESCRIPTION = """Make a run of a sweep again and tell what became of it, and why.
 
@@ -70,10 +70,10 @@ def _why(row: Row) -> str:
 def _show(swept: ReadSweep | None, word: str, out: Path | None, *, bag: bool) -> int:
     run, row = _chosen(swept, word)
     setting = swept.order.setting_of(run.planner) if swept else _usual(run)
-    Order(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)  # or it raises
+    SweepSpec(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)  # or it raises
     directory = refuse_existing(out or new_run_directory(stem="show"))
     with _patience(setting.patience_s):
-        played = play(run, setting)
+        played = run_one(run, setting)
     lines = [str(run), *explain(played), *_oracle(played, setting)]
     if swept is not None and swept.code_changed:
         lines.append("note: the code has changed since the sweep; its run may have gone otherwise")
@@ -126,13 +126,15 @@ def _patience(patience_s: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def _oracle(played: Played, setting: Setting) -> Iterator[str]:
+def _oracle(played: PlayedRun, setting: Setting) -> Iterator[str]:
     solution = solve(played.episode.scenario, setting.params.speed_mps)
     way = f", {solution.length_m:.3f} m" if solution.waypoints else ""
     yield f"oracle: {solution.certificate.value} at {solution.speed_mps:g} m/s{way}"
 
 
-def _write(directory: Path, run: Run, played: Played, lines: list[str], *, bag: bool) -> list[str]:
+def _write(
+    directory: Path, run: Run, played: PlayedRun, lines: list[str], *, bag: bool
+) -> list[str]:
     episode = played.episode
     directory.mkdir(parents=True)
     names = ["explanation.txt"]

@@ -11,7 +11,7 @@ from pathlib import Path
 from ..core.argument_parser import Parser
 from ..core.errors import ConfigError, MfbaError
 from ..evaluation.metrics import Result, evaluate
-from ..launcher.run_arguments import Order, add_world_arguments, read_config
+from ..launcher.run_arguments import RunRequest, add_world_arguments, read_config
 from ..launcher.run_result import show, why_no_success
 from ..scenarios.run_config import Driver, RunConfig
 from ..simulation.simulate import simulate
@@ -39,9 +39,9 @@ def main(args: list[str]) -> int:
 
         return fleet.simulate(config, found.seeds, found.out)
     if found.out is not None:
-        from ..launcher.execute_run import run as launch
+        from ..launcher.execute_run import execute
 
-        return launch(Order(config=config, out=found.out, node_args={}))
+        return execute(RunRequest(config=config, out=found.out, node_args={}))
     if found.seeds == 1:
         return _one(config)
     return _many([replace(config, seed=config.seed + k) for k in range(found.seeds)])

@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..core.errors import ConfigError
-from ..evaluation.study.chunk import Part
+from ..evaluation.study.chunk import Chunk
 from ..evaluation.study.chunk_store import Store
 from ..evaluation.study.compute_chunks import check_workers
-from ..paper.study.chunk import Chunk
+from ..paper.study.chunk import SampleChunk
 from ..paper.study.run import Sample, run_plan
 
 
@@ -46,7 +46,7 @@ def check(found: argparse.Namespace) -> None:
     check_workers(found.workers)
 
 
-def run_watched(chunks: Sequence[Chunk], workers: int, store: Store) -> dict[str, Sample]:
+def run_watched(chunks: Sequence[SampleChunk], workers: int, store: Store) -> dict[str, Sample]:
     """Run the plan under a progress bar."""
     with progress(chunks, store.directory) as done:
         return run_plan(chunks, workers=workers, store=store, done=done, say=say)
@@ -58,7 +58,7 @@ def say(line: str) -> None:
 
 
 @contextmanager
-def progress(parts: Sequence[Part], directory: Path) -> Iterator[Callable[[Part], None]]:
+def progress(chunks: Sequence[Chunk], directory: Path) -> Iterator[Callable[[Chunk], None]]:
     """A progress bar, where somebody watches; tells how to go on after an interrupt."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -69,8 +69,8 @@ def progress(parts: Sequence[Part], directory: Path) -> Iterator[Callable[[Part]
         with Progress(
             *columns, console=console, transient=True, disable=not console.is_terminal
         ) as bar:
-            task = bar.add_task("running", total=sum(part.cost for part in parts))
-            yield lambda part: bar.advance(task, part.cost)
+            task = bar.add_task("running", total=sum(chunk.cost for chunk in chunks))
+            yield lambda chunk: bar.advance(task, chunk.cost)
     except (KeyboardInterrupt, SystemExit):
         say(f"interrupted; go on with --out {directory}")
         raise

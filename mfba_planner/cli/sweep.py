@@ -17,14 +17,14 @@ from ..core.outputs import new_run_directory, write_same
 from ..evaluation.study.compute_chunks import check_workers
 from ..evaluation.suites import suite_names
 from ..evaluation.suites.named_suites import SPEED_MPS
-from ..evaluation.sweep.chunks import parts_of
+from ..evaluation.sweep.chunks import chunks_of
 from ..evaluation.sweep.columns import COLUMNS, TIMINGS
 from ..evaluation.sweep.run_sweep import Swept, dask_executor, open_store, sweep
-from ..evaluation.sweep.sweep_spec import PATIENCE_S, Order, Setting, own_preset
+from ..evaluation.sweep.sweep_spec import PATIENCE_S, Setting, SweepSpec, own_preset
 from ..evaluation.sweep.table import write
 from ..launcher.set_option import add_set_argument, with_settings
 from ..perception.sensory_vector import SensorParams
-from ..planning.planner_factory import USUAL
+from ..planning.planner_factory import DEFAULT_METHOD
 from ..planning.planner_params import PlannerParams
 from ..planning.planner_registry import PLANNERS
 from ..simulation.planner_observations import NAMES as PERCEPTIONS
@@ -45,7 +45,7 @@ def main(args: list[str]) -> int:
     order = _order(found)
     directory = found.out or new_run_directory(stem="sweep")
     store = open_store(directory, order)
-    with _executor(found.scheduler) as executor, progress(parts_of(order), directory) as done:
+    with _executor(found.scheduler) as executor, progress(chunks_of(order), directory) as done:
         swept = sweep(
             order, workers=found.workers, executor=executor, store=store, done=done, say=say
         )
@@ -69,7 +69,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--planner", action="append", default=[], metavar="NAME", dest="planners",
         help=f"one of {', '.join(PLANNERS)}, or MODULE:NAME; may be repeated "
-        f"(default: {USUAL.value})",
+        f"(default: {DEFAULT_METHOD.value})",
     )  # fmt: skip
     for name, default, what in (
         ("--worlds", 100, "how many worlds"),
@@ -105,15 +105,18 @@ def _parser() -> Parser:
     return parser
 
 
-def _order(found: argparse.Namespace) -> Order:
-    usual, planners = PlannerParams(speed_mps=SPEED_MPS), tuple(found.planners or [USUAL.value])
+def _order(found: argparse.Namespace) -> SweepSpec:
+    usual, planners = (
+        PlannerParams(speed_mps=SPEED_MPS),
+        tuple(found.planners or [DEFAULT_METHOD.value]),
+    )
     params, sensor = with_settings(usual, SensorParams(), found.settings)
     # What was said on the command line holds for all, whatever a planner is made for.
     own = {
         name: with_settings(own_preset(name, usual), sensor, found.settings)[0]
         for name in planners
     }
-    return Order(
+    return SweepSpec(
         suite=found.suite,
         planners=planners,
         worlds=found.worlds,
@@ -142,7 +145,7 @@ def _executor(scheduler: str | None) -> Iterator[Executor | None]:
         yield executor
 
 
-def command(order: Order) -> str:
+def command(order: SweepSpec) -> str:
     """The command that makes this sweep, however it was typed."""
     one, plain = order.setting, Setting()
     words = ["mfba", "sweep", order.suite]

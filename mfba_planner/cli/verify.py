@@ -14,7 +14,7 @@ from ..core.outputs import bag_in
 from ..launcher.set_option import add_set_argument, with_settings
 from ..recording.bag_reader import BagReader
 from ..recording.read_episode import read_recording
-from ..recording.robot_topics import ALONE, of_robot
+from ..recording.robot_topics import NO_NAMESPACE, of_robot
 from ..simulation.episode import Episode, Outcome, stamp_of
 from ..simulation.simulate import simulate, simulate_fleet
 from ..verification.compare_decisions import Divergence, first_divergence, side_by_side
@@ -78,7 +78,7 @@ def _show(robot: str, report: Report) -> None:
         print(of_robot(robot, said))
 
 
-def _show_divergence(found: Divergence, left: str, right: str, robot: str = ALONE) -> None:
+def _show_divergence(found: Divergence, left: str, right: str, robot: str = NO_NAMESPACE) -> None:
     decision = found.left or found.right
     assert decision is not None
     said = f"first difference at tick {found.tick}, stamp {decision.stamp_ns} ns:"
@@ -99,10 +99,10 @@ def _again(
     bag: Path, reports: dict[str, Report], settings: list[str]
 ) -> Iterator[tuple[str, Episode, Episode]]:
     """Yield (robot, recorded, simulated again, which is cut short where the recording was)."""
-    if ALONE not in reports:
+    if NO_NAMESPACE not in reports:
         yield from _fleet_again(bag, reports, settings)
         return
-    report = reports[ALONE]
+    report = reports[NO_NAMESPACE]
     recorded = report.setup.episode(report.recorded)
     planner, sensor = with_settings(recorded.planner, recorded.sensor, settings)
     again = simulate(
@@ -112,7 +112,7 @@ def _again(
         seed=recorded.seed,
         go_on=lambda world: bool(settings) or world.stamp_ns < recorded.ticks[-1].stamp_ns,
     )
-    yield ALONE, recorded, replace(again, driver="core")
+    yield NO_NAMESPACE, recorded, replace(again, driver="core")
 
 
 def _fleet_again(

@@ -13,8 +13,8 @@ from ..core.geometry import Point
 from ..launcher.set_option import with_settings
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
-from ..recording.robot_topics import ALONE, of_robot
-from ..verification.redecide import FromScratch, Robot, decide_from_scratch
+from ..recording.robot_topics import NO_NAMESPACE, of_robot
+from ..verification.redecide import Redecided, Robot, redecide_recording
 from ..verification.verify_bag import Report
 
 SHOWN = 10  # faults; more of them say nothing new
@@ -61,7 +61,7 @@ def report(bag: Path, found: argparse.Namespace) -> int:
                 f"{option}: {bag} is not a recording of ours, so there is no world to simulate; "
                 "leave it out"
             )
-    result = decide_from_scratch(bag, _robot(found))
+    result = redecide_recording(bag, _robot(found))
     show_remarks(result)
     modes = Counter(decision.mode.value for decision in result.decided)
     print("modes: " + ", ".join(f"{mode} {count}" for mode, count in sorted(modes.items())))
@@ -99,7 +99,7 @@ def _goal(given: list[float] | None) -> Point | None:
     return (given[0], given[1])
 
 
-def show_remarks(report: Report | FromScratch, robot: str = ALONE) -> None:
+def show_remarks(report: Report | Redecided, robot: str = NO_NAMESPACE) -> None:
     """Notes, then faults, not too many of them."""
     for note in report.notes:
         print(of_robot(robot, f"note: {note}"))

@@ -19,7 +19,7 @@ HEADING_CHANGE_RAD = math.radians(15.0)  # half a sector of Fig. 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Conduct:
+class RunMotion:
     """Figures of one run beyond evaluation.metrics.Result; one value each, over all K steps.
 
     hits_moving, hits_standing: the collisions of Result, by whether the robot moved (more than
@@ -52,7 +52,7 @@ class Conduct:
     avoidance_s: float
 
 
-class Course:
+class DrivenPath:
     """The shape of a path, point by point: turning, heading changes, jerk."""
 
     def __init__(self) -> None:
@@ -96,7 +96,7 @@ class Course:
         return self._thirds_m / self._third_count / tick_s**3 if self._third_count else 0.0
 
 
-class Passes:
+class ObstaclePasses:
     """What the obstacles of a run did to the robot, step by step."""
 
     def __init__(self) -> None:

@@ -13,10 +13,10 @@ import numpy as np
 
 from ..core.geometry import Pose2D, distance
 from ..core.types import NANO, Decision, Mode
-from ..planning.odometry_jump import carried_off
+from ..planning.odometry_jump import is_jump_reason
 from ..simulation.batched_motion import Array, Motion, Steps
 from ..simulation.episode import Episode, Outcome
-from .contacts_and_clearances import Conduct, Course, Passes
+from .contacts_and_clearances import DrivenPath, ObstaclePasses, RunMotion
 
 BLOCK = 512  # ticks
 
@@ -54,20 +54,20 @@ def evaluate(episode: Episode) -> Result:
     return assess(episode)[0]
 
 
-def conduct(episode: Episode) -> Conduct:
+def run_motion(episode: Episode) -> RunMotion:
     """How the run went on its way."""
     return assess(episode)[1]
 
 
-def assess(episode: Episode) -> tuple[Result, Conduct]:
+def assess(episode: Episode) -> tuple[Result, RunMotion]:
     """evaluate() and conduct() in one go."""
-    tally = Tally(episode)
+    tally = MetricsAccumulator(episode)
     for tick, pose in zip_longest(episode.ticks, episode.truth):
         tally.add(tick, pose)
-    return tally.result(episode.outcome), tally.conduct()
+    return tally.result(episode.outcome), tally.run_motion()
 
 
-class Tally:
+class MetricsAccumulator:
     """The figures of evaluate(), tick by tick: holds BLOCK ticks, however long the run is.
 
     Obstacles are looked at a block at a time, which is what makes it fast.
@@ -84,8 +84,8 @@ class Tally:
         self._steps_m = array("d")
         self._modes: Counter[Mode] = Counter()
         self._switches = 0
-        self._passes = Passes()
-        self._course = Course()
+        self._passes = ObstaclePasses()
+        self._course = DrivenPath()
         self._encounters: dict[int, None] = {}
 
     def add(self, tick: Decision, pose: Pose2D | None = None) -> None:
@@ -123,12 +123,12 @@ class Tally:
             encounters=tuple(number + 1 for number in self._encounters),
         )
 
-    def conduct(self) -> Conduct:
+    def run_motion(self) -> RunMotion:
         """How it went on its way so far."""
         passes = self._told()
         tick_s = self._run.planner.tick_ns * NANO
         length, turning = math.fsum(self._steps_m), self._course.turning_rad
-        return Conduct(
+        return RunMotion(
             hits_moving=passes.hits_moving,
             hits_standing=passes.hits_standing,
             first_contact_with=passes.first_contact_with,
@@ -142,12 +142,12 @@ class Tally:
             avoidance_s=self._modes[Mode.OBSTACLE_AVOIDANCE] * tick_s,
         )
 
-    def _told(self) -> Passes:
+    def _told(self) -> ObstaclePasses:
         """What the obstacles did so far; to a single tick, what they do while it stands."""
         self._look()
         if self._modes.total() != 1:
             return self._passes
-        standing = Passes()
+        standing = ObstaclePasses()
         times_s, positions_m = self._course_of([self._block[0]] * 2)
         standing.add(self._motion.steps(times_s, positions_m), times_s, np.zeros(1))
         return standing
@@ -157,7 +157,7 @@ class Tally:
         ticks = self._block
         if len(ticks) == self._looked:
             return
-        driven = np.array([not carried_off(tick.reason) for tick in ticks[1:]], dtype=bool)
+        driven = np.array([not is_jump_reason(tick.reason) for tick in ticks[1:]], dtype=bool)
         self._course_on(ticks[self._looked :])
         times_s, positions_m = self._course_of(ticks)
         steps = self._motion.steps(times_s, positions_m)
@@ -177,7 +177,7 @@ class Tally:
         """Draw the path on; where the robot was carried, a new one begins."""
         first = 0
         for number, tick in enumerate(ticks):
-            if carried_off(tick.reason):
+            if is_jump_reason(tick.reason):
                 if number > first:
                     self._course.add([tick.pose.position for tick in ticks[first:number]])
                 self._course.interrupt()
@@ -200,7 +200,7 @@ def steps_driven(episode: Episode) -> list[tuple[Decision, Decision]]:
         for tick, pose in zip_longest(episode.ticks, episode.truth)
     ]
     pairs = pairwise(ticks if len(ticks) > 1 else ticks * 2)
-    return [(a, replace(b, pose=a.pose) if carried_off(b.reason) else b) for a, b in pairs]
+    return [(a, replace(b, pose=a.pose) if is_jump_reason(b.reason) else b) for a, b in pairs]
 
 
 def tick_clearances(episode: Episode) -> list[list[float]]:
@@ -211,7 +211,7 @@ def tick_clearances(episode: Episode) -> list[list[float]]:
     positions_m = np.array([tick.pose.position for tick in moments]).T
     gaps_m = motion.steps(times_s, positions_m).gap_m
     for k, (_, b) in enumerate(steps):
-        if carried_off(b.reason):  # the next step begins elsewhere
+        if is_jump_reason(b.reason):  # the next step begins elsewhere
             standing_m = positions_m[:, [k, k]]
             gaps_m[k] = motion.steps(times_s[k : k + 2], standing_m).gap_m[0]
     return [[float(gap) for gap in row] for row in gaps_m]

@@ -4,7 +4,7 @@
 
 def main(args: list[str], prog: str = "launcher") -> int:
     """Run what args order; return the exit code. MfbaErrors pass through."""
-    from .execute_run import run
-    from .run_arguments import read_order
+    from .execute_run import execute
+    from .run_arguments import read_request
 
-    return run(read_order(args, prog))
+    return execute(read_request(args, prog))

@@ -14,7 +14,7 @@ PLAIN_PERIOD_S = 2.0  # between two lines of progress where they cannot be overw
 LIVE_PERIOD_S = 0.1
 
 
-class Screen:
+class RunConsole:
     """Standard output, and a log file once there is a place for it.
 
     On a terminal progress is one line that is overwritten, otherwise a line now and then.

@@ -10,16 +10,16 @@ from ..core.errors import BagError, MfbaError
 from ..scenarios.run_config import Driver
 from ..simulation.episode import Episode
 from ..simulation.simulate import simulate
-from .console import Screen
-from .fleet_result import conclude_fleet
-from .run import Attempt
-from .run_arguments import Order
+from .console import RunConsole
+from .fleet_result import finish_fleet_run
+from .run import Run
+from .run_arguments import RunRequest
 from .run_directory import RunDirectory
-from .run_result import conclude
+from .run_result import finish_run
 from .stop_request import StoppedError, StopRequest
 
 
-def run(order: Order) -> int:
+def execute(request: RunRequest) -> int:
     """Make the run; return 0 for the goal without collision, 128 + number for a signal.
 
     Raises MfbaError, in one line, for any other end. A run that never began leaves nothing
@@ -27,80 +27,80 @@ def run(order: Order) -> int:
     """
     episode: Episode | None = None
     failure: MfbaError | StoppedError | None = None
-    with StopRequest(order.timeout_s) as stop, closing(Screen()) as screen:
-        attempt = Attempt(order, RunDirectory(order.out), screen, stop)
+    with StopRequest(request.timeout_s) as stop, closing(RunConsole()) as console:
+        run = Run(request, RunDirectory(request.out), console, stop)
         try:
-            episode = _drive(attempt)
-            failure = attempt.stopped
+            episode = _drive(run)
+            failure = run.stopped
         except (MfbaError, StoppedError) as error:
             failure = error
         finally:
-            if not attempt.has_begun:
-                attempt.directory.discard()
+            if not run.has_begun:
+                run.directory.discard()
     if failure is None:
-        _conclude(attempt, episode)
+        _conclude(run, episode)
         return 0
-    if attempt.has_begun:
+    if run.has_begun:
         with suppress(BagError):  # nothing to tell of; the failure is told below
-            _conclude(attempt, episode, str(failure))
-    return _fail(failure, attempt)
+            _conclude(run, episode, str(failure))
+    return _fail(failure, run)
 
 
-def _conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> None:
+def _conclude(run: Run, episode: Episode | None, failure: str = "") -> None:
     """Leave what is left of a run; judge and show it unless it failed."""
-    if attempt.order.config.scenario.robots:
-        conclude_fleet(attempt, failure)
+    if run.request.config.scenario.robots:
+        finish_fleet_run(run, failure)
         return
-    conclusion = conclude(attempt, episode, failure)
+    run_result = finish_run(run, episode, failure)
     if failure:
         return
-    if attempt.order.view:
+    if run.request.view:
         from ..report.rerun_viewer import show
 
-        show([(conclusion.directory.name, conclusion.episode)])
-    conclusion.judge()
+        show([(run_result.directory.name, run_result.episode)])
+    run_result.judge()
 
 
-def _drive(attempt: Attempt) -> Episode | None:
+def _drive(run: Run) -> Episode | None:
     """Let the ordered driver make the run; return the episode where there is no bag."""
-    config = attempt.order.config
+    config = run.request.config
     if config.driver is Driver.MULTI_PROCESS:
         from .multi_process import run_multi_process
 
-        run_multi_process(attempt)
+        run_multi_process(run)
         return None
     if config.driver is Driver.IN_PROCESS:
-        _run_in_process(attempt)
+        _run_in_process(run)
         return None
-    attempt.begin()
+    run.begin()
     episode = simulate(
         config.scenario,
         planner=config.planner,
         sensor=config.sensor,
         seed=config.seed,
-        go_on=attempt.go_on,
+        go_on=run.go_on,
     )
-    attempt.end()
+    run.end()
     return episode
 
 
-def _run_in_process(attempt: Attempt) -> None:
+def _run_in_process(run: Run) -> None:
     from .in_process import run_in_process
     from .ros_domain import private_domain
 
     with private_domain() as domain:
-        attempt.wall_s = run_in_process(
-            attempt.order.config,
-            attempt.directory.bag,
+        run.wall_s = run_in_process(
+            run.request.config,
+            run.directory.bag,
             domain_id=domain,
-            timeout_s=attempt.order.timeout_s,
-            on_turn=attempt.go_on,
+            timeout_s=run.request.timeout_s,
+            on_turn=run.go_on,
         )
 
 
-def _fail(failure: MfbaError | StoppedError, attempt: Attempt) -> int:
+def _fail(failure: MfbaError | StoppedError, run: Run) -> int:
     """Say why in one line, and where to look; return the exit code unless it is 1."""
-    where = f"; what was recorded is in {attempt.directory.path}" if attempt.has_begun else ""
+    where = f"; what was recorded is in {run.directory.path}" if run.has_begun else ""
     if isinstance(failure, StoppedError) and failure.exit_code != 1:
         print(f"{failure}{where}", file=sys.stderr)
         return failure.exit_code

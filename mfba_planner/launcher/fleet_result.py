@@ -10,10 +10,10 @@ from ..evaluation.metrics import evaluate
 from ..recording.omitted_decisions import tell
 from ..recording.read_episode import read_recording
 from ..report.fleet_table import fleet_text, why_no_success
-from .run import Attempt
+from .run import Run
 
 
-def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
+def finish_fleet_run(run: Run, failure: str = "") -> None:
     """Print the table, write NAME.json for each robot and run.png.
 
     Raises MfbaError where the run, otherwise fine, was no success, and BagError where the bag
@@ -22,22 +22,22 @@ def conclude_fleet(attempt: Attempt, failure: str = "") -> None:
     from ..report.fleet_figure import draw_fleet
     from ..report.result_json import result_to_dict, write_result
 
-    directory, config = attempt.directory, attempt.order.config
+    directory, config = run.directory, run.request.config
     recording = read_recording(directory.bag)
     tell(directory.bag, recording.missed)
     runs = recording.episodes
     results = [evaluate(episode) for episode in runs.values()]
-    extra = {"fleet_seed": config.seed, "wall_s": attempt.wall_s, "failure": failure or None}
+    extra = {"fleet_seed": config.seed, "wall_s": run.wall_s, "failure": failure or None}
     for name, episode in runs.items():
         left_out = {"left_out": recording.missed[name]} if name in recording.missed else {}
         write_result(directory.path / f"{name}.json", result_to_dict(episode, extra | left_out))
-    if attempt.order.picture:
+    if run.request.picture:
         draw_fleet(config.scenario, config.seed, runs, directory.picture)
     sys.stdout.write(fleet_text(list(runs), results))
     print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
     if failure:
         return
-    if attempt.order.view:
+    if run.request.view:
         from ..report.rerun_viewer import show
 
         show(list(runs.items()), list(runs))

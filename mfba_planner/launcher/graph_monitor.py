@@ -17,13 +17,13 @@ from rclpy.serialization import deserialize_message
 from std_srvs.srv import SetBool, Trigger
 
 from ..recording.messages import points, stamp_ns
-from ..recording.robot_topics import ALONE
+from ..recording.robot_topics import NO_NAMESPACE
 from ..ros.endpoints.robot_namespace import below
 from ..ros.interface import topics
 from ..ros.interface.serialized_message import header_stamp_ns
 from ..ros.interface.topics import Topic
 from ..ros.runtime.node_runtime import GraphNode
-from ..ros.runtime.polled_subscriptions import Letterboxes
+from ..ros.runtime.polled_subscriptions import PolledSubscriptions
 
 ASK_AGAIN_S = 0.5  # an answer can get lost while client and server still find each other
 PROGRESS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -65,7 +65,7 @@ class Question:
 class Monitor:
     """A node beside the graph, which the graph does not wait for."""
 
-    def __init__(self, domain_id: int, robots: Sequence[str] = (ALONE,)) -> None:
+    def __init__(self, domain_id: int, robots: Sequence[str] = (NO_NAMESPACE,)) -> None:
         """Join the domain; robots are the namespaces of those that are watched."""
         self._context = Context()
         self._context.init(domain_id=domain_id)
@@ -79,7 +79,7 @@ class Monitor:
         self._executor.add_node(self._node)
         self._pause = self._node.create_client(SetBool, f"{topics.WORLD_SIM}/pause")
         self._robots = robots
-        self._letterboxes = Letterboxes()  # nothing wakes us up for every message of the run
+        self._polled = PolledSubscriptions()  # nothing wakes us up for every message of the run
         self._decisions: dict[str, bytes] = {}
         self._ticks: dict[str, int] = {}
 
@@ -99,7 +99,7 @@ class Monitor:
 
     def take_in(self) -> None:
         """Take in the newest of everything, now: the run must not be waited upon."""
-        self._letterboxes.empty()
+        self._polled.empty()
 
     def ask_ready(self, nodes: Iterable[str]) -> dict[str, Question]:
         """A question to ~/ready of each node."""
@@ -121,8 +121,8 @@ class Monitor:
     def _open(
         self, robot: str, topic: Topic, qos: QoSProfile, deliver: Callable[[str, bytes], None]
     ) -> None:
-        self._node.open_boxes(
-            self._letterboxes,
+        self._node.subscribe_polled(
+            self._polled,
             topic.type,
             below(robot, topic).name,
             lambda letter: deliver(robot, letter.data),

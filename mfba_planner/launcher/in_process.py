@@ -97,7 +97,9 @@ def run_in_process(
             lambda: f"tick {world.world.tick} after {timeout_s:g} s",
         )
         took_s = time.perf_counter() - started
-        world.pace.paused = True  # so that the present tick is answered and no other follows
+        world.tick_control.paused = (
+            True  # so that the present tick is answered and no other follows
+        )
         for _ in range(DRAIN_TURNS):
             executor.spin_once(timeout_sec=0.0)
         return took_s

@@ -10,13 +10,13 @@ from typing import Any
 
 from ..core.errors import BagError, GraphError
 from ..recording.bag_reader import BagReader
-from ..recording.robot_topics import ALONE, below
+from ..recording.robot_topics import NO_NAMESPACE, below
 from ..ros.interface import topics
 from ..scenarios.run_config import NODES, READY_TIMEOUT_S, graph_parameters, recorder_parameters
 from .graph_monitor import Monitor
-from .node_processes import Crew
+from .node_processes import NodeProcesses
 from .ros_domain import private_domain
-from .run import Attempt
+from .run import Run
 from .run_arguments import RECORDER
 from .run_directory import RunDirectory
 from .stop_request import StoppedError
@@ -28,62 +28,62 @@ LAST_DECISION_TIMEOUT_S = 2.0
 TURN_S = 0.02
 
 
-def run_multi_process(attempt: Attempt) -> None:
+def run_multi_process(run: Run) -> None:
     """Run the graph until goal or time limit; the bag is closed and complete afterwards.
 
     Raises GraphError for a node that ends or does not get ready, StoppedError for an attempt that
     is stopped from outside: then the bag holds what happened until then. Raises BagError when
     the recorder missed something.
     """
-    attempt.screen.log_to(attempt.directory.log)
-    config = attempt.order.config
+    run.console.log_to(run.directory.log)
+    config = run.request.config
     told = graph_parameters(config, (*NODES, RECORDER))
-    bag = str(attempt.directory.bag.absolute())
+    bag = str(run.directory.bag.absolute())
     # First, as what it hears first it must not miss.
     told = {RECORDER: recorder_parameters(config, bag, told)} | told
     with (
         private_domain() as domain,
-        Monitor(domain, config.scenario.robot_names or (ALONE,)) as monitor,
-        Crew(attempt.screen.line, attempt.stop.is_urgent) as crew,
+        Monitor(domain, config.scenario.robot_names or (NO_NAMESPACE,)) as monitor,
+        NodeProcesses(run.console.line, run.stop.is_urgent) as node_processes,
     ):
-        attempt.screen.say(f"starting the nodes; look on with ROS_DOMAIN_ID={domain}")
-        crew.start(told, attempt.order.node_args)
-        ticks = _Conductor(attempt, monitor, crew, list(told)).conduct()
+        run.console.say(f"starting the nodes; look on with ROS_DOMAIN_ID={domain}")
+        node_processes.start(told, run.request.node_args)
+        ticks = _MultiProcessDriver(run, monitor, node_processes, list(told)).run_motion()
     if not config.real_time:
-        require_complete(attempt.directory, ticks)
+        require_complete(run.directory, ticks)
 
 
-class _Conductor:
+class _MultiProcessDriver:
     """Lets the nodes get ready, play and stop together."""
 
     def __init__(
-        self, attempt: Attempt, monitor: Monitor, crew: Crew, nodes: Sequence[str]
+        self, run: Run, monitor: Monitor, node_processes: NodeProcesses, nodes: Sequence[str]
     ) -> None:
-        self._attempt = attempt
+        self._run = run
         self._monitor = monitor
-        self._crew = crew
+        self._node_processes = node_processes
         self._nodes = nodes
-        robots = len(attempt.order.config.scenario.robots)
+        robots = len(run.request.config.scenario.robots)
         self._patience_s = READY_TIMEOUT_S + MORE_PER_ROBOT_S * robots
 
-    def conduct(self) -> dict[str, int]:
+    def run_motion(self) -> dict[str, int]:
         """Run from start to end; return each robot's number of ticks."""
         self._get_ready()
         self._monitor.listen()
-        self._attempt.begin()
+        self._run.begin()
         try:
             self._let_go()
             ticks = self._watch()
         except (GraphError, StoppedError):
             self._freeze()
             raise
-        self._attempt.end()
+        self._run.end()
         self._hear_the_last_decision(ticks)
         return ticks
 
     def _check(self) -> None:
-        self._crew.check()
-        self._attempt.stop.check()
+        self._node_processes.check()
+        self._run.stop.check()
 
     def _wait(self, done: Callable[[], Any], timeout_s: float, explain: Callable[[], str]) -> None:
         """Spin until done; GraphError with the explanation after timeout_s."""
@@ -113,7 +113,7 @@ class _Conductor:
             self._patience_s,
             lambda: "not ready: " + "; ".join(f"{name}: {what}" for name, what in missing.items()),
         )
-        self._crew.forget_parameters()
+        self._node_processes.forget_parameters()
 
     def _let_go(self) -> None:
         question = self._monitor.ask_pause(False)
@@ -121,18 +121,18 @@ class _Conductor:
 
     def _watch(self) -> dict[str, int]:
         """Until the world says that it is over; without waking up for every message."""
-        tick_ns = self._attempt.order.config.planner.tick_ns
+        tick_ns = self._run.request.config.planner.tick_ns
         while (ticks := self._monitor.ticks_at_end()) is None:
             self._check()
             time.sleep(TURN_S)
             self._monitor.take_in()
-            if self._attempt.screen.wants_progress() and (now := self._monitor.progress()):
-                self._attempt.show(now.stamp_ns // tick_ns - 1, now.distance_m, now.mode)
+            if self._run.console.wants_progress() and (now := self._monitor.progress()):
+                self._run.show(now.stamp_ns // tick_ns - 1, now.distance_m, now.mode)
         return ticks
 
     def _hear_the_last_decision(self, ticks: Mapping[str, int]) -> None:
         """In real time the world does not wait for the planner: give it a moment to finish."""
-        tick_ns = self._attempt.order.config.planner.tick_ns
+        tick_ns = self._run.request.config.planner.tick_ns
         deadline = time.monotonic() + LAST_DECISION_TIMEOUT_S
         while time.monotonic() < deadline:
             heard = self._monitor.stamps_ns()
@@ -146,7 +146,7 @@ class _Conductor:
         question = self._monitor.ask_pause(True)
         deadline = time.monotonic() + FREEZE_TIMEOUT_S
         while question.answer() is None and time.monotonic() < deadline:
-            if self._attempt.stop.is_urgent() or not self._crew.has(topics.WORLD_SIM):
+            if self._run.stop.is_urgent() or not self._node_processes.has(topics.WORLD_SIM):
                 return
             self._monitor.spin(TURN_S)
 

@@ -32,11 +32,11 @@ _LOGGING = {
 }
 
 
-class Child:
+class NodeProcess:
     """A running node; its output goes to sink(name, line), line by line."""
 
     def __init__(self, name: str, args: list[str], sink: Callable[[str, str], None]) -> None:
-        """Start a program (a function of entry_points.py) with args; name is its own, or NAMESPACE/it."""
+        """Start a program of entry_points.py with args; name is its own, or NAMESPACE/its own."""
         namespace, _, program = name.rpartition("/")
         if namespace:
             args = [*args, "-r", f"__ns:=/{namespace}"]
@@ -69,7 +69,7 @@ class Child:
         """Whether the process still runs."""
         return self.process.poll() is None
 
-    def fate(self) -> str:
+    def how_it_ended(self) -> str:
         """How the process ended, in words."""
         code = self.process.poll()
         if code is None:

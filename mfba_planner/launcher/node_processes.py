@@ -14,24 +14,24 @@ import yaml
 
 from ..core.errors import GraphError
 from ..scenarios.run_config import Parameters
-from .node_process import Child
+from .node_process import NodeProcess
 
 RECORDER_GRACE_S = 20.0  # it still writes what it has received
 GRACE_S = 10.0  # on a machine with far too much to do; a killed node counts as a failure
 MORE_EACH_S = 1.0  # they end all at once, and each hears of each
 
 
-class Crew:
+class NodeProcesses:
     """The nodes' processes, as a context: whatever happens inside, all of them end with it."""
 
     def __init__(self, sink: Callable[[str, str], None], hurry: Callable[[], bool]) -> None:
         """Send output to sink; hurry says that nobody wants to wait for orderly ends."""
-        self.children: list[Child] = []
+        self.children: list[NodeProcess] = []
         self._sink = sink
         self._hurry = hurry
         self._files = tempfile.TemporaryDirectory(prefix="mfba_")
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> NodeProcesses:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -39,7 +39,7 @@ class Crew:
         self.stop()
         failed = [child for child in stopped if child.process.returncode != 0]
         if failed and kind is None:
-            raise GraphError(_obituary(failed[0]))
+            raise GraphError(_death_message(failed[0]))
 
     def start(self, told: Parameters, more: Mapping[str, list[str]]) -> None:
         """Start a node per entry of told, in that order; more holds further --ros-args.
@@ -51,7 +51,7 @@ class Crew:
             path.write_text(parameters_yaml(parameters), encoding="utf-8")
             args = ["--ros-args", "--disable-external-lib-logs", "--params-file", str(path)]
             args += more.get(name.rpartition("/")[2], [])
-            self.children.append(Child(name, args, self._sink))
+            self.children.append(NodeProcess(name, args, self._sink))
 
     def forget_parameters(self) -> None:
         """Remove the parameter files: every node has read its own."""
@@ -66,7 +66,7 @@ class Crew:
         for child in self.children:
             if not child.is_alive:
                 child.ended_within(1.0)  # now, but for its last lines
-                raise GraphError(_obituary(child))
+                raise GraphError(_death_message(child))
 
     def stop(self) -> None:
         """End all: the recorder first, while those it hears are there, then the others."""
@@ -77,7 +77,7 @@ class Crew:
         self._end(others, GRACE_S + MORE_EACH_S * len(others))
         self._files.cleanup()
 
-    def _end(self, children: list[Child], grace_s: float) -> None:
+    def _end(self, children: list[NodeProcess], grace_s: float) -> None:
         for child in children:
             child.tell(SIGTERM)
         deadline = time.monotonic() + grace_s
@@ -94,8 +94,8 @@ def parameters_yaml(parameters: Mapping[str, Any]) -> str:
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=2**31)
 
 
-def _obituary(child: Child) -> str:
+def _death_message(child: NodeProcess) -> str:
     said = [line for line in child.last_lines if line]
     # A node that refuses something says it in its last line.
     last = f"; it said last: {said[-1]}" if said else " without a word"
-    return f"{child.name} ended ({child.fate()}){last}"
+    return f"{child.name} ended ({child.how_it_ended()}){last}"

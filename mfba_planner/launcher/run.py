@@ -7,22 +7,22 @@ import time
 
 from ..simulation.fleet import Fleet
 from ..simulation.world import World
-from .console import Screen
-from .run_arguments import Order
+from .console import RunConsole
+from .run_arguments import RunRequest
 from .run_directory import RunDirectory
 from .stop_request import StoppedError, StopRequest
 
 
-class Attempt:
+class Run:
     """What the three drivers are given."""
 
     def __init__(
-        self, order: Order, directory: RunDirectory, screen: Screen, stop: StopRequest
+        self, request: RunRequest, directory: RunDirectory, console: RunConsole, stop: StopRequest
     ) -> None:
         """Nothing has happened yet."""
-        self.order = order
+        self.request = request
         self.directory = directory
-        self.screen = screen
+        self.console = console
         self.stop = stop
         self.stopped: StoppedError | None = None
         self.wall_s: float | None = None  # of the loop, without starting and ending
@@ -53,8 +53,8 @@ class Attempt:
         except StoppedError as stopped:
             self.stopped = stopped
             return False
-        if self.screen.wants_progress():
-            self.show(world.tick, world.left_m)
+        if self.console.wants_progress():
+            self.show(world.tick, world.distance_to_goal_m)
         return True
 
     def show(self, tick: int, distance_m: float, mode: str = "") -> None:
@@ -67,4 +67,4 @@ class Attempt:
             mode.replace("_", " "),
             f"{(tick - before) / (now - then):.0f} ticks/s" if now > then else "",
         ]
-        self.screen.progress(", ".join(part for part in parts if part))
+        self.console.progress(", ".join(part for part in parts if part))

@@ -14,7 +14,7 @@ from ..core.errors import ConfigError
 from ..core.options import override
 from ..paper import readings
 from ..perception.sensory_vector import SensorParams
-from ..planning.planner_factory import USUAL, named
+from ..planning.planner_factory import DEFAULT_METHOD, params_for_method
 from ..planning.planner_params import Method
 from ..scenarios.run_config import NODES, Driver, RunConfig
 from ..scenarios.scenario_files import load_scenario
@@ -44,7 +44,7 @@ examples:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
+class RunRequest:
     """One run to be made; out is None for a new directory below ./runs."""
 
     config: RunConfig
@@ -55,7 +55,7 @@ class Order:
     node_args: dict[str, list[str]]
 
 
-def read_order(args: list[str], prog: str) -> Order:
+def read_request(args: list[str], prog: str) -> RunRequest:
     """Turn a command line into an Order; ConfigError for whatever cannot be accepted."""
     parser = Parser(prog=prog, description=_DESCRIPTION, epilog=_EPILOG.format(prog=prog))
     add_world_arguments(parser)
@@ -118,13 +118,14 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
         "--reading",
         metavar="NAME",
         help="how the paper's path planning is read: "
-        f"{', '.join(readings.PLANNERS)} (default: {readings.USUAL})",
+        f"{', '.join(readings.PLANNERS)} (default: {readings.DEFAULT_METHOD})",
     )
     parser.add_argument(
         "--planner",
         choices=[method.value for method in Method],
         help="who decides: Algorithm 1, or our planner that predicts, with its own step and swarm "
-        f"(default: {USUAL.value}; {Method.PAPER.value} with --algorithm, --reading or --swarm)",
+        f"(default: {DEFAULT_METHOD.value}; "
+        f"{Method.PAPER.value} with --algorithm, --reading or --swarm)",
     )
     parser.add_argument(
         "--swarm",
@@ -136,13 +137,13 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
 
 def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
     """The RunConfig that add_world_arguments' values describe; later ones override earlier."""
-    planner = readings.planner(found.reading or readings.USUAL)
+    planner = readings.planner(found.reading or readings.DEFAULT_METHOD)
     if found.swarm:
         planner = replace(planner, bat=readings.swarm(found.swarm))
     if found.algorithm:
         planner = override(planner, {"bat.algorithm": found.algorithm})
     algorithm_1 = any((found.algorithm, found.reading, found.swarm))
-    planner = named(found.planner, planner, algorithm_1=algorithm_1)
+    planner = params_for_method(found.planner, planner, algorithm_1=algorithm_1)
     scenario = load_scenario(found.scenario)
     robot, others = with_robot_settings(scenario.robot, found.settings)
     planner, sensor = with_settings(planner, SensorParams(), others)
@@ -155,7 +156,7 @@ def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
     )
 
 
-def _order(found: argparse.Namespace) -> Order:
+def _order(found: argparse.Namespace) -> RunRequest:
     driver = Driver(found.driver or _usual_driver(found.scenario))
     real_time = found.real_time or found.speed is not None
     if real_time and driver is Driver.CORE:
@@ -193,7 +194,7 @@ def _order(found: argparse.Namespace) -> Order:
         from ..report.rerun_viewer import require_viewer
 
         require_viewer()
-    return Order(
+    return RunRequest(
         config=config,
         view=found.view,
         out=found.out,

@@ -39,7 +39,7 @@ class RunDirectory:
 
 
 def _claim(wanted: Path | None) -> tuple[Path, list[Path]]:
-    for attempt in range(_ATTEMPTS):
+    for run in range(_ATTEMPTS):
         path = wanted if wanted is not None else new_run_directory()
         try:
             return path, make_directory(path)
@@ -47,6 +47,6 @@ def _claim(wanted: Path | None) -> tuple[Path, list[Path]]:
             # Another launcher was quicker: with the same new name, or with a parent.
             overtaken = isinstance(error.__cause__, FileExistsError)
             lost = wanted is not None and os.path.lexists(path)
-            if not overtaken or lost or attempt == _ATTEMPTS - 1:
+            if not overtaken or lost or run == _ATTEMPTS - 1:
                 raise
     raise AssertionError("unreachable")

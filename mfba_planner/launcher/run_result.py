@@ -12,13 +12,13 @@ from ..core.geometry import distance
 from ..evaluation.metrics import Result, evaluate
 from ..recording.omitted_decisions import tell
 from ..recording.read_episode import read_recording
-from ..recording.robot_topics import ALONE
+from ..recording.robot_topics import NO_NAMESPACE
 from ..simulation.episode import Episode, Outcome
-from .run import Attempt
+from .run import Run
 
 
 @dataclass(frozen=True, slots=True)
-class Conclusion:
+class RunResult:
     """A run that was made, whatever came of it."""
 
     directory: Path
@@ -45,31 +45,34 @@ def why_no_success(episode: Episode, result: Result) -> str:
     return f"no success: {', '.join(faults)}; see the picture, or try another --seed"
 
 
-def conclude(attempt: Attempt, episode: Episode | None, failure: str = "") -> Conclusion:
+def finish_run(run: Run, episode: Episode | None, failure: str = "") -> RunResult:
     """Print the table, write result.json and run.png; the episode comes from the bag if None.
 
     Raises BagError where the bag holds no decision or was not closed.
     """
     from ..report.result_json import result_to_dict, write_result
 
-    directory = attempt.directory
+    directory = run.directory
     left_out = ""
     if episode is None:
         recording = read_recording(directory.bag)
         tell(directory.bag, recording.missed)
-        episode, left_out = recording.episodes[ALONE], recording.missed.get(ALONE, "")
+        episode, left_out = (
+            recording.episodes[NO_NAMESPACE],
+            recording.missed.get(NO_NAMESPACE, ""),
+        )
     result = evaluate(episode)
-    speed = result.ticks / attempt.wall_s if attempt.wall_s else None
-    extra = {"wall_s": attempt.wall_s, "ticks_per_s": speed, "failure": failure or None}
+    speed = result.ticks / run.wall_s if run.wall_s else None
+    extra = {"wall_s": run.wall_s, "ticks_per_s": speed, "failure": failure or None}
     extra |= {"left_out": left_out} if left_out else {}
     write_result(directory.result, result_to_dict(episode, extra))
-    if attempt.order.picture:
+    if run.request.picture:
         from ..report.run_figure import draw_run
 
         draw_run(episode, directory.picture)
     show(episode, result, speed)
     print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
-    return Conclusion(directory.path, episode, result)
+    return RunResult(directory.path, episode, result)
 
 
 def show(episode: Episode, result: Result, ticks_per_s: float | None = None) -> None:

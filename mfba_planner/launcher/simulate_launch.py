@@ -10,7 +10,7 @@ from typing import Any
 from ..core.errors import ConfigError
 from ..core.options import override
 from ..paper import readings
-from ..planning.planner_factory import USUAL, named
+from ..planning.planner_factory import DEFAULT_METHOD, params_for_method
 from ..planning.planner_params import Method
 from ..scenarios.run_config import (
     NODES,
@@ -41,12 +41,14 @@ ARGUMENTS = {
     "seed": Argument("0", "seed of all randomness"),
     "planner": Argument(
         "",
-        f"who decides; empty: {USUAL.value}, or {Method.PAPER.value} for another algorithm or "
-        "reading than the usual ones",
+        f"who decides; empty: {DEFAULT_METHOD.value}, or {Method.PAPER.value} for another "
+        "algorithm or reading than the usual ones",
         ("", *(method.value for method in Method)),
     ),
     "algorithm": Argument(_MFBA, "law of beta in eq. 4", tuple(a.value for a in Algorithm)),
-    "reading": Argument(readings.USUAL, "how section 6.2 is read", tuple(readings.PLANNERS)),
+    "reading": Argument(
+        readings.DEFAULT_METHOD, "how section 6.2 is read", tuple(readings.PLANNERS)
+    ),
     "real_time": Argument(
         "true", "tick on a wall timer; false: as fast as it goes", _TRUE_OR_FALSE
     ),
@@ -57,13 +59,13 @@ ARGUMENTS = {
 }
 
 
-def told_by_launch(given: Mapping[str, str]) -> Parameters:
+def launch_parameters(given: Mapping[str, str]) -> Parameters:
     """Every node's parameters, the recorder's first if there is one; ConfigError if refused."""
     planner = override(readings.planner(given["reading"]), {"bat.algorithm": given["algorithm"]})
-    algorithm_1 = (given["algorithm"], given["reading"]) != (_MFBA, readings.USUAL)
+    algorithm_1 = (given["algorithm"], given["reading"]) != (_MFBA, readings.DEFAULT_METHOD)
     config = RunConfig(
         scenario=load_scenario(given["scenario"]),
-        planner=named(given["planner"] or None, planner, algorithm_1=algorithm_1),
+        planner=params_for_method(given["planner"] or None, planner, algorithm_1=algorithm_1),
         seed=_number("seed", given["seed"], int),
         real_time=given["real_time"] == "true",
         speed_factor=_number("speed_factor", given["speed_factor"], float),

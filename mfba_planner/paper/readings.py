@@ -12,7 +12,7 @@ from ..swarm.bat_swarm import BatParams, Bounds, Epsilon, Initial, Schedule, Ste
 
 T = TypeVar("T")
 
-USUAL = "section6"  # of the path planning
+DEFAULT_METHOD = "section6"  # of the path planning
 
 # The paper says what the swarm does in words; `robust` is the core's default.
 SWARMS: dict[str, BatParams] = {

@@ -21,7 +21,7 @@ from ..simulation.run_episode import run
 from ..simulation.scenario import Scenario
 from ..swarm.bat_swarm import Algorithm
 from . import published, readings
-from .study.chunk import Chunk, Trips, chunks
+from .study.chunk import SampleChunk, Trips, chunks
 from .study.run import Sample
 
 CASES = tuple(published.TRIP_TABLES)
@@ -161,7 +161,7 @@ def turned(scenario: Scenario, angle_rad: float) -> Scenario:
     return replace(scenario, goal_m=moved(scenario.goal_m), obstacles=obstacles)
 
 
-def plan(scenarios: Mapping[str, Scenario], quick: bool, first: int = 0) -> list[Chunk]:
+def plan(scenarios: Mapping[str, Scenario], quick: bool, first: int = 0) -> list[SampleChunk]:
     """What is to be run from seed first on; scenarios are those of CASES."""
     found = []
     seeds = QUICK_SEEDS if quick else SEEDS

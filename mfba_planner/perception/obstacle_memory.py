@@ -15,10 +15,10 @@ _SAME = 0.25  # of a radius: a circle seen this near to a remembered one is the 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MemoryParams:
+class ObstacleMemoryParams:
     """How long what is out of sight is believed to move on as it did."""
 
-    way_m: float = option(
+    path_m: float = option(
         0.6, "way after which a circle out of sight is given up", unit="m", minimum=0.0,
         maximum=1000.0,
     )  # fmt: skip
@@ -32,16 +32,16 @@ class MemoryParams:
         check(self)
 
 
-class Memory:
+class ObstacleMemory:
     """What was seen and is out of sight; nothing is in it that no look ever showed.
 
     A remembered circle that ought to be in sight is dropped, whether or not it is seen: the
     present look knows better.
     """
 
-    def __init__(self, params: MemoryParams | None = None) -> None:
+    def __init__(self, params: ObstacleMemoryParams | None = None) -> None:
         """Start empty."""
-        self.params = params or MemoryParams()
+        self.params = params or ObstacleMemoryParams()
         self._circles: list[tuple[Circle, float]] = []  # and since when they are out of sight, s
         self._stamp_ns: int | None = None
 
@@ -76,4 +76,4 @@ class Memory:
     def _given_up(self, circle: Circle, age_s: float) -> bool:
         """Whether a circle has been out of sight for too long."""
         p, (vx, vy) = self.params, circle.velocity_mps
-        return age_s > p.longest_s or age_s * math.sqrt(vx * vx + vy * vy) > p.way_m
+        return age_s > p.longest_s or age_s * math.sqrt(vx * vx + vy * vy) > p.path_m

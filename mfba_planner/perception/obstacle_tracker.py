@@ -29,7 +29,7 @@ class TrackingParams:
         0.2, "deviation of a new obstacle's velocity, per axis", unit="m/s", minimum=1e-3,
         maximum=100.0,
     )  # fmt: skip
-    place_sd_m: float = option(
+    position_sd_m: float = option(
         0.1, "deviation of a new obstacle's centre", unit="m", minimum=1e-3, maximum=10.0
     )
     range_sd_m: float = option(0.01, "noise of a range", unit="m", minimum=1e-4, maximum=10.0)
@@ -45,10 +45,10 @@ class TrackingParams:
     widest_m: float = option(
         1.3, "width beyond which a shape is no circle", unit="m", minimum=0.01, maximum=100.0
     )
-    caution: float = option(
+    position_sd_factor: float = option(
         0.5, "deviations of the centre by which a circle is enlarged", minimum=0.0, maximum=10.0
     )
-    caution_s: float = option(
+    speed_sd_factor_s: float = option(
         0.1, "time for which a velocity's deviation enlarges it", unit="s", minimum=0.0,
         maximum=10.0,
     )  # fmt: skip
@@ -98,7 +98,7 @@ class Track:
             P[k][k] += q * dt * dt / 3.0
             P[k + 2][k + 2] += q
 
-    def doubt(self) -> tuple[float, float]:
+    def uncertainty(self) -> tuple[float, float]:
         """Deviations of the centre (m) and of the velocity (m/s), the mean of the axes."""
         P = self.covariance
         return math.sqrt(0.5 * (P[0][0] + P[1][1])), math.sqrt(0.5 * (P[2][2] + P[3][3]))
@@ -184,12 +184,14 @@ class Tracker:
         p, found = self.params, []
         for track in self.tracks:
             x, y, vx, vy, r = track.state
-            place, speed = track.doubt()
-            doubt = p.allowance_m + p.caution * place + p.caution_s * speed
+            place, speed = track.uncertainty()
+            uncertainty = (
+                p.allowance_m + p.position_sd_factor * place + p.speed_sd_factor_s * speed
+            )
             found.append(
                 Circle(
                     center_m=(x + vx * ahead_s, y + vy * ahead_s),
-                    radius_m=r + robot_radius_m + min(doubt, _DOUBT_M),
+                    radius_m=r + robot_radius_m + min(uncertainty, _DOUBT_M),
                     velocity_mps=(vx, vy),
                 )
             )
@@ -271,7 +273,7 @@ class Tracker:
             away = math.sqrt(ux * ux + uy * uy) or 1e-9
             mx, my = middle.tolist()
             r = p.radius_m
-            place, speed = p.place_sd_m, p.speed_sd_mps
+            place, speed = p.position_sd_m, p.speed_sd_mps
             track = Track(
                 [mx + ux / away * r, my + uy / away * r, 0.0, 0.0, r],
                 [place, place, speed, speed, p.radius_sd_m],

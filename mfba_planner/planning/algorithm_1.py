@@ -14,10 +14,10 @@ from ..perception.sensory_vector import sensory_vector
 from ..swarm.bat_swarm import BatSwarm, Disc, Vector
 from .gap_vector import gap_heading, gap_vector, nearest_free_gap
 from .mode_transitions import Event, transition
-from .odometry_jump import JumpWatch, explained
-from .path_generation import Start, Step, fresh_step, fresh_steps
+from .odometry_jump import OdometryJump, with_jump_reason
+from .path_generation import Start, Step, generate_step, generate_steps
 from .planner_params import PlannerParams, Swarm
-from .stop_conditions import reason_to_stand
+from .stop_conditions import reason_to_stop
 
 FEW = 8  # bats of so few planners are no quicker at once
 
@@ -70,7 +70,7 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
 
 def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tuple[Event, str, int]:
     """Reduce an observation to one event, its reason and the chosen gap (0 when none)."""
-    standing = reason_to_stand(obs, params)
+    standing = reason_to_stop(obs, params)
     if standing:
         return *standing, 0
     assert obs.goal is not None
@@ -84,7 +84,7 @@ def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tupl
     return Event.OBSTACLE, f"sectors {sensed} set: gap {gap} is nearest to the goal", gap
 
 
-class Planner:
+class Algorithm1:
     """Algorithm 1 with its memory: the mode, and the swarm where a reading keeps one.
 
     The random stream of a decision depends on (seed, stamp) only, so a planner that is
@@ -101,8 +101,8 @@ class Planner:
         self._goal: Point | None = None
         self._swarm: BatSwarm | None = None
         self._stamp_ns = 0
-        self._watch = JumpWatch()
-        self._foreseen: tuple[tuple[Start, PlannerParams], Step] | None = None
+        self._watch = OdometryJump()
+        self._generated_step: tuple[tuple[Start, PlannerParams], Step] | None = None
 
     def reset(self) -> None:
         """Forget everything but parameters and seed (a jump of time, a new trip)."""
@@ -110,7 +110,7 @@ class Planner:
 
     def plan(self, obs: Observation) -> Decision:
         """Answer one observation and remember the mode; who was carried off begins anew."""
-        carried = self._watch.noticed(obs, self.params, self.mode)
+        carried = self._watch.detect(obs, self.params, self.mode)
         if carried:
             self.reset()
         if obs.goal != self._goal:
@@ -119,17 +119,17 @@ class Planner:
         self._stamp_ns = obs.stamp_ns
         decision = decide(obs, self.mode, self.params, self._generate)
         self.mode = decision.mode
-        return explained(decision, carried)
+        return with_jump_reason(decision, carried)
 
     def _generate(self, position: Point, goal: Point) -> Step:
         params = self.params
         if params.swarm is Swarm.PERSISTENT:
-            return self._fly_on(position, goal)
+            return self._continue_swarm(position, goal)
         start = Start(position, goal, self.seed, self._stamp_ns)
-        foreseen, self._foreseen = self._foreseen, None
+        foreseen, self._generated_step = self._generated_step, None
         if foreseen is not None and foreseen[0] == (start, params):
             return foreseen[1]
-        return fresh_step(start, params.step_length_m, params.bat)
+        return generate_step(start, params.step_length_m, params.bat)
 
     def start(self, obs: Observation) -> Start | None:
         """What fresh_step() will be asked for by plan(), None where it will not be."""
@@ -139,11 +139,11 @@ class Planner:
             return None
         return Start(obs.pose.position, obs.goal, self.seed, obs.stamp_ns)
 
-    def foresee(self, start: Start, params: PlannerParams, step: Step) -> None:
+    def accept_generated_step(self, start: Start, params: PlannerParams, step: Step) -> None:
         """Take what fresh_steps() found; plan() uses it if it is just what it would ask for."""
-        self._foreseen = (start, params), step
+        self._generated_step = (start, params), step
 
-    def _fly_on(self, position: Point, goal: Point) -> Step:
+    def _continue_swarm(self, position: Point, goal: Point) -> Step:
         """Fig. 1 read literally: bat.iterations per robot step, within the robot's reach.
 
         The bats stay where they are in the world, but are drawn into the disc of one step
@@ -163,14 +163,16 @@ class Planner:
             rng = stream(self.seed, self._stamp_ns)
             self._swarm = BatSwarm(bat, disc, rng, horizon)
         else:
-            self._swarm.resettle(disc, cost)
+            self._swarm.change_region(disc, cost)
         for _ in range(bat.iterations):
             self._swarm.tell([cost(x) for x in self._swarm.ask()])
         x, y = disc.clamp(self._swarm.best_x)
         return (x, y), tuple((px, py) for px, py in self._swarm.candidates)
 
 
-def fly_together(planners: Sequence[Planner], observations: Sequence[Observation]) -> None:
+def generate_paths_together(
+    planners: Sequence[Algorithm1], observations: Sequence[Observation]
+) -> None:
     """Let the bats of all that are about to generate a path fly at once, before they plan().
 
     Their decisions stay the same to the last bit. Who has other params than the first flies
@@ -182,6 +184,6 @@ def fly_together(planners: Sequence[Planner], observations: Sequence[Observation
         return
     params = starting[0][0].params
     starts = [start for _, start in starting]
-    steps = fresh_steps(starts, params.step_length_m, params.bat)
+    steps = generate_steps(starts, params.step_length_m, params.bat)
     for (planner, start), step in zip(starting, steps):
-        planner.foresee(start, params, step)
+        planner.accept_generated_step(start, params, step)

@@ -11,9 +11,9 @@ from ..core.geometry import Point
 from ..core.types import NANO, Bits, Decision, Mode, Observation
 from ..perception.sensory_vector import SensorParams
 from .mode_transitions import Event, transition
-from .odometry_jump import JumpWatch, explained
+from .odometry_jump import OdometryJump, with_jump_reason
 from .planner_params import PlannerParams
-from .stop_conditions import reason_to_stand
+from .stop_conditions import reason_to_stop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class Move:
     candidates: tuple[Point, ...] = ()
 
 
-class Steering:
+class BasePlanner:
     """A planner that moves by move() and stands still for the reasons the paper's does.
 
     Subclasses define move(), and where they remember anything forget(), which is called
@@ -51,7 +51,7 @@ class Steering:
         self.params = params
         self.sensor = sensor
         self.seed = seed
-        self._watch = JumpWatch()
+        self._watch = OdometryJump()
         self.tick_s = params.tick_ns * NANO
         self.reset()
 
@@ -70,13 +70,13 @@ class Steering:
 
     def plan(self, obs: Observation) -> Decision:
         """Answer one observation and remember the mode; who was carried off begins anew."""
-        carried = self._watch.noticed(obs, self.params, self.mode)
+        carried = self._watch.detect(obs, self.params, self.mode)
         if carried:
             self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
             self._goal = obs.goal
-        standing = reason_to_stand(obs, self.params, sectors=False)
+        standing = reason_to_stop(obs, self.params, sectors=False)
         if standing is None and self.mode is not Mode.ARRIVED:
             assert obs.goal is not None
             move = self.move(obs, obs.goal)
@@ -86,7 +86,7 @@ class Steering:
                 reason = f"goal was reached before; {reason}"
             move = Move(velocity=(0.0, 0.0), reason=reason, event=event)
         self.mode = transition(self.mode, move.event)
-        return explained(self._decision(obs, move), carried)
+        return with_jump_reason(self._decision(obs, move), carried)
 
     def straight(self, position: Point, target: Point, speed_mps: float) -> Point:
         """The velocity that leads to the target at most at this speed, and not beyond it."""

@@ -13,14 +13,14 @@ from .planner_params import PlannerParams
 CARRIED_OFF = "carried off"
 
 
-class JumpWatch:
+class OdometryJump:
     """Compares each pose with the one before it."""
 
     def __init__(self) -> None:
         """Start before the first pose."""
         self._last: tuple[int, Pose2D] | None = None
 
-    def noticed(self, obs: Observation, params: PlannerParams, mode: Mode) -> str:
+    def detect(self, obs: Observation, params: PlannerParams, mode: Mode) -> str:
         """Why the robot cannot have driven here, "" where it can.
 
         Farther than its speed times the time since the last pose plus jump_m is too far. A pose
@@ -39,11 +39,11 @@ class JumpWatch:
         return f"{CARRIED_OFF} {moved_m:.3g} m in {took_s:.3g} s, beginning anew"
 
 
-def explained(decision: Decision, carried: str) -> Decision:
+def with_jump_reason(decision: Decision, carried: str) -> Decision:
     """The decision, its reason preceded by how the robot came where it is."""
     return replace(decision, reason=f"{carried}; {decision.reason}") if carried else decision
 
 
-def carried_off(reason: str) -> bool:
+def is_jump_reason(reason: str) -> bool:
     """Whether a decision's reason says that the robot was carried to where it is."""
     return reason.startswith(CARRIED_OFF)

@@ -26,7 +26,7 @@ class Start(NamedTuple):
     stamp_ns: int
 
 
-def fresh_step(start: Start, step_length_m: float, bat: BatParams) -> Step:
+def generate_step(start: Start, step_length_m: float, bat: BatParams) -> Step:
     """Next point by a fresh swarm in the disc of one step; the last step is cut to the goal.
 
     Objective: distance of the candidate to GP (eq. 1; eq. 2 is its reciprocal).
@@ -50,7 +50,7 @@ def fresh_step(start: Start, step_length_m: float, bat: BatParams) -> Step:
     return (px + bx, py + by), tuple([(px + x, py + y) for x, y in swarm.candidates])
 
 
-def fresh_steps(starts: Sequence[Start], step_length_m: float, bat: BatParams) -> list[Step]:
+def generate_steps(starts: Sequence[Start], step_length_m: float, bat: BatParams) -> list[Step]:
     """fresh_step() of each start, to the last bit, all bats flown at once."""
     found: list[Step] = [(start.goal, ()) for start in starts]
     away = {i: s for i, s in enumerate(starts) if distance(s.position, s.goal) > step_length_m}

@@ -7,17 +7,21 @@ from dataclasses import replace
 
 from ..perception.sensory_vector import SensorParams
 from .planner_params import Method, PlannerParams
-from .supervised_planner import Guarded, algorithm_1
+from .supervised_planner import SupervisedPlanner, supervised_algorithm_1
 
-USUAL = Method.PREDICTIVE  # of the programs and launch files: the robot that does not collide
+DEFAULT_METHOD = (
+    Method.PREDICTIVE
+)  # of the programs and launch files: the robot that does not collide
 
 
-def named(method: str | None, params: PlannerParams, *, algorithm_1: bool) -> PlannerParams:
+def params_for_method(
+    method: str | None, params: PlannerParams, *, algorithm_1: bool
+) -> PlannerParams:
     """The given options for the method of that name, with the step and swarm it is made for.
 
     None: USUAL; or the paper's, where something was said that is about Algorithm 1 alone.
     """
-    usual = Method.PAPER if algorithm_1 else USUAL
+    usual = Method.PAPER if algorithm_1 else DEFAULT_METHOD
     if Method(method or usual) is Method.PAPER:
         return params
     from .predictive import preset
@@ -25,10 +29,12 @@ def named(method: str | None, params: PlannerParams, *, algorithm_1: bool) -> Pl
     return preset(replace(params, method=Method.PREDICTIVE))
 
 
-def brain(params: PlannerParams, sensor: SensorParams | None = None, seed: int = 0) -> Guarded:
+def make_planner(
+    params: PlannerParams, sensor: SensorParams | None = None, seed: int = 0
+) -> SupervisedPlanner:
     """A fresh planner of params.method. Raises ConfigError for a negative seed."""
     if params.method is Method.PREDICTIVE:
         from .predictive import Predictive  # much to load, and mostly not asked for
 
-        return Guarded(Predictive(params, sensor or SensorParams(), seed))
-    return algorithm_1(params, seed)
+        return SupervisedPlanner(Predictive(params, sensor or SensorParams(), seed))
+    return supervised_algorithm_1(params, seed)

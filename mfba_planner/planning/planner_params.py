@@ -11,7 +11,7 @@ from ..core.types import NANO
 from ..swarm.bat_swarm import BatParams
 from .gap_vector import GapHeading
 from .recovery import RecoveryParams
-from .speed_limit import CautionParams
+from .speed_limit import SpeedLimitParams
 
 
 class Method(Enum):
@@ -60,7 +60,7 @@ class PlannerParams:
     gap_heading: GapHeading = option(GapHeading.BOUNDARY, "where a gap leads, in its two sectors")
     swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
     bat: BatParams = field(default_factory=BatParams)
-    caution: CautionParams = field(default_factory=CautionParams)
+    speed_limit: SpeedLimitParams = field(default_factory=SpeedLimitParams)
     recovery: RecoveryParams = field(default_factory=RecoveryParams)
 
     def __post_init__(self) -> None:

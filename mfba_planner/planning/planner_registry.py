@@ -11,7 +11,7 @@ from ..core.options import did_you_mean
 from ..core.types import PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..swarm.bat_swarm import Algorithm
-from .algorithm_1 import Planner
+from .algorithm_1 import Algorithm1
 from .peers.apf import PotentialField
 from .peers.dwa import DynamicWindow
 from .peers.orca import Orca
@@ -24,12 +24,12 @@ Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]
 
 
 def _paper(params: PlannerParams, _: SensorParams, seed: int) -> PathPlanner:
-    return Planner(params, seed)
+    return Algorithm1(params, seed)
 
 
 def _with(algorithm: Algorithm) -> Factory:
     def planner(params: PlannerParams, _: SensorParams, seed: int) -> PathPlanner:
-        return Planner(replace(params, bat=replace(params.bat, algorithm=algorithm)), seed)
+        return Algorithm1(replace(params, bat=replace(params.bat, algorithm=algorithm)), seed)
 
     return planner
 

@@ -13,15 +13,15 @@ from ..core.geometry import Point, distance
 from ..core.options import check, option
 from ..core.random_streams import stream
 from ..core.types import NANO, ROBOT_RADIUS_M, Bits, Circle, Observation
-from ..perception.obstacle_memory import Memory, MemoryParams
+from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
 from ..perception.sensory_vector import SensorParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
-from .base_planner import Move, Steering
+from .base_planner import BasePlanner, Move
 from .mode_transitions import Event
 from .planner_params import PlannerParams
-from .trajectory_cost import Prediction, RiskParams, Way, from_sectors, moved
+from .trajectory_cost import RiskParams, TrajectoryCost, Way, from_sectors, moved
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # of a gap's waypoints, in reaches
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
@@ -50,7 +50,7 @@ class PredictiveParams:
     sector_radius_m: float = option(
         0.3, "radius of what stands for a set sector", unit="m", minimum=0.01, maximum=10.0
     )
-    memory: MemoryParams = field(default_factory=MemoryParams)
+    memory: ObstacleMemoryParams = field(default_factory=ObstacleMemoryParams)
     tracking: TrackingParams = field(default_factory=TrackingParams)
     risk: RiskParams = field(default_factory=RiskParams)
 
@@ -70,7 +70,7 @@ def preset(params: PlannerParams | None = None) -> PlannerParams:
     return replace(params, step_length_m=0.08, bat=bat)
 
 
-class Predictive(Steering):
+class Predictive(BasePlanner):
     """Straight while that is free; else the best of the nearest gaps, refined by bats.
 
     A heading's bit is set when it leads too close to a circle within tau at full speed. The
@@ -102,7 +102,7 @@ class Predictive(Steering):
             for c, s in zip(self._cos.tolist(), self._sin.tolist())
         ]
         self._waypoint: Point | None = None
-        self._memory = Memory(self.options.memory)
+        self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
         super().__init__(params, sensor, seed)
 
@@ -117,7 +117,7 @@ class Predictive(Steering):
         tick_s = self.tick_s
         (x, y), (gx, gy) = here, goal
         to_goal, left = (gx - x, gy - y), distance(here, goal)
-        world = Prediction(here, circles, self.options.risk, tick_s, speed)
+        world = TrajectoryCost(here, circles, self.options.risk, tick_s, speed)
         share = min(1.0, speed * tick_s / left)
         ahead, t_ahead = (to_goal[0] * share, to_goal[1] * share), share * left / speed
         direct = world.cost(ahead, t_ahead, to_goal, speed)
@@ -162,7 +162,7 @@ class Predictive(Steering):
     def forget(self) -> None:
         """Drop the last waypoint, all tracks and all that is out of sight."""
         self._waypoint = None
-        self._memory = Memory(self.options.memory)
+        self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
@@ -213,7 +213,7 @@ class Predictive(Steering):
         return ways
 
     def _fly(
-        self, world: Prediction, center: Point, to_goal: Point, bound: float, stamp_ns: int
+        self, world: TrajectoryCost, center: Point, to_goal: Point, bound: float, stamp_ns: int
     ) -> BatSwarm:
         """Bats around the best waypoint so far; what cannot be below the bound is not weighed."""
         bat, speed, tick_s = self.params.bat, self.params.speed_mps, self.tick_s

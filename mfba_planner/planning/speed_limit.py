@@ -11,7 +11,7 @@ from ..core.types import Ranges
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CautionParams:
+class SpeedLimitParams:
     """When to slow down; off by default, as the paper's robot has one speed."""
 
     slow_within_m: float = option(
@@ -30,7 +30,7 @@ class CautionParams:
         check(self)
 
 
-def allowed_share(ranges_m: Ranges, params: CautionParams) -> float:
+def allowed_speed_share(ranges_m: Ranges, params: SpeedLimitParams) -> float:
     """Share of the full speed allowed at the clearance of these sectors, in [0, 1].
 
     clearance / slow_within_m, not below least_share; the clearance is the least range, which is

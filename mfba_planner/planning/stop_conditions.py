@@ -11,7 +11,7 @@ from .mode_transitions import Event
 from .planner_params import PlannerParams
 
 
-def reason_to_stand(
+def reason_to_stop(
     obs: Observation, params: PlannerParams, *, sectors: bool = True
 ) -> tuple[Event, str] | None:
     """What keeps any planner from moving, with its reason; sectors=False: it reads none."""

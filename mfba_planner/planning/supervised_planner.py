@@ -9,11 +9,11 @@ from typing import Protocol
 from ..core.errors import ConfigError
 from ..core.geometry import Point, bearing, distance, towards
 from ..core.types import NANO, Decision, Mode, Observation, PathPlanner
-from .algorithm_1 import Planner
-from .odometry_jump import carried_off
+from .algorithm_1 import Algorithm1
+from .odometry_jump import is_jump_reason
 from .planner_params import Method, PlannerParams
 from .recovery import Phase, Recovery, advance, most_room
-from .speed_limit import allowed_share
+from .speed_limit import allowed_speed_share
 
 TRAIL_M = 0.05  # so far back is where the robot came from
 _STANDING = (Mode.IDLE, Mode.ARRIVED)
@@ -29,11 +29,11 @@ class Resettable(PathPlanner, Protocol):
         ...
 
 
-class Guarded:
+class SupervisedPlanner:
     """A planner whose decisions are passed on unchanged unless an option says otherwise.
 
     With recovery.enabled, BLOCKED decisions lead through planning.recovery's phases; with
-    caution.slow_within_m, every move is shortened near obstacles. It knows nothing but the
+    speed_limit.slow_within_m, every move is shortened near obstacles. It knows nothing but the
     observations: a recording decides again what was decided.
     """
 
@@ -70,7 +70,7 @@ class Guarded:
     def plan(self, obs: Observation) -> Decision:
         """Answer one observation."""
         decision = self.inner.plan(obs)
-        if obs.goal != self._goal or carried_off(decision.reason):
+        if obs.goal != self._goal or is_jump_reason(decision.reason):
             self._forget()
             self._goal = obs.goal
         if self.params.recovery.enabled:
@@ -129,13 +129,13 @@ class Guarded:
         )
 
 
-def algorithm_1(params: PlannerParams, seed: int) -> Guarded:
+def supervised_algorithm_1(params: PlannerParams, seed: int) -> SupervisedPlanner:
     """The paper's planner. Raises ConfigError where params name another one, or for the seed."""
     if params.method is not Method.PAPER:
         raise ConfigError(
             f"method={params.method.value}: not the core's own; use planning.planner_factory"
         )
-    return Guarded(Planner(params, seed))
+    return SupervisedPlanner(Algorithm1(params, seed))
 
 
 def _standing(decision: Decision, reason: str) -> Decision:
@@ -152,7 +152,7 @@ def _standing(decision: Decision, reason: str) -> Decision:
 
 def _slowed(decision: Decision, params: PlannerParams) -> Decision:
     """The same move, shortened to what the clearance allows."""
-    share = allowed_share(decision.ranges_m, params.caution)
+    share = allowed_speed_share(decision.ranges_m, params.speed_limit)
     if share == 1.0 or decision.velocity == (0.0, 0.0):
         return decision
     (x, y), (wx, wy), (vx, vy) = decision.pose.position, decision.waypoint, decision.velocity

@@ -52,7 +52,7 @@ class RiskParams:
         check(self)
 
 
-class Prediction:
+class TrajectoryCost:
     """Circles around one position, each moving on as it does now.
 
     A circle that turns is noticed a tick later: hence margins that grow with its speed. Plain

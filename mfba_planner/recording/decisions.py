@@ -12,28 +12,28 @@ from ..core.types import Decision, Ranges
 from .bag_reader import BagReader, DecodedMessage
 from .messages import decision, sector_ranges, stamp_ns
 from .omitted_decisions import left_out
-from .robot_topics import ALONE, below, heard_by_robot, of_robot
+from .robot_topics import NO_NAMESPACE, below, messages_by_robot, of_robot
 
 SECTORS, DECISION = "/sectors", "/planner/decision"
 REMEMBERED = 10_000  # of sectors without a decision, of decisions without sectors, of stamps
 
 
-class Answer(NamedTuple):
+class RecordedDecision(NamedTuple):
     """A decision, the sectors message it answers, and who decided."""
 
     decision: Decision
     sectors: Any
-    robot: str = ALONE
+    robot: str = NO_NAMESPACE
 
 
-def deciders(reader: BagReader) -> list[str]:
+def robots_with_decisions(reader: BagReader) -> list[str]:
     """The robots whose decisions are in a bag, as its topics have them; ALONE where none is."""
     found = [name for name in reader.topics if name.endswith(DECISION)]
     names = [name.removesuffix(DECISION).lstrip("/") for name in found]
-    return [ALONE] if ALONE in names else names or [ALONE]
+    return [NO_NAMESPACE] if NO_NAMESPACE in names else names or [NO_NAMESPACE]
 
 
-def require_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> None:
+def require_decisions(reader: BagReader, robots: Sequence[str] = (NO_NAMESPACE,)) -> None:
     """Raise BagError for a bag that holds none of one of these robots."""
     for topic in (below(robot, topic) for robot in robots for topic in (SECTORS, DECISION)):
         if topic not in reader.topics or not reader.topics[topic].message_count:
@@ -42,7 +42,7 @@ def require_decisions(reader: BagReader, robots: Sequence[str] = (ALONE,)) -> No
 
 def stream_decisions(
     reader: BagReader, robots: Sequence[str], missed: dict[str, str]
-) -> Iterator[Answer]:
+) -> Iterator[RecordedDecision]:
     """Yield each robot's decisions in the order of the bag, one for each stamp, in one pass.
 
     The first counts: a later one on its stamp only says that its inputs have become stale. Those
@@ -52,11 +52,11 @@ def stream_decisions(
     """
     require_decisions(reader, robots)
     pairs = {robot: _Pairs() for robot in robots}
-    for robot, message in heard_by_robot(reader, robots, (SECTORS, DECISION)):
+    for robot, message in messages_by_robot(reader, robots, (SECTORS, DECISION)):
         pair = pairs[robot].take(message)
         if pair is not None:
             said, sectors = pair
-            yield Answer(_decision(reader, said, sectors), sectors, robot)
+            yield RecordedDecision(_decision(reader, said, sectors), sectors, robot)
         if len(pairs[robot].decisions) > REMEMBERED:
             raise _hole(reader, robot, next(iter(pairs[robot].decisions)))
     for robot, waiting in pairs.items():
@@ -106,7 +106,7 @@ class _Pairs:
 
 def rising_decisions(
     reader: BagReader, robots: Sequence[str], missed: dict[str, str]
-) -> Iterator[Answer]:
+) -> Iterator[RecordedDecision]:
     """stream_decisions; raises BagError where a robot's stamp goes back."""
     last_ns = dict.fromkeys(robots, -1)
     for answer in stream_decisions(reader, robots, missed):
@@ -120,7 +120,7 @@ def rising_decisions(
         yield answer
 
 
-def ranges_seen(sectors: Any) -> Ranges:
+def ranges_of(sectors: Any) -> Ranges:
     """What the planner made of a sectors message: nothing, where it refused it."""
     try:
         return sector_ranges(sectors)
@@ -130,6 +130,6 @@ def ranges_seen(sectors: Any) -> Ranges:
 
 def _decision(reader: BagReader, diagnostics: Any, sectors: Any) -> Decision:
     try:
-        return decision(diagnostics, ranges_seen(sectors))
+        return decision(diagnostics, ranges_of(sectors))
     except InputError as error:
         raise BagError(f"{reader.path}: {error}") from None

@@ -12,15 +12,15 @@ from typing import NamedTuple
 from ..core.errors import BagError, InputError
 from ..core.geometry import Pose2D
 from ..core.types import Decision
-from ..evaluation.metrics import Result, Tally, evaluate
+from ..evaluation.metrics import MetricsAccumulator, Result, evaluate
 from ..simulation.decision_digest import Digest, digest
 from ..simulation.episode import Episode
-from ..simulation.fleet import worlds_seen
+from ..simulation.fleet import scenarios_with_others
 from ..simulation.scenario import Scenario
 from .bag_reader import BagReader
 from .decisions import rising_decisions, stream_decisions
 from .messages import robot_pose, stamp_ns
-from .robot_topics import ALONE, below, chosen, heard_by_robot
+from .robot_topics import NO_NAMESPACE, below, chosen, messages_by_robot
 from .run_setup import read_setup, read_setups
 
 TRUTH = "/ground_truth"
@@ -61,7 +61,7 @@ def read_recording(
     if scenario.robots:
         poses = [e.truth or tuple(tick.pose for tick in e.ticks) for e in episodes.values()]
         tick_ns = next(iter(setups.values())).planner.tick_ns
-        worlds = dict(zip(names, worlds_seen(scenario, poses, tick_ns)))
+        worlds = dict(zip(names, scenarios_with_others(scenario, poses, tick_ns)))
         episodes = {name: replace(episodes[name], scenario=worlds[name]) for name in wanted}
     told = {name: missed[name] for name in episodes if name in missed}
     return Recording(scenario, seed, episodes, told)
@@ -71,7 +71,7 @@ def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
     """read_recording() of a bag of one robot; BagError for that of a fleet."""
     with BagReader(path, salvage=salvage) as reader:
         read_setup(reader)
-    return read_recording(path, salvage=salvage).episodes[ALONE]
+    return read_recording(path, salvage=salvage).episodes[NO_NAMESPACE]
 
 
 class Summary(NamedTuple):
@@ -92,17 +92,17 @@ def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
     Streams; raises as read_episode does, and where the stamp of a decision goes back.
     """
     with BagReader(path, salvage=salvage) as reader:
-        setup, truth = read_setup(reader), _read_truth(reader, [ALONE])[ALONE]
+        setup, truth = read_setup(reader), _read_truth(reader, [NO_NAMESPACE])[NO_NAMESPACE]
         missed: dict[str, str] = {}
-        stream = (found.decision for found in rising_decisions(reader, [ALONE], missed))
+        stream = (found.decision for found in rising_decisions(reader, [NO_NAMESPACE], missed))
         first = next(stream)  # or it raises
-        tally, hashed = Tally(setup.episode((first,))), Digest()
+        tally, hashed = MetricsAccumulator(setup.episode((first,))), Digest()
         for tick in chain([first], stream):
             tally.add(tick, truth.get(tick.stamp_ns))
             hashed.add(tick)
     episode = setup.episode((tick,), truth)
     result = tally.result(episode.outcome)
-    return Summary(episode, result, hashed.hexdigest(), missed.get(ALONE, ""))
+    return Summary(episode, result, hashed.hexdigest(), missed.get(NO_NAMESPACE, ""))
 
 
 def summaries(
@@ -112,8 +112,8 @@ def summaries(
     with BagReader(path, salvage=salvage) as reader:
         names = list(read_setups(reader).by_robot)
         chosen(reader.path, names, robots)
-    if names == [ALONE]:
-        return {ALONE: summarize(path, salvage=salvage)}
+    if names == [NO_NAMESPACE]:
+        return {NO_NAMESPACE: summarize(path, salvage=salvage)}
     # What the others did is part of what happened to each, so all has to be read first.
     found = read_recording(path, robots, salvage=salvage)
     return {
@@ -127,7 +127,7 @@ def _read_truth(reader: BagReader, robots: Sequence[str]) -> dict[str, dict[int,
     found: dict[str, dict[int, Pose2D]] = {robot: {} for robot in robots}
     if not any(below(robot, TRUTH) in reader.topics for robot in robots):
         return found
-    for robot, message in heard_by_robot(reader, robots, [TRUTH]):
+    for robot, message in messages_by_robot(reader, robots, [TRUTH]):
         odom = message.message
         try:
             found[robot][stamp_ns(odom.header.stamp)] = robot_pose(odom)

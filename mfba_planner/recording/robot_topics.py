@@ -14,7 +14,7 @@ from ..core.errors import BagError
 from ..core.options import did_you_mean
 from .bag_reader import BagReader, DecodedMessage
 
-ALONE = ""
+NO_NAMESPACE = ""
 
 
 def below(robot: str, topic: str) -> str:
@@ -22,7 +22,7 @@ def below(robot: str, topic: str) -> str:
     return f"/{robot}{topic}" if robot else topic
 
 
-def heard_by_robot(
+def messages_by_robot(
     reader: BagReader, robots: Sequence[str], topics: Collection[str]
 ) -> Iterator[tuple[str, DecodedMessage]]:
     """Yield (robot, message under its topic's name at the root) in one pass, by log time."""
@@ -35,7 +35,7 @@ def heard_by_robot(
 def chosen(path: Path, robots: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
     """The wanted ones of a bag's robots, all where none is named. BagError for one not there."""
     for name in wanted:
-        if ALONE in robots:
+        if NO_NAMESPACE in robots:
             raise BagError(f"{path}: holds one robot's run, and no {name}; leave out --robot")
         if name not in robots:
             raise BagError(f"{path}: holds no robot {name}; {did_you_mean(name, list(robots))}")

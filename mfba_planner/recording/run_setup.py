@@ -14,17 +14,17 @@ from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..scenarios.scenario_files import load_scenario
 from ..simulation.episode import Episode, Outcome
-from ..simulation.fleet import worlds_seen
+from ..simulation.fleet import scenarios_with_others
 from ..simulation.scenario import Scenario
 from ..simulation.world import World
 from .bag_reader import BagReader
 from .configuration import read_configuration
-from .robot_topics import ALONE
+from .robot_topics import NO_NAMESPACE
 
 T = TypeVar("T")
 
 # Options younger than the oldest bags: what they default to is what was done then.
-LATER = ("method", "jump_m", "scan_radius_m", "caution.", "recovery.")
+LATER = ("method", "jump_m", "scan_radius_m", "speed_limit.", "recovery.")
 
 
 class Setup(NamedTuple):
@@ -72,9 +72,9 @@ def read_setups(reader: BagReader) -> Setups:
         scenario = load_scenario(world["scenario_json"])
         names = scenario.robot_names
         starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
-        worlds = worlds_seen(scenario, starts, world["tick_ns"]) if names else [scenario]
+        worlds = scenarios_with_others(scenario, starts, world["tick_ns"]) if names else [scenario]
         found = {}
-        for name, seen in zip(names or (ALONE,), worlds):
+        for name, seen in zip(names or (NO_NAMESPACE,), worlds):
             above = f"{name}/" if name else ""
             planner, sensor = (nodes[above + node] for node in ("planner", "virtual_sensor"))
             found[name] = Setup(
@@ -87,7 +87,7 @@ def read_setups(reader: BagReader) -> Setups:
                 odom_frame=planner.get("odom_frame", ""),
                 scan_frame=sensor.get("scan_frame", ""),
             )
-        alone = found.get(ALONE)
+        alone = found.get(NO_NAMESPACE)
         return Setups(scenario, alone.seed if alone else world["seed"], found)
     except (ConfigError, InputError) as error:
         raise BagError(f"{reader.path}: {error}") from None
@@ -100,12 +100,12 @@ def read_setups(reader: BagReader) -> Setups:
 def read_setup(reader: BagReader) -> Setup:
     """read_setups() of a robot that is alone; BagError for a fleet's bag."""
     found = read_setups(reader).by_robot
-    if ALONE not in found:
+    if NO_NAMESPACE not in found:
         raise BagError(
             f"{reader.path}: holds {len(found)} robots, and a bag of one is read here; use "
             "mfba_planner.recording.read_episode.read_recording"
         )
-    return found[ALONE]
+    return found[NO_NAMESPACE]
 
 
 def _only(defaults: T, values: dict[str, Any]) -> T:

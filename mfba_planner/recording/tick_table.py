@@ -10,8 +10,8 @@ from typing import Any
 from ..core.types import NANO
 from ..perception.sensory_vector import bits_text
 from .bag_reader import BagReader
-from .decisions import Answer, rising_decisions
-from .robot_topics import ALONE
+from .decisions import RecordedDecision, rising_decisions
+from .robot_topics import NO_NAMESPACE
 
 Row = dict[str, Any]
 
@@ -50,11 +50,11 @@ def read_rows(reader: BagReader, robots: Sequence[str], missed: dict[str, str]) 
             yield _row(answer, first_ns)
 
 
-def _row(answer: Answer, first_ns: int) -> Row:
+def _row(answer: RecordedDecision, first_ns: int) -> Row:
     found = answer.decision
     goal = found.goal or (None, None)
     return {
-        **({} if answer.robot == ALONE else {"robot": answer.robot}),
+        **({} if answer.robot == NO_NAMESPACE else {"robot": answer.robot}),
         "stamp_ns": found.stamp_ns,
         "time_s": (found.stamp_ns - first_ns) * NANO,
         "mode": found.mode.value,

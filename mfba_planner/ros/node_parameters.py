@@ -77,7 +77,7 @@ class WorldSimSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rig:
+class RobotParameters:
     """The robot of world_sim's scenario, option by option: its parameters robot.*."""
 
     robot: Robot

@@ -19,7 +19,7 @@ from ..core.options import Scalar, check, flatten, option
 from ..core.types import NANO
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
-from ..simulation.fleet import seed_of, worlds_seen
+from ..simulation.fleet import robot_seed, scenarios_with_others
 from ..simulation.scenario import Scenario
 from .plain_data import scenario_to_json
 
@@ -124,9 +124,9 @@ def graph_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
         return node_parameters(config, peers)
     wholes = {"world_sim": node_parameters(config, peers)["world_sim"]}
     starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
-    worlds = worlds_seen(scenario, starts, config.planner.tick_ns)
+    worlds = scenarios_with_others(scenario, starts, config.planner.tick_ns)
     for number, (member, world) in enumerate(zip(scenario.robots, worlds)):
-        one = replace(config, scenario=world, seed=seed_of(config.seed, number))
+        one = replace(config, scenario=world, seed=robot_seed(config.seed, number))
         told = node_parameters(one, peers)
         wholes |= {f"{member.name}/{name}": told[name] for name in OF_ROBOT}
     return wholes

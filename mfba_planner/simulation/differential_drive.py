@@ -55,7 +55,7 @@ def brake(left: float, deceleration: float, held_s: float) -> float:
     return deceleration * (math.sqrt(held_s * held_s + 2.0 * left / deceleration) - held_s)
 
 
-def obey(
+def apply_command(
     pose: Pose2D, speeds: Speeds, told: Point, base: Base, tick_ns: int
 ) -> tuple[Pose2D, Speeds]:
     """The base after one tick: speeds follow within the limits, each subtick is an arc.

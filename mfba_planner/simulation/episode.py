@@ -33,12 +33,12 @@ class Episode:
     ticks: tuple[Decision, ...]
     outcome: Outcome
     truth: tuple[Pose2D, ...] = ()  # where the robot was at each tick; (): where it saw itself
-    brain: str = ""  # who decided, where that is not what planner's own options name
+    planner_name: str = ""  # who decided, where that is not what planner's own options name
 
     @property
     def label(self) -> str:
         """Who decided, for people."""
-        return self.brain or self.planner.label
+        return self.planner_name or self.planner.label
 
     def time_s(self, stamp_ns: int) -> float:
         """Time since the first tick in seconds, the t of the obstacles' motion."""

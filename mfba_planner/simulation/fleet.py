@@ -14,22 +14,22 @@ from ..core.geometry import Point, Pose2D, bearing, distance, towards
 from ..core.types import NANO, Decision, PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
-from ..planning.supervised_planner import algorithm_1
+from ..planning.supervised_planner import supervised_algorithm_1
 from .differential_drive import command
 from .episode import Episode, Outcome
 from .nearby_obstacles import Found
 from .obstacle_motion import Obstacle, Turn
-from .planner_observations import Look, look
+from .planner_observations import Observe, observe_sectors
 from .scenario import Scenario
 from .world import World
 
 FLEET_STREAM = 6  # spawn key of the robots' SeedSequence children; one number per purpose
 DRIFT_M = 1e-12  # by which a way of straight stretches may miss a pose
 
-MakeBrain = Callable[[int], PathPlanner]  # from a robot's seed
+MakePlanner = Callable[[int], PathPlanner]  # from a robot's seed
 
 
-def seed_of(seed: int, number: int) -> int:
+def robot_seed(seed: int, number: int) -> int:
     """The seed of a fleet's robot (from 0) for its planner and its instruments."""
     child = np.random.SeedSequence(seed, spawn_key=(FLEET_STREAM, number))
     return int(child.generate_state(1, np.uint64)[0] >> np.uint64(1))
@@ -47,12 +47,12 @@ def alone(scenario: Scenario, number: int) -> Scenario:
     )
 
 
-class Place(World):
+class RobotWorld(World):
     """The world as one robot of a fleet has it: the scenario's obstacles, then the others."""
 
     def __init__(self, fleet: Fleet, number: int, tolerance_m: float) -> None:
         """Put the robot at its start, at tick 0."""
-        seed = seed_of(fleet.seed, number)
+        seed = robot_seed(fleet.seed, number)
         super().__init__(alone(fleet.scenario, number), fleet.tick_ns, tolerance_m, seed)
         self.name = fleet.scenario.robots[number].name
         self.poses = [self.pose]  # one per tick of the fleet
@@ -61,9 +61,9 @@ class Place(World):
         self._own = len(self.scenario.obstacles)
 
     @property
-    def others(self) -> list[Place]:
+    def others(self) -> list[RobotWorld]:
         """The other robots' places, in the scenario's order."""
-        return [p for p in self._fleet.places if p is not self]
+        return [p for p in self._fleet.robot_worlds if p is not self]
 
     def near(self, reach_m: float, position: Point | None = None) -> Found:
         """As World.near(); all other robots are in it."""
@@ -108,23 +108,23 @@ class Fleet:
         self.scenario, self.tick_ns, self.seed = scenario, tick_ns, seed
         self.tick = 0
         count = len(scenario.robots)
-        self.places = [Place(self, number, goal_tolerance_m) for number in range(count)]
-        self.outcomes: list[Outcome | None] = [place.outcome() for place in self.places]
+        self.robot_worlds = [RobotWorld(self, number, goal_tolerance_m) for number in range(count)]
+        self.outcomes: list[Outcome | None] = [place.outcome() for place in self.robot_worlds]
 
     @property
-    def under_way(self) -> list[int]:
+    def running(self) -> list[int]:
         """Who has not ended yet, as numbers from 0."""
         return [number for number, outcome in enumerate(self.outcomes) if outcome is None]
 
     @property
-    def left_m(self) -> float:
+    def distance_to_goal_m(self) -> float:
         """How far the farthest robot is from its goal."""
-        return max(place.left_m for place in self.places)
+        return max(place.distance_to_goal_m for place in self.robot_worlds)
 
     def step(self, told: dict[int, Point]) -> None:
         """Move everybody who is under way and time on by one tick; told as for World.step()."""
-        going = self.under_way
-        for number, place in enumerate(self.places):
+        going = self.running
+        for number, place in enumerate(self.robot_worlds):
             if number in going:
                 place.step(told[number])
             else:
@@ -132,10 +132,10 @@ class Fleet:
             place.poses.append(place.pose)
         self.tick += 1
         for number in going:
-            self.outcomes[number] = self.places[number].outcome()
+            self.outcomes[number] = self.robot_worlds[number].outcome()
 
 
-def worlds_seen(
+def scenarios_with_others(
     scenario: Scenario, poses: Sequence[Sequence[Pose2D]], tick_ns: int
 ) -> list[Scenario]:
     """The scenario of each robot with all others as obstacles that went as they did.
@@ -193,8 +193,8 @@ def run_fleet(
     sensor: SensorParams | None = None,
     seed: int = 0,
     go_on: Callable[[Fleet], bool] = lambda _: True,
-    brain: MakeBrain | None = None,
-    look: Look = look,
+    path_planner: MakePlanner | None = None,
+    observe: Observe = observe_sectors,
 ) -> tuple[Episode, ...]:
     """run_episode.run for every robot of a scenario at once: an Episode each, in its order.
 
@@ -202,18 +202,20 @@ def run_fleet(
     the scenario's own, then the other robots as they went.
     """
     planner, sensor = planner or PlannerParams(), sensor or SensorParams()
-    make = brain or (lambda seed: algorithm_1(planner, seed))
+    make = path_planner or (lambda seed: supervised_algorithm_1(planner, seed))
     fleet = Fleet(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
-    brains = [make(place.seed) for place in fleet.places]
-    ticks: list[list[Decision]] = [[] for _ in brains]
+    path_planners = [make(place.seed) for place in fleet.robot_worlds]
+    ticks: list[list[Decision]] = [[] for _ in path_planners]
 
     def decide(numbers: Sequence[int]) -> dict[int, Point]:
         for number in numbers:
-            ticks[number].append(brains[number].plan(look(fleet.places[number], sensor)))
+            ticks[number].append(
+                path_planners[number].plan(observe(fleet.robot_worlds[number], sensor))
+            )
         return {n: command(ticks[n][-1], scenario.robot, planner.tick_ns) for n in numbers}
 
-    told = decide(range(len(brains)))
-    while (going := fleet.under_way) and go_on(fleet):
+    told = decide(range(len(path_planners)))
+    while (going := fleet.running) and go_on(fleet):
         fleet.step(told)
         told = decide(going)
     return episodes(fleet, ticks, planner, sensor, "core")
@@ -228,7 +230,9 @@ def episodes(
 ) -> tuple[Episode, ...]:
     """What came of a fleet: an Episode of each robot."""
     errs = fleet.scenario.robot.noise.of_odometry
-    worlds = worlds_seen(fleet.scenario, [place.poses for place in fleet.places], fleet.tick_ns)
+    worlds = scenarios_with_others(
+        fleet.scenario, [place.poses for place in fleet.robot_worlds], fleet.tick_ns
+    )
     return tuple(
         Episode(
             scenario=worlds[number],
@@ -240,5 +244,5 @@ def episodes(
             outcome=fleet.outcomes[number] or Outcome.INTERRUPTED,
             truth=tuple(place.poses[: len(ticks[number])]) if errs else (),
         )
-        for number, place in enumerate(fleet.places)
+        for number, place in enumerate(fleet.robot_worlds)
     )

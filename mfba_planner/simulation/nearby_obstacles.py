@@ -19,7 +19,7 @@ ROAM_M = 2.0  # how far the robot may at least go before they are picked again
 Found = tuple[list[int], list[tuple[Point, float]]]
 
 
-class Nearby:
+class NearbyObstacles:
     """The obstacles of one scenario, of which most are far away most of the time."""
 
     def __init__(self, motion: Motion, tick_ns: int) -> None:

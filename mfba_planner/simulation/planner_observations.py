@@ -159,7 +159,7 @@ def _sensed(world: World, seen: Reading, params: SensorParams) -> Ranges:
     return sense_scan(seen.scan, yaw, world.scenario.robot_radius_m, params)
 
 
-def look(world: World, sensor: SensorParams) -> Observation:
+def observe_sectors(world: World, sensor: SensorParams) -> Observation:
     """What the paper's planner gets to know at the present tick: pose, sectors, goal."""
     seen = world.read()
     ranges: Ranges | Refused
@@ -171,13 +171,13 @@ def look(world: World, sensor: SensorParams) -> Observation:
     return observe(world.stamp_ns, pose, ranges, world.scenario.goal_m, pose)
 
 
-def look_at_scan(world: World, sensor: SensorParams) -> Observation:
+def observe_scan(world: World, sensor: SensorParams) -> Observation:
     """look(), and the scan itself, in a frame aligned with odom."""
-    obs, scan = look(world, sensor), world.read().scan
+    obs, scan = observe_sectors(world, sensor), world.read().scan
     if scan is None or obs.refused:
         return obs
     yaw = obs.pose.yaw + world.scenario.robot.lidar.yaw_rad
     return replace(obs, scan=aligned(scan, yaw))
 
 
-Look = Callable[[World, SensorParams], Observation]
+Observe = Callable[[World, SensorParams], Observation]

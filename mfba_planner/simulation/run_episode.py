@@ -9,10 +9,10 @@ from typing import TypeVar
 from ..core.types import Observation, PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
-from ..planning.supervised_planner import algorithm_1
+from ..planning.supervised_planner import supervised_algorithm_1
 from .differential_drive import command
 from .episode import Episode, Outcome
-from .planner_observations import Look, look
+from .planner_observations import Observe, observe_sectors
 from .scenario import Scenario
 from .world import World
 
@@ -20,30 +20,30 @@ T = TypeVar("T")
 GoOn = Callable[[World], bool]
 
 
-def to_the_end(_: World) -> bool:
+def always_continue(_: World) -> bool:
     """Go on, whatever the world is like."""
     return True
 
 
-def course(
+def episode_generator(
     scenario: Scenario,
     planner: PlannerParams,
     sensor: SensorParams,
     seed: int,
     go_on: GoOn,
-    brain: PathPlanner,
-    look: Look,
+    path_planner: PathPlanner,
+    observe: Observe,
 ) -> Generator[Observation, None, Episode]:
     """run(), pausing before every decision: yields what is about to be decided upon."""
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
-    obs = look(world, sensor)
+    obs = observe(world, sensor)
     yield obs
-    ticks, truth = [brain.plan(obs)], [world.pose]
+    ticks, truth = [path_planner.plan(obs)], [world.pose]
     while (outcome := world.outcome()) is None and go_on(world):
         world.step(command(ticks[-1], scenario.robot, world.tick_ns))
-        obs = look(world, sensor)
+        obs = observe(world, sensor)
         yield obs
-        ticks.append(brain.plan(obs))
+        ticks.append(path_planner.plan(obs))
         truth.append(world.pose)
     return Episode(
         scenario=scenario,
@@ -63,9 +63,9 @@ def run(
     planner: PlannerParams | None = None,
     sensor: SensorParams | None = None,
     seed: int = 0,
-    go_on: GoOn = to_the_end,
-    brain: PathPlanner | None = None,
-    look: Look = look,
+    go_on: GoOn = always_continue,
+    path_planner: PathPlanner | None = None,
+    observe: Observe = observe_sectors,
 ) -> Episode:
     """The core driver: Algorithm 1 from start to goal or time limit, without ROS.
 
@@ -74,11 +74,15 @@ def run(
     it gets to know.
     """
     planner = planner or PlannerParams()
-    brain = brain or algorithm_1(planner, seed)
-    return ended(course(scenario, planner, sensor or SensorParams(), seed, go_on, brain, look))
+    path_planner = path_planner or supervised_algorithm_1(planner, seed)
+    return run_to_end(
+        episode_generator(
+            scenario, planner, sensor or SensorParams(), seed, go_on, path_planner, observe
+        )
+    )
 
 
-def ended(under_way: Generator[object, None, T]) -> T:
+def run_to_end(under_way: Generator[object, None, T]) -> T:
     """Go on to the end, and return what comes of it."""
     while True:
         try:

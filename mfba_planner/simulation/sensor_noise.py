@@ -33,7 +33,7 @@ class Reading:
         return carried(self.pose)
 
 
-class Instruments:
+class NoisySensors:
     """Odometry and lidar of one robot over a run, asked once per tick, stamps rising.
 
     A latency is a delay that the stamp hides: the reading of an earlier tick under this one's

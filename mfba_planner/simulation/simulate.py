@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..perception.sensory_vector import SensorParams
-from ..planning.planner_factory import brain
+from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from .episode import Episode
 from .fleet import Fleet, run_fleet
-from .planner_observations import look, look_at_scan
+from .planner_observations import observe_scan, observe_sectors
 from .run_episode import run
 from .scenario import Scenario
 from .world import World
@@ -31,8 +31,8 @@ def simulate(
         sensor=sensor,
         seed=seed,
         go_on=go_on,
-        brain=brain(planner, sensor, seed),
-        look=look_at_scan if planner.tracks_scan else look,
+        path_planner=make_planner(planner, sensor, seed),
+        observe=observe_scan if planner.tracks_scan else observe_sectors,
     )
 
 
@@ -51,6 +51,6 @@ def simulate_fleet(
         sensor=sensor,
         seed=seed,
         go_on=go_on,
-        brain=lambda child: brain(planner, sensor, child),
-        look=look_at_scan if planner.tracks_scan else look,
+        path_planner=lambda child: make_planner(planner, sensor, child),
+        observe=observe_scan if planner.tracks_scan else observe_sectors,
     )

@@ -12,7 +12,7 @@ from .obstacle_motion import bounce_times, center_at
 from .scenario import Scenario
 
 
-class Legs(NamedTuple):
+class UniformSegments(NamedTuple):
     """m legs of uniform motion; every field is an array of m numbers."""
 
     t0: np.ndarray  # s, when the leg begins
@@ -24,13 +24,13 @@ class Legs(NamedTuple):
     radius: np.ndarray  # m, enlarged
     obstacle: np.ndarray  # index into Scenario.obstacles
 
-    def of(self, obstacles: list[int]) -> Legs:
+    def of(self, obstacles: list[int]) -> UniformSegments:
         """The legs of some obstacles only."""
         keep = np.isin(self.obstacle, obstacles)
-        return Legs(*(column[keep] for column in self))
+        return UniformSegments(*(column[keep] for column in self))
 
 
-def uniform_legs(scenario: Scenario, until_s: float) -> Legs:
+def uniform_segments(scenario: Scenario, until_s: float) -> UniformSegments:
     """Cut the motion of every obstacle in [0, until_s] at its bounces and turns."""
     rows = []
     for index, obstacle in enumerate(scenario.obstacles):
@@ -43,4 +43,4 @@ def uniform_legs(scenario: Scenario, until_s: float) -> Legs:
             rows.append((t0, t1, x0, y0, vx, vy, radius, index))
     table = np.array(rows, dtype=np.float64).reshape(-1, 8)
     begin, end, x, y, speed_x, speed_y, radii, which = table.T
-    return Legs(begin, end, x, y, speed_x, speed_y, radii, which.astype(np.intp))
+    return UniformSegments(begin, end, x, y, speed_x, speed_y, radii, which.astype(np.intp))

@@ -7,12 +7,12 @@ from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, distance
 from ..core.types import NANO
 from .batched_motion import Motion
-from .differential_drive import Speeds, obey
+from .differential_drive import Speeds, apply_command
 from .episode import Outcome, stamp_of
-from .nearby_obstacles import Found, Nearby
+from .nearby_obstacles import Found, NearbyObstacles
 from .obstacle_motion import velocity_at
 from .scenario import Scenario
-from .sensor_noise import Instruments, Reading
+from .sensor_noise import NoisySensors, Reading
 
 DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
 
@@ -44,9 +44,9 @@ class World:
         self.tick = 0
         self.pose = Pose2D(*scenario.start_m)
         self.speeds = Speeds()  # of a differential drive
-        self._instruments = Instruments(scenario.robot, scenario.walls, tick_ns, seed)
+        self._instruments = NoisySensors(scenario.robot, scenario.walls, tick_ns, seed)
         self._read: tuple[int, Reading] | None = None
-        self._nearby = Nearby(Motion(scenario), tick_ns)
+        self._nearby = NearbyObstacles(Motion(scenario), tick_ns)
 
     def near(self, reach_m: float, position: Point | None = None) -> Found:
         """Indices, and (centre, enlarged radius), of whoever may be within reach of its edge now.
@@ -60,7 +60,7 @@ class World:
         return self.scenario.centers(self.time_s)
 
     @property
-    def left_m(self) -> float:
+    def distance_to_goal_m(self) -> float:
         """How far the goal is."""
         return distance(self.pose.position, self.scenario.goal_m)
 
@@ -86,7 +86,7 @@ class World:
         """How the run has ended by the present tick, None while it goes on."""
         # Who sees itself there need not be: the robot stops where its odometry says so.
         doubt_m = DOUBTS * self.scenario.robot.noise.odom_m
-        if self.left_m <= self.goal_tolerance_m + doubt_m:
+        if self.distance_to_goal_m <= self.goal_tolerance_m + doubt_m:
             return Outcome.GOAL_REACHED
         if self.time_s >= self.scenario.time_limit_s:
             return Outcome.TIME_LIMIT
@@ -96,7 +96,9 @@ class World:
         """Move robot and time on by one tick; told is what differential_drive.command gives."""
         robot = self.scenario.robot
         if robot.turns:
-            self.pose, self.speeds = obey(self.pose, self.speeds, told, robot, self.tick_ns)
+            self.pose, self.speeds = apply_command(
+                self.pose, self.speeds, told, robot, self.tick_ns
+            )
         else:
             self.pose = advance(self.pose, told, self.tick_ns)
         before_s = self.time_s

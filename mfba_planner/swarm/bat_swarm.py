@@ -51,10 +51,35 @@ class BatSwarm:
     """
 
     __slots__ = (
-        "_a", "_ahead", "_always", "_asked", "_each", "_flight", "_gate", "_gates", "_limit",
-        "_normalized", "_paired", "_picks", "_r", "_random", "_readers", "_rng", "_scale",
-        "_stride", "_v", "_values", "_x",
-        "best_value", "best_x", "candidates", "failures", "horizon", "params", "region", "t",
+        "_a",
+        "_ahead",
+        "_always",
+        "_asked",
+        "_each",
+        "_gate",
+        "_gates",
+        "_iteration",
+        "_limit",
+        "_normalized",
+        "_paired",
+        "_picks",
+        "_r",
+        "_random",
+        "_readers",
+        "_rng",
+        "_scale",
+        "_stride",
+        "_v",
+        "_values",
+        "_x",
+        "best_value",
+        "best_x",
+        "candidates",
+        "failures",
+        "horizon",
+        "params",
+        "region",
+        "t",
     )  # fmt: skip
 
     def __init__(
@@ -76,7 +101,7 @@ class BatSwarm:
         self.region = region
         low, high = region.span()
         d = len(low)
-        self._flight = Law.of(params, region).flight(d)
+        self._iteration = Law.of(params, region).iteration(d)
         self.t = 0
         self.best_x: Vector = []
         self.best_value = math.inf
@@ -150,7 +175,7 @@ class BatSwarm:
         elif (least := min(values)) < self.best_value:
             self.best_x, self.best_value = self.candidates[values.index(least)], least
 
-    def resettle(self, region: Region, objective: Callable[[Vector], float]) -> None:
+    def change_region(self, region: Region, objective: Callable[[Vector], float]) -> None:
         """Draw bats and best into another region and value them again, between tell and ask.
 
         Raises InputError at any other moment.
@@ -158,7 +183,7 @@ class BatSwarm:
         if self._asked or not self.best_x:
             raise InputError("resettle before tell: tell the values of the candidates first")
         self.region = region
-        self._flight = Law.of(self.params, region).flight(len(self.best_x))
+        self._iteration = Law.of(self.params, region).iteration(len(self.best_x))
         self._x = self._bounded(self._x)
         self._values = [objective(x) for x in self._x]
         self.best_x = self._bounded([self.best_x])[0]
@@ -210,7 +235,7 @@ class BatSwarm:
             self._draw()
         pairs = self._pairs(*self._picks) if self._paired else None
         bats = zip(self._x, self._v, self._r, *self._readers)
-        return self._flight(bats, self._time(), self.best_x, self._scale, pairs)
+        return self._iteration(bats, self._time(), self.best_x, self._scale, pairs)
 
     def _pairs(self, ones: Iterator[float], others: Iterator[float]) -> list[Pair]:
         """For every bat, where two different bats picked at random are."""

@@ -14,7 +14,7 @@ from .search_region import Box, Disc, Region, Vector
 Bats = Iterable[Any]
 Pair = tuple[Vector, Vector]
 Pairs = list[Pair] | None
-Flight = Callable[[Bats, float, Vector, float, Pairs], list[Vector]]
+Iteration = Callable[[Bats, float, Vector, float, Pairs], list[Vector]]
 
 
 @dataclass(slots=True)
@@ -51,16 +51,16 @@ class Law:
             params.f_min, f_span, sign, params.inertia, from_best, low, high, clamp, is_box, disc
         )
 
-    def flight(self, d: int) -> Flight:
+    def iteration(self, d: int) -> Iteration:
         """What moves n bats in d dimensions: (bats, t, best, scale, pairs) -> candidates.
 
         A bat is its x, its v (which changes), r, what t is multiplied with to give beta, the
         draw that decides whether it walks, and d draws for epsilon. scale is sigma times the
         mean loudness; a pair makes a bat's walk as long as the pair is apart.
         """
-        return self._fly_in_the_plane if d == 2 else self._fly_anywhere
+        return self._iterate_in_the_plane if d == 2 else self._iterate_in_d_dimensions
 
-    def _fly_anywhere(
+    def _iterate_in_d_dimensions(
         self, bats: Bats, t: float, best: Vector, scale: float, pairs: Pairs
     ) -> list[Vector]:
         inertia, clamp = self.inertia, self.clamp
@@ -81,7 +81,7 @@ class Law:
             points.append(clamp(point))
         return points
 
-    def _fly_in_the_plane(
+    def _iterate_in_the_plane(
         self, bats: Bats, t: float, best: Vector, scale: float, pairs: Pairs
     ) -> list[Vector]:
         """Two coordinates unrolled: the same numbers to the last bit, in half the time."""

@@ -15,7 +15,7 @@ UPRIGHT = math.cos(math.radians(5.0))  # of a lidar that scans the robot's plane
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
 
 
-class Mounting(NamedTuple):
+class LidarExtrinsics(NamedTuple):
     """How a frame stands in another: turned about z, and how far off in the plane."""
 
     yaw_rad: float
@@ -57,14 +57,14 @@ class StaticFrames:
             for told in message.message.transforms:
                 self._above[told.child_frame_id] = told.header.frame_id, _pose(told.transform)
 
-    def mounting(self, frame: str, base: str) -> Mounting:
+    def extrinsics(self, frame: str, base: str) -> LidarExtrinsics:
         """How a frame is mounted on a base; of one that has no name nothing is to be known.
 
         Raises FrameError where no transforms lead from one to the other, and for a frame whose
         plane is not the base's.
         """
         if not (frame and base) or frame == base:
-            return Mounting(0.0, 0.0)
+            return LidarExtrinsics(0.0, 0.0)
         ours, theirs = self._upwards(frame), self._upwards(base)
         common = next((name for name in ours if name in theirs), None)
         if common is None:
@@ -77,7 +77,7 @@ class StaticFrames:
                 f"frame {frame!r}: tilted against {base!r}, so its beams leave the plane that the "
                 "robot moves in; give --scan-yaw if they do not"
             )
-        return Mounting(yaw_of(x, y, z, w), math.hypot(at[0], at[1]))
+        return LidarExtrinsics(yaw_of(x, y, z, w), math.hypot(at[0], at[1]))
 
     def _upwards(self, frame: str) -> dict[str, Pose]:
         """The poses of a frame in itself and in all frames above it."""

@@ -15,13 +15,13 @@ from ..core.geometry import Point, Pose2D
 from ..core.types import Decision, Ranges, Refused, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams
-from ..planning.planner_factory import brain
+from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
-from ..recording.decisions import DECISION, SECTORS, deciders
+from ..recording.decisions import DECISION, SECTORS, robots_with_decisions
 from ..recording.file_integrity import check_data
 from ..recording.messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
-from ..recording.robot_topics import ALONE
+from ..recording.robot_topics import NO_NAMESPACE
 from ..simulation.decision_digest import digest
 from .lidar_extrinsics import StaticFrames
 
@@ -48,7 +48,7 @@ class Robot:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FromScratch:
+class Redecided:
     """The decisions on every scan; faults speak against the recording, notes do not."""
 
     decided: tuple[Decision, ...]
@@ -64,11 +64,15 @@ class FromScratch:
 def is_foreign(reader: BagReader) -> bool:
     """Whether a bag has scans and odometry, but neither decisions nor sectors of ours."""
     types = {topic.type_name for topic in reader.topics.values()}
-    ours = SECTORS in reader.topics or DECISION in reader.topics or deciders(reader) != [ALONE]
+    ours = (
+        SECTORS in reader.topics
+        or DECISION in reader.topics
+        or robots_with_decisions(reader) != [NO_NAMESPACE]
+    )
     return not ours and {ODOMETRY, SCAN} <= types
 
 
-def decide_from_scratch(path: str | Path, robot: Robot) -> FromScratch:
+def redecide_recording(path: str | Path, robot: Robot) -> Redecided:
     """Decide on every scan with the odometry of its stamp, or the newest recorded before it.
 
     As virtual_sensor (source: scan) and planner do when the bag is replayed, with the lidar as
@@ -167,7 +171,7 @@ class _Mounted:
         frame = scan.header.frame_id
         if frame not in self._yaws:
             try:
-                yaw, offset_m = self._frames.mounting(frame, self._base)
+                yaw, offset_m = self._frames.extrinsics(frame, self._base)
             except FrameError as error:
                 raise BagError(f"{self._path}: {error}") from None
             self._yaws[frame] = yaw
@@ -195,17 +199,17 @@ class _Decider:
         self._poses = poses
         self._goals = goals
         self._faults = faults
-        self._brain = brain(robot.planner, robot.sensor, robot.seed)
+        self._path_planner = make_planner(robot.planner, robot.sensor, robot.seed)
         self._pose = Pose2D(0.0, 0.0)
         self._counts: Counter[str] = Counter()
 
-    def on(self, reader: BagReader, topic: str) -> FromScratch:
+    def on(self, reader: BagReader, topic: str) -> Redecided:
         decided = []
         for stamp, message in _rising(reader, topic, self._faults):
             decision = self._decide(stamp, message.log_time_ns, message.message)
             if decision is not None:
                 decided.append(decision)
-        return FromScratch(
+        return Redecided(
             decided=tuple(decided),
             faults=tuple(self._faults),
             notes=(
@@ -232,7 +236,7 @@ class _Decider:
         if self._robot.planner.tracks_scan and not seen.refused:
             yaw = seen.pose.yaw + self._mounted.yaw_rad(scan)
             seen = replace(seen, scan=aligned(laser_scan(scan), yaw))
-        return self._brain.plan(seen)
+        return self._path_planner.plan(seen)
 
     def _measure(self, pose: Pose2D | Refused, scan: Any) -> Ranges | Refused:
         if isinstance(pose, str):

@@ -11,10 +11,10 @@ from typing import Any
 from ..core.errors import InputError
 from ..core.geometry import Point
 from ..recording.bag_reader import BagReader, DecodedMessage
-from ..recording.decisions import DECISION, SECTORS, ranges_seen, require_decisions
+from ..recording.decisions import DECISION, SECTORS, ranges_of, require_decisions
 from ..recording.messages import goal_point, stamp_ns, waypoint_points
 from ..recording.omitted_decisions import left_out
-from ..recording.robot_topics import heard_by_robot
+from ..recording.robot_topics import messages_by_robot
 
 ODOM, OBSTACLES, VECTOR, SCAN = "/odom", "/obstacles", "/sensory_vector", "/scan"
 GOAL, WAYPOINTS = "/goal_pose", "/waypoints"
@@ -32,7 +32,7 @@ class Tick:
 
 
 @dataclass(slots=True, kw_only=True)
-class Evidence:
+class TickRecords:
     """The ticks in order of their stamps; faults speak against the bag, notes do not."""
 
     ticks: list[Tick]
@@ -49,7 +49,7 @@ def collect(reader: BagReader, robots: Sequence[str]) -> dict[str, list[DecodedM
     """
     require_decisions(reader, robots)
     found: dict[str, list[DecodedMessage]] = {robot: [] for robot in robots}
-    for robot, message in heard_by_robot(reader, robots, (*HEARD, GOAL, WAYPOINTS)):
+    for robot, message in messages_by_robot(reader, robots, (*HEARD, GOAL, WAYPOINTS)):
         found[robot].append(message)
     return found
 
@@ -60,14 +60,14 @@ def gather(
     frame: str = "",
     *,
     inputs: Sequence[str],
-) -> Evidence:
+) -> TickRecords:
     """Join a robot's messages; tick_ns is the duration of a tick, None where it is not fixed.
 
     frame is the one that goals must be in, "" for any; inputs are what a decision is decided
     again on.
     """
     heard: dict[str, list[Any]] = {name: [] for name in HEARD}
-    found = Evidence(ticks=[], goals=[])
+    found = TickRecords(ticks=[], goals=[])
     latest: dict[str, int] = {}  # where in the bag each topic ends
     for place, message in enumerate(messages):
         latest[message.topic] = place
@@ -81,7 +81,7 @@ def gather(
         all_alike = bool(tick_ns) or topic not in (DECISION, STEP)
         _join(found, ticks, topic, heard[topic], all_alike=all_alike)
     # No sensory vector follows where the sensor was blind.
-    seen = [message for message in heard[SECTORS] if ranges_seen(message)]
+    seen = [message for message in heard[SECTORS] if ranges_of(message)]
     _join_by_order(found, ticks, latest, SECTORS, seen, VECTOR, heard[VECTOR])
     steps, twists = heard[STEP], heard[TWIST]
     _join_by_order(found, ticks, latest, STEP, steps, TWIST, twists, all_alike=bool(tick_ns))
@@ -100,7 +100,7 @@ def _goals(topic: str, message: Any, frame: str) -> tuple[Point, ...]:
 
 
 def _join(
-    found: Evidence,
+    found: TickRecords,
     ticks: dict[int, Tick],
     topic: str,
     messages: list[Any],
@@ -134,7 +134,7 @@ def _content(topic: str, message: Any) -> str:
 
 
 def _join_by_order(
-    found: Evidence,
+    found: TickRecords,
     ticks: dict[int, Tick],
     latest: dict[str, int],
     stamped: str,
@@ -167,7 +167,7 @@ def _join_by_order(
             found.faults.append(f"{topic}: stamp {stamp} ns is there twice, and not alike")
 
 
-def _leave_out(found: Evidence, inputs: Sequence[str]) -> None:
+def _leave_out(found: TickRecords, inputs: Sequence[str]) -> None:
     """Name the decisions after the end of an input, as recording/omitted_decisions.py has it.
 
     Not where that would be all of them, nor for an input that was never recorded.
@@ -183,7 +183,7 @@ def _leave_out(found: Evidence, inputs: Sequence[str]) -> None:
         found.notes.append(left_out(stamps, ended))
 
 
-def _look_for_gaps(found: Evidence, tick_ns: int, needed: tuple[str, ...]) -> None:
+def _look_for_gaps(found: TickRecords, tick_ns: int, needed: tuple[str, ...]) -> None:
     """In lockstep each tick follows the other, and each has all its messages."""
     first = found.ticks[0].stamp_ns
     if first > tick_ns:

@@ -16,7 +16,7 @@ from ..core.geometry import Point, Pose2D
 from ..core.types import Decision, Mode, Observation, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import sense_circles, sensory_vector
-from ..planning.planner_factory import brain
+from ..planning.planner_factory import make_planner
 from ..recording.bag_reader import BagReader
 from ..recording.file_integrity import check_data
 from ..recording.messages import (
@@ -30,7 +30,7 @@ from ..recording.messages import (
     velocity,
 )
 from ..recording.messages import decision as read_decision
-from ..recording.robot_topics import ALONE, chosen
+from ..recording.robot_topics import NO_NAMESPACE, chosen
 from ..recording.run_setup import Setup, read_setup, read_setups
 from ..simulation.decision_digest import digest
 from .compare_decisions import Divergence, first_divergence
@@ -43,8 +43,8 @@ from .tick_records import (
     STEP,
     TWIST,
     VECTOR,
-    Evidence,
     Tick,
+    TickRecords,
     collect,
     gather,
 )
@@ -79,7 +79,7 @@ def verify(path: str | Path) -> Report:
     """Check a bag of one robot. Raises BagError for one that cannot be checked at all."""
     with BagReader(path) as reader:
         read_setup(reader)
-    return verify_each(path)[ALONE]
+    return verify_each(path)[NO_NAMESPACE]
 
 
 def verify_each(path: str | Path, robots: Sequence[str] = ()) -> dict[str, Report]:
@@ -97,23 +97,23 @@ def verify_each(path: str | Path, robots: Sequence[str] = ()) -> dict[str, Repor
     for name in names:
         setup = setups[name]
         tick_ns = setup.planner.tick_ns if setup.lockstep else None
-        evidence = gather(messages.pop(name), tick_ns, setup.odom_frame, inputs=_inputs(setup))
-        found[name] = _check(setup, evidence)
+        tick_records = gather(messages.pop(name), tick_ns, setup.odom_frame, inputs=_inputs(setup))
+        found[name] = _check(setup, tick_records)
     return found
 
 
-def _check(setup: Setup, evidence: Evidence) -> Report:
-    faults, notes = [*evidence.faults], [*evidence.notes]
+def _check(setup: Setup, tick_records: TickRecords) -> Report:
+    faults, notes = [*tick_records.faults], [*tick_records.notes]
     read_odom = partial(robot_pose, frame=setup.odom_frame)
     read_sectors = partial(sector_ranges, frame=setup.odom_frame)
-    planner = brain(setup.planner, setup.sensor, setup.seed)
-    goals = deque(evidence.goals)
+    planner = make_planner(setup.planner, setup.sensor, setup.seed)
+    goals = deque(tick_records.goals)
     goal: Point | None = None
     pose = Pose2D(0.0, 0.0)
     recorded, decided = [], []
     unchecked, errand = 0, ""
-    for tick in evidence.ticks:
-        if DECISION not in tick.said or tick.stamp_ns in evidence.left_out:
+    for tick in tick_records.ticks:
+        if DECISION not in tick.said or tick.stamp_ns in tick_records.left_out:
             continue  # named by evidence where it must not be
         if SECTORS not in tick.said:
             if not setup.lockstep:  # there evidence names it

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...simulation.scenario import Scenario
-from ...simulation.uniform_segments import Legs
+from ...simulation.uniform_segments import UniformSegments
 
 GOAL_TOLERANCE_M = 0.05  # more than any planner of ours is granted
 
@@ -30,7 +30,10 @@ class ReachParams:
 
 
 def unreachable(
-    scenario: Scenario, speed_mps: float, legs: Legs, params: ReachParams | None = None
+    scenario: Scenario,
+    speed_mps: float,
+    segments: UniformSegments,
+    params: ReachParams | None = None,
 ) -> str:
     """Why no trajectory at up to speed_mps can reach the goal, "" when that is not proven.
 
@@ -56,29 +59,32 @@ def unreachable(
         reached = distance_transform_edt(~reached) <= stride
         if outside:
             reached |= edge
-        if (reached & goal).any() and not _shut(scenario, legs, before_s, now_s):
+        if (reached & goal).any() and not _shut(scenario, segments, before_s, now_s):
             return ""
-        reached &= ~_covered(xs, ys, legs, now_s, half)
+        reached &= ~_covered(xs, ys, segments, now_s, half)
         if not reached.any():
             return f"contact cannot be avoided beyond t = {now_s:g} s"
     return f"goal_m cannot be reached within the time limit of {scenario.time_limit_s:g} s"
 
 
-def _shut(scenario: Scenario, legs: Legs, begin_s: float, end_s: float) -> bool:
+def _shut(scenario: Scenario, segments: UniformSegments, begin_s: float, end_s: float) -> bool:
     """Whether one circle holds the goal, tolerance included, all the time in between.
 
     The distance to uniform motion is convex in t: it is largest at the ends of each leg.
     """
     gx, gy = scenario.goal_m
-    meanwhile = (legs.t0 <= end_s) & (legs.t1 >= begin_s)
-    furthest = np.zeros(len(legs.t0))
-    for t in (np.maximum(legs.t0, begin_s), np.minimum(legs.t1, end_s)):
-        x, y = legs.x + legs.vx * (t - legs.t0), legs.y + legs.vy * (t - legs.t0)
+    meanwhile = (segments.t0 <= end_s) & (segments.t1 >= begin_s)
+    furthest = np.zeros(len(segments.t0))
+    for t in (np.maximum(segments.t0, begin_s), np.minimum(segments.t1, end_s)):
+        x, y = (
+            segments.x + segments.vx * (t - segments.t0),
+            segments.y + segments.vy * (t - segments.t0),
+        )
         furthest = np.maximum(furthest, np.hypot(x - gx, y - gy))
-    holds = furthest + GOAL_TOLERANCE_M < legs.radius
+    holds = furthest + GOAL_TOLERANCE_M < segments.radius
     return any(
-        holds[(legs.obstacle == obstacle) & meanwhile].all()
-        for obstacle in set(legs.obstacle[meanwhile].tolist())
+        holds[(segments.obstacle == obstacle) & meanwhile].all()
+        for obstacle in set(segments.obstacle[meanwhile].tolist())
     )
 
 
@@ -92,14 +98,16 @@ def _axes(scenario: Scenario, p: ReachParams) -> tuple[np.ndarray, np.ndarray]:
     return tuple(np.arange(a, b, p.cell_m) for a, b in zip(low, high))  # type: ignore[return-value]
 
 
-def _covered(xs: np.ndarray, ys: np.ndarray, legs: Legs, t_s: float, half: float) -> np.ndarray:
+def _covered(
+    xs: np.ndarray, ys: np.ndarray, segments: UniformSegments, t_s: float, half: float
+) -> np.ndarray:
     """Cells that lie wholly inside an enlarged circle at time t."""
     covered = np.zeros((len(xs), len(ys)), dtype=bool)
-    now = np.flatnonzero((legs.t0 <= t_s) & (t_s <= legs.t1))
+    now = np.flatnonzero((segments.t0 <= t_s) & (t_s <= segments.t1))
     for m in now.tolist():
-        cx = legs.x[m] + legs.vx[m] * (t_s - legs.t0[m])
-        cy = legs.y[m] + legs.vy[m] * (t_s - legs.t0[m])
-        r = legs.radius[m] - half - 1e-9
+        cx = segments.x[m] + segments.vx[m] * (t_s - segments.t0[m])
+        cy = segments.y[m] + segments.vy[m] * (t_s - segments.t0[m])
+        r = segments.radius[m] - half - 1e-9
         i = slice(*np.searchsorted(xs, (cx - r, cx + r)))
         j = slice(*np.searchsorted(ys, (cy - r, cy + r)))
         covered[i, j] |= (xs[i, None] - cx) ** 2 + (ys[None, j] - cy) ** 2 < r * r

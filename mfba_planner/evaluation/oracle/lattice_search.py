@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.geometry import Point
 from ...simulation.obstacle_motion import Walls
-from ...simulation.uniform_segments import Legs
+from ...simulation.uniform_segments import UniformSegments
 from .polyline import edge_gaps, within
 from .tangent_search import CLEAR_M
 
@@ -38,7 +38,7 @@ def lattice_ways(
     start: Point,
     goal: Point,
     speed_mps: float,
-    legs: Legs,
+    segments: UniformSegments,
     limit_s: float,
     params: LatticeParams,
     inside: Walls | None = None,
@@ -49,7 +49,7 @@ def lattice_ways(
     u = speed_mps * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     places, parents = [np.array([start])], [np.array([-1])]
     arrivals: list[tuple[float, int, int]] = []
-    inner = legs._replace(radius=legs.radius + CLEAR_M)
+    inner = segments._replace(radius=segments.radius + CLEAR_M)
     t = 0.0
     while len(places[-1]) and t < limit_s:
         here, layer = places[-1], len(places) - 1
@@ -79,19 +79,19 @@ def lattice_ways(
     return [_way(places, parents, one, goal) for one in sorted(arrivals)[: params.ways]]
 
 
-def _during(legs: Legs, begin_s: float, end_s: float) -> Legs:
+def _during(segments: UniformSegments, begin_s: float, end_s: float) -> UniformSegments:
     """The legs that last at some time of an interval."""
-    keep = (legs.t1 >= begin_s) & (legs.t0 <= end_s)
-    return Legs(*(column[keep] for column in legs))
+    keep = (segments.t1 >= begin_s) & (segments.t0 <= end_s)
+    return UniformSegments(*(column[keep] for column in segments))
 
 
 def _free(
-    here: np.ndarray, velocity: np.ndarray, t: float, end: np.ndarray, legs: Legs
+    here: np.ndarray, velocity: np.ndarray, t: float, end: np.ndarray, segments: UniformSegments
 ) -> np.ndarray:
     """Which of the straight legs that begin at t touch nothing, (n,)."""
-    if not legs.t0.size:
+    if not segments.t0.size:
         return np.full(len(here), True)
-    rows = max(1, _CHUNK // legs.t0.size)
+    rows = max(1, _CHUNK // segments.t0.size)
     parts = []
     for k in range(0, len(here), rows):
         part = slice(k, k + rows)
@@ -102,14 +102,19 @@ def _free(
             end[part, None],
             velocity[part, 0, None],
             velocity[part, 1, None],
-            legs,
+            segments,
         )
         parts.append(gap.min(axis=1) >= 0.0)
     return np.concatenate(parts) if parts else np.zeros(0, dtype=bool)
 
 
 def _free_steps(
-    here: np.ndarray, u: np.ndarray, t: float, end: float, steps: np.ndarray, legs: Legs
+    here: np.ndarray,
+    u: np.ndarray,
+    t: float,
+    end: float,
+    steps: np.ndarray,
+    segments: UniformSegments,
 ) -> np.ndarray:
     """_free() of some steps with velocities u (h, 2) until end; step n begins at here[n // h].
 
@@ -117,13 +122,13 @@ def _free_steps(
     """
     asked, touched = np.zeros((2, len(here) * len(u)), dtype=bool)
     asked[steps] = True
-    for origin, leg in _met(here, float(np.hypot(*u[0])), t, end, legs):
+    for origin, leg in _met(here, float(np.hypot(*u[0])), t, end, segments):
         step = origin[:, None] * len(u) + np.arange(len(u))
         which = np.nonzero(asked[step])
         step, near, heading = step[which], leg[which[0]], u[which[1]]
         (x, y), (ux, uy) = here[step // len(u)].T, heading.T
         begin, until = np.full(len(step), t), np.full(len(step), end)
-        those = Legs(*(column[near] for column in legs))
+        those = UniformSegments(*(column[near] for column in segments))
         gap = edge_gaps(x, y, begin, until, ux, uy, those)
         touched[step[gap < 0.0]] = True
     free: np.ndarray = ~touched[steps]
@@ -131,12 +136,17 @@ def _free_steps(
 
 
 def _met(
-    here: np.ndarray, speed_mps: float, t: float, end: float, legs: Legs
+    here: np.ndarray, speed_mps: float, t: float, end: float, segments: UniformSegments
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Pairs of a place and a leg that whoever is there at t may touch until end; in parts."""
-    seen = np.clip(t, legs.t0, legs.t1)
-    x, y = legs.x + legs.vx * (seen - legs.t0), legs.y + legs.vy * (seen - legs.t0)
-    reach = legs.radius + (speed_mps + np.hypot(legs.vx, legs.vy)) * (end - t) + _SLACK_M
+    seen = np.clip(t, segments.t0, segments.t1)
+    x, y = (
+        segments.x + segments.vx * (seen - segments.t0),
+        segments.y + segments.vy * (seen - segments.t0),
+    )
+    reach = (
+        segments.radius + (speed_mps + np.hypot(segments.vx, segments.vy)) * (end - t) + _SLACK_M
+    )
     dx, dy = x - here[:, :1], y - here[:, 1:]
     origin, leg = np.nonzero(dx * dx + dy * dy <= reach * reach)
     for k in range(0, len(origin), _AT_ONCE):

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ...simulation.obstacle_motion import Walls
-from ...simulation.uniform_segments import Legs
+from ...simulation.uniform_segments import UniformSegments
 from .polyline import gaps, lengths, one_way_gaps, pair_gaps, within
 from .tangent_search import CLEAR_M
 
@@ -20,35 +20,35 @@ _MOST_POINTS = 40  # SLSQP's time grows with their cube; a way that has to wait 
 
 
 def refine(
-    way: np.ndarray, speed_mps: float, legs: Legs, inside: Walls | None = None
+    way: np.ndarray, speed_mps: float, segments: UniformSegments, inside: Walls | None = None
 ) -> np.ndarray | None:
     """The shortest free polyline (p, 2) found next to a way, None when the way is not free."""
-    if not _free(way, speed_mps, legs):
+    if not _free(way, speed_mps, segments):
         return None
-    best = _shortcut(way, speed_mps, legs)
+    best = _shortcut(way, speed_mps, segments)
     for split in (False, True):
         trial = _bend_finer(best) if split else best
         if trial is None:
             break
-        tight = _tighten(trial, speed_mps, legs, inside)
+        tight = _tighten(trial, speed_mps, segments, inside)
         if tight is None:
             continue
-        tight = _shortcut(tight, speed_mps, legs)
+        tight = _shortcut(tight, speed_mps, segments)
         if lengths(tight[None])[0] < lengths(best[None])[0]:
             best = tight
     return best
 
 
-def _free(points: np.ndarray, speed_mps: float, legs: Legs) -> bool:
-    return bool(gaps(points[None], speed_mps, legs).min(initial=math.inf) >= 0.0)
+def _free(points: np.ndarray, speed_mps: float, segments: UniformSegments) -> bool:
+    return bool(gaps(points[None], speed_mps, segments).min(initial=math.inf) >= 0.0)
 
 
-def _shortcut(points: np.ndarray, speed_mps: float, legs: Legs) -> np.ndarray:
+def _shortcut(points: np.ndarray, speed_mps: float, segments: UniformSegments) -> np.ndarray:
     """Leave out via points, the one that saves most first, while the way stays free."""
     while len(points) > 2:
         k = np.arange(1, len(points) - 1)
         trials = np.stack([np.delete(points, one, axis=0) for one in k])
-        free = gaps(trials, speed_mps, legs).min(axis=(1, 2)) >= 0.0
+        free = gaps(trials, speed_mps, segments).min(axis=(1, 2)) >= 0.0
         if not free.any():
             return points
         new = np.where(free, lengths(trials), math.inf)
@@ -77,13 +77,13 @@ def _bend_finer(points: np.ndarray) -> np.ndarray | None:
 
 
 def _tighten(
-    points: np.ndarray, speed_mps: float, legs: Legs, inside: Walls | None
+    points: np.ndarray, speed_mps: float, segments: UniformSegments, inside: Walls | None
 ) -> np.ndarray | None:
     """Minimise the length over the via points (SLSQP); None when the result is not free."""
     if not 2 < len(points) <= _MOST_POINTS:
         return None
-    near = gaps(points[None], speed_mps, legs)[0].min(axis=0) < _NEAR_M
-    local = Legs(*(column[near] for column in legs))
+    near = gaps(points[None], speed_mps, segments)[0].min(axis=0) < _NEAR_M
+    local = UniformSegments(*(column[near] for column in segments))
     pairs = gaps(points[None], speed_mps, local)[0] < _PAIR_M
     for margin in (CLEAR_M, 2.0 * CLEAR_M, 2e-4):
         problem = _Problem(points, speed_mps, local, pairs, margin)
@@ -91,7 +91,7 @@ def _tighten(
         gap = gaps(found[None], speed_mps, local)[0]
         if (
             gap.min(initial=math.inf) >= 0.0
-            and _free(found, speed_mps, legs)
+            and _free(found, speed_mps, segments)
             and within(inside, *found.T).all()
         ):
             return found
@@ -106,16 +106,21 @@ class _Problem:
         self,
         points: np.ndarray,
         speed_mps: float,
-        legs: Legs,
+        segments: UniformSegments,
         pairs: np.ndarray,
         margin: float,
     ) -> None:
         self.points, self.v, self.margin = points, speed_mps, margin
         self.rows, columns = np.nonzero(pairs)
-        self.legs = Legs(*(values[columns] for values in legs))  # one for each pair
+        self.segments = UniformSegments(
+            *(values[columns] for values in segments)
+        )  # one for each pair
         first, last = self.points[0].tolist(), self.points[-1].tolist()
         self._ends = [tuple(first)], [tuple(last)]
-        self._plain = self.rows.tolist(), list(zip(*(values.tolist() for values in self.legs[:7])))
+        self._plain = (
+            self.rows.tolist(),
+            list(zip(*(values.tolist() for values in self.segments[:7]))),
+        )
 
     def solve(self, inside: Walls | None) -> np.ndarray:
         """The via points that SLSQP ends with, feasible or not."""
@@ -158,9 +163,9 @@ class _Problem:
 
     def slack(self, x: np.ndarray) -> np.ndarray:
         """Gaps of the pairs above the margin, metres."""
-        (first, last), (rows, legs), via = self._ends, self._plain, x.tolist()
+        (first, last), (rows, segments), via = self._ends, self._plain, x.tolist()
         points = first + list(zip(via[::2], via[1::2])) + last
-        return np.array(one_way_gaps(points, self.v, rows, legs)) - self.margin
+        return np.array(one_way_gaps(points, self.v, rows, segments)) - self.margin
 
     def slack_gradient(self, x: np.ndarray) -> np.ndarray:
         """Of slack(), (pairs, via coordinates), by differences, all at once."""
@@ -170,4 +175,4 @@ class _Problem:
         return gradient
 
     def _slacks(self, x: np.ndarray) -> np.ndarray:
-        return pair_gaps(self.full(x), self.v, self.rows, self.legs) - self.margin
+        return pair_gaps(self.full(x), self.v, self.rows, self.segments) - self.margin

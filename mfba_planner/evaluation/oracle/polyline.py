@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.geometry import Point
 from ...simulation.obstacle_motion import Walls
-from ...simulation.uniform_segments import Legs
+from ...simulation.uniform_segments import UniformSegments
 
 Leg = tuple[float, float, float, float, float, float, float]  # Legs, but for the obstacle
 FAR_M = 9.0  # gap reported for a pair that never moves at the same time
@@ -23,20 +23,22 @@ def lengths(points: np.ndarray) -> np.ndarray:
     return np.sqrt((step * step).sum(axis=2)).sum(axis=1)
 
 
-def gaps(points: np.ndarray, speed_mps: float, legs: Legs) -> np.ndarray:
+def gaps(points: np.ndarray, speed_mps: float, segments: UniformSegments) -> np.ndarray:
     """Smallest gap (b, p - 1, m) in metres of every robot leg to every obstacle leg."""
     x, y, begin, end, ux, uy = (column[:, :, None] for column in _edges(points, speed_mps))
-    return edge_gaps(x, y, begin, end, ux, uy, legs)
+    return edge_gaps(x, y, begin, end, ux, uy, segments)
 
 
-def pair_gaps(points: np.ndarray, speed_mps: float, rows: np.ndarray, legs: Legs) -> np.ndarray:
+def pair_gaps(
+    points: np.ndarray, speed_mps: float, rows: np.ndarray, segments: UniformSegments
+) -> np.ndarray:
     """Smallest gap (b, m) of robot leg rows[k] to obstacle leg k only, the same bits as gaps()."""
     x, y, begin, end, ux, uy = (column[:, rows] for column in _edges(points, speed_mps))
-    return edge_gaps(x, y, begin, end, ux, uy, legs)
+    return edge_gaps(x, y, begin, end, ux, uy, segments)
 
 
 def one_way_gaps(
-    points: Sequence[Point], speed_mps: float, rows: Sequence[int], legs: Sequence[Leg]
+    points: Sequence[Point], speed_mps: float, rows: Sequence[int], segments: Sequence[Leg]
 ) -> list[float]:
     """pair_gaps() of one polyline in plain floats, the same bits.
 
@@ -50,7 +52,7 @@ def one_way_gaps(
         end, per_m = travelled / speed_mps, speed_mps / max(way, 1e-12)
         edges.append((x, y, end - way / speed_mps, end, dx * per_m, dy * per_m))
     found = []
-    for row, (t0, t1, ox, oy, vx, vy, radius) in zip(rows, legs):
+    for row, (t0, t1, ox, oy, vx, vy, radius) in zip(rows, segments):
         x, y, begin, end, ux, uy = edges[row]
         low = max(begin, t0)
         span = min(end, t1) - low
@@ -85,24 +87,24 @@ def edge_gaps(
     end: np.ndarray,
     ux: np.ndarray,
     uy: np.ndarray,
-    legs: Legs,
+    segments: UniformSegments,
 ) -> np.ndarray:
     """Smallest gap of robot legs (from x, y at begin, velocity u, until end) to obstacle legs.
 
     The m obstacle legs are broadcast over the robot's arrays: their last axis is 1, or m.
     """
-    low = np.maximum(begin, legs.t0)
-    span = np.minimum(end, legs.t1) - low
-    qx, qy = ux - legs.vx, uy - legs.vy
-    since = low - legs.t0
+    low = np.maximum(begin, segments.t0)
+    span = np.minimum(end, segments.t1) - low
+    qx, qy = ux - segments.vx, uy - segments.vy
+    since = low - segments.t0
     ahead = low - begin
-    px = x + ux * ahead - legs.x - legs.vx * since
-    py = y + uy * ahead - legs.y - legs.vy * since
+    px = x + ux * ahead - segments.x - segments.vx * since
+    py = y + uy * ahead - segments.y - segments.vy * since
     qq = np.maximum(qx * qx + qy * qy, 1e-300)
     s = np.minimum(np.maximum(-(px * qx + py * qy) / qq, 0.0), span)
     px += qx * s
     py += qy * s
-    gap: np.ndarray = np.sqrt(px * px + py * py) - legs.radius
+    gap: np.ndarray = np.sqrt(px * px + py * py) - segments.radius
     gap[span < 0.0] = FAR_M
     return gap
 

@@ -12,7 +12,7 @@ from ...core.errors import ConfigError
 from ...core.geometry import distance
 from ...simulation.obstacle_motion import Walls
 from ...simulation.scenario import Scenario
-from ...simulation.uniform_segments import Legs, uniform_legs
+from ...simulation.uniform_segments import UniformSegments, uniform_segments
 from .independent_check import inspect
 from .infeasibility_proof import unreachable
 from .lattice_search import LatticeParams, lattice_ways
@@ -96,34 +96,34 @@ class _Task:
             self.proof = f"the straight way alone takes {straight_s:g} s of {limit_s:g} s"
             return
         horizon_s = min(limit_s, 1.5 * straight_s + 5.0)
-        legs = uniform_legs(self.scenario, horizon_s)
-        touched = self._touched(self.straight, legs)
+        segments = uniform_segments(self.scenario, horizon_s)
+        touched = self._touched(self.straight, segments)
         if not touched:
             yield self.straight
             return
         self.active |= touched
-        if found := self._refined(self._by_tangents(legs), legs):
-            yield from self._seconded(found, legs)
+        if found := self._refined(self._by_tangents(segments), segments):
+            yield from self._seconded(found, segments)
             return
-        legs = uniform_legs(self.scenario, limit_s)
-        self.proof = unreachable(self.scenario, self.v, legs)
+        segments = uniform_segments(self.scenario, limit_s)
+        self.proof = unreachable(self.scenario, self.v, segments)
         if self.proof:
             return
-        if horizon_s < limit_s and (found := self._refined(self._by_tangents(legs), legs)):
-            yield from self._seconded(found, legs)
+        if horizon_s < limit_s and (found := self._refined(self._by_tangents(segments), segments)):
+            yield from self._seconded(found, segments)
             return
         for times in (1.25, 2.5, 5.0):
             until_s = min(limit_s, times * straight_s)
-            if found := self._refined(self._by_lattice(legs, until_s, _COARSE), legs):
+            if found := self._refined(self._by_lattice(segments, until_s, _COARSE), segments):
                 yield from found
                 return
 
-    def _refined(self, ways: list[np.ndarray], legs: Legs) -> list[np.ndarray]:
+    def _refined(self, ways: list[np.ndarray], segments: UniformSegments) -> list[np.ndarray]:
         """The ways, refined, the best first."""
-        tried = (refine(way, self.v, legs, self.inside) for way in ways)
+        tried = (refine(way, self.v, segments, self.inside) for way in ways)
         return sorted((points for points in tried if points is not None), key=_length)
 
-    def _seconded(self, ways: list[np.ndarray], legs: Legs) -> list[np.ndarray]:
+    def _seconded(self, ways: list[np.ndarray], segments: UniformSegments) -> list[np.ndarray]:
         """Ask the lattice too where the tangents' way is long.
 
         Such a robot is early for a gap that opens, and how it spends the time it has left is
@@ -133,30 +133,32 @@ class _Task:
         if best_m <= _LONG * self.straight_m:
             return ways
         params = _FINE if best_m <= _VERY_LONG * self.straight_m else _COARSE
-        others = self._refined(self._by_lattice(legs, best_m / self.v, params), legs)
+        others = self._refined(self._by_lattice(segments, best_m / self.v, params), segments)
         return sorted([*ways, *others], key=_length)
 
-    def _touched(self, way: np.ndarray, legs: Legs) -> set[int]:
+    def _touched(self, way: np.ndarray, segments: UniformSegments) -> set[int]:
         """Obstacles that a way runs into."""
-        gap = gaps(way[None], self.v, legs)[0]
-        return set(legs.obstacle[(gap < CLEAR_M / 2.0).any(axis=0)].tolist())
+        gap = gaps(way[None], self.v, segments)[0]
+        return set(segments.obstacle[(gap < CLEAR_M / 2.0).any(axis=0)].tolist())
 
-    def _by_tangents(self, legs: Legs) -> list[np.ndarray]:
+    def _by_tangents(self, segments: UniformSegments) -> list[np.ndarray]:
         """Shortest ways among a few obstacles; whom the best one touches joins them.
 
         What is shortest among some obstacles and free of all is shortest among all.
         """
         start, goal = self.scenario.start_m, self.scenario.goal_m
         while True:
-            some = legs.of(sorted(self.active))
+            some = segments.of(sorted(self.active))
             ways = Search(start, goal, self.v, some, self.params, self.inside).ways()
             if not ways:
                 return []
-            touched = self._touched(ways[0], legs)
+            touched = self._touched(ways[0], segments)
             if not touched - self.active:
-                return [way for way in ways if not self._touched(way, legs)]
+                return [way for way in ways if not self._touched(way, segments)]
             self.active |= touched
 
-    def _by_lattice(self, legs: Legs, limit_s: float, params: LatticeParams) -> list[np.ndarray]:
+    def _by_lattice(
+        self, segments: UniformSegments, limit_s: float, params: LatticeParams
+    ) -> list[np.ndarray]:
         start, goal = self.scenario.start_m, self.scenario.goal_m
-        return lattice_ways(start, goal, self.v, legs, limit_s, params, self.inside)
+        return lattice_ways(start, goal, self.v, segments, limit_s, params, self.inside)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...core.geometry import Point
 from ...simulation.obstacle_motion import Walls
-from ...simulation.uniform_segments import Legs
+from ...simulation.uniform_segments import UniformSegments
 from .polyline import edge_gaps, within
 
 CLEAR_M = 1e-5  # kept from every circle, so that rounding cannot make contact
@@ -73,21 +73,21 @@ class Search:
         start: Point,
         goal: Point,
         speed_mps: float,
-        legs: Legs,
+        segments: UniformSegments,
         params: SearchParams,
         inside: Walls | None = None,
     ) -> None:
         """Prepare; speed in m/s; all ways stay within the rectangle inside, if there is one."""
-        self.start, self.goal, self.v, self.legs = start, goal, speed_mps, legs
+        self.start, self.goal, self.v, self.segments = start, goal, speed_mps, segments
         self.params, self.inside = params, inside
-        self.inner = legs._replace(radius=legs.radius + CLEAR_M)
-        self.edge = (legs.radius + 2.0 * CLEAR_M) / math.cos(params.chord_rad / 2.0)
-        self.end_x = legs.x + legs.vx * (legs.t1 - legs.t0)
-        self.end_y = legs.y + legs.vy * (legs.t1 - legs.t0)
-        same = legs.obstacle[1:] == legs.obstacle[:-1]
+        self.inner = segments._replace(radius=segments.radius + CLEAR_M)
+        self.edge = (segments.radius + 2.0 * CLEAR_M) / math.cos(params.chord_rad / 2.0)
+        self.end_x = segments.x + segments.vx * (segments.t1 - segments.t0)
+        self.end_y = segments.y + segments.vy * (segments.t1 - segments.t0)
+        same = segments.obstacle[1:] == segments.obstacle[:-1]
         self.kinked = np.append(same, False)  # the next leg is the same obstacle's
-        self.horizon = float(legs.t1.max())
-        fast = legs.vx**2 + legs.vy**2 >= speed_mps**2
+        self.horizon = float(segments.t1.max())
+        fast = segments.vx**2 + segments.vy**2 >= speed_mps**2
         self.roots = (1.0, -1.0) if fast.any() else (1.0,)
 
     def ways(self) -> list[np.ndarray]:
@@ -131,7 +131,7 @@ class Search:
                 break
             way = graph.way(node)
             passed = [
-                (int(self.legs.obstacle[graph.leg[n]]), graph.side[n])
+                (int(self.segments.obstacle[graph.leg[n]]), graph.side[n])
                 for n in way
                 if graph.leg[n] >= 0
             ]
@@ -191,31 +191,31 @@ class Search:
         self, x: np.ndarray, y: np.ndarray, t: np.ndarray, leg: np.ndarray
     ) -> list[tuple[np.ndarray, ...]]:
         """Headings that graze a circle while its leg lasts, on either side."""
-        legs = self.legs
-        dx = legs.x + legs.vx * (t[:, None] - legs.t0) - x[:, None]
-        dy = legs.y + legs.vy * (t[:, None] - legs.t0) - y[:, None]
+        segments = self.segments
+        dx = segments.x + segments.vx * (t[:, None] - segments.t0) - x[:, None]
+        dy = segments.y + segments.vy * (t[:, None] - segments.t0) - y[:, None]
         d2 = dx * dx + dy * dy
         reach = np.sqrt(np.maximum(d2 - self.edge**2, 0.0))
-        outside = (d2 > self.edge**2 * (1.0 + 1e-9)) & (legs.t1 > t[:, None])
+        outside = (d2 > self.edge**2 * (1.0 + 1e-9)) & (segments.t1 > t[:, None])
         on = np.flatnonzero(leg >= 0)
         outside[on, leg[on]] = False
-        slack = self.v**2 - legs.vx**2 - legs.vy**2
+        slack = self.v**2 - segments.vx**2 - segments.vy**2
         parts: list[tuple[np.ndarray, ...]] = []
         for s in (1, -1):
             tx = (dx * reach + s * dy * self.edge) / np.maximum(d2, 1e-9)
             ty = (dy * reach - s * dx * self.edge) / np.maximum(d2, 1e-9)
-            along = legs.vx * tx + legs.vy * ty
+            along = segments.vx * tx + segments.vy * ty
             under = along * along + slack
             for root in self.roots:
                 closing = -along + root * np.sqrt(np.maximum(under, 0.0))
                 wait = reach / np.maximum(closing, 1e-9)
                 end = t[:, None] + wait
                 good = outside & (under >= 0.0) & (closing > 1e-9)
-                good &= (end >= legs.t0) & (end <= legs.t1)
+                good &= (end >= segments.t0) & (end <= segments.t1)
                 i, j = np.nonzero(good)
                 w = wait[i, j]
-                ex = x[i] + (closing[i, j] * tx[i, j] + legs.vx[j]) * w
-                ey = y[i] + (closing[i, j] * ty[i, j] + legs.vy[j]) * w
+                ex = x[i] + (closing[i, j] * tx[i, j] + segments.vx[j]) * w
+                ey = y[i] + (closing[i, j] * ty[i, j] + segments.vy[j]) * w
                 parts.append((i, ex, ey, end[i, j], j, np.full(len(i), s)))
         return parts
 
@@ -225,7 +225,7 @@ class Search:
             return []
         dx, dy = self.end_x - x[:, None], self.end_y - y[:, None]
         d = np.sqrt(dx * dx + dy * dy)
-        wait = self.legs.t1 - t[:, None]
+        wait = self.segments.t1 - t[:, None]
         way = self.v * wait
         a = (way * way - self.edge**2 + d * d) / (2.0 * np.maximum(d, 1e-9))
         h2 = way * way - a * a
@@ -238,7 +238,7 @@ class Search:
                 i,
                 x[i] + a * nx - s * h * ny,
                 y[i] + a * ny + s * h * nx,
-                self.legs.t1[j],
+                self.segments.t1[j],
                 j + 1,
                 np.full(len(i), -s),
             )
@@ -251,10 +251,10 @@ class Search:
         """One chord further along the circle's edge."""
         i = np.flatnonzero(leg >= 0)
         j, s = leg[i], side[i]
-        vx, vy = self.legs.vx[j], self.legs.vy[j]
-        since = t[i] - self.legs.t0[j]
-        rx = x[i] - self.legs.x[j] - vx * since
-        ry = y[i] - self.legs.y[j] - vy * since
+        vx, vy = self.segments.vx[j], self.segments.vy[j]
+        since = t[i] - self.segments.t0[j]
+        rx = x[i] - self.segments.x[j] - vx * since
+        ry = y[i] - self.segments.y[j] - vy * since
         angle = np.arctan2(ry, rx) + s * self.params.chord_rad
         qx, qy = self.edge[j] * np.cos(angle) - rx, self.edge[j] * np.sin(angle) - ry
         a = self.v**2 - vx**2 - vy**2
@@ -264,7 +264,7 @@ class Search:
         with np.errstate(divide="ignore", invalid="ignore"):
             wait = (b + np.sqrt(under)) / a
         end = t[i] + wait
-        ok = (under >= 0.0) & (wait > 0.0) & (end <= self.legs.t1[j])
+        ok = (under >= 0.0) & (wait > 0.0) & (end <= self.segments.t1[j])
         i, j, s, wait, end = i[ok], j[ok], s[ok], wait[ok], end[ok]
         ex = x[i] + qx[ok] + vx[ok] * wait
         ey = y[i] + qy[ok] + vy[ok] * wait

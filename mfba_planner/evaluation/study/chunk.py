@@ -9,7 +9,7 @@ from typing import Any, Protocol
 Columns = Mapping[str, list[Any]]  # of equal lengths; whole and other numbers, text
 
 
-class Part(Protocol):
+class Chunk(Protocol):
     """Some work of a study; it travels to a worker and its columns come back."""
 
     @property

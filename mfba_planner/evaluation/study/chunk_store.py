@@ -15,7 +15,7 @@ import numpy as np
 from ... import __version__
 from ...core.errors import OutputError
 from ...core.outputs import write_new
-from .chunk import Columns, Part
+from .chunk import Chunk, Columns
 
 SCHEMA_VERSION = 1
 MANIFEST, CHUNKS = "study.json", "chunks"
@@ -28,7 +28,7 @@ class Store:
     def __init__(
         self,
         directory: Path,
-        parts: Sequence[Part],
+        chunks: Sequence[Chunk],
         facts: Mapping[str, Any],
         *,
         command: str,
@@ -39,33 +39,33 @@ class Store:
         command names the study to users; packages are the folders whose code decides the numbers.
         """
         self.directory = directory
-        chunks = directory / CHUNKS
-        wanted = manifest(parts, facts, packages)
+        folder = directory / CHUNKS
+        wanted = manifest(chunks, facts, packages)
         try:
             if directory.is_dir() and any(directory.iterdir()):
                 _compare(directory, wanted, command)
             else:
-                chunks.mkdir(parents=True)
+                folder.mkdir(parents=True)
                 write_new(directory / MANIFEST, _text(wanted))
-            chunks.mkdir(exist_ok=True)
+            folder.mkdir(exist_ok=True)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise OutputError(
                 f"{directory}: cannot be written ({reason}); give a writable --out"
             ) from None
 
-    def read(self, part: Part) -> Columns | None:
+    def read(self, chunk: Chunk) -> Columns | None:
         """A finished part; None when it is not there or not whole, and so to be computed."""
-        return read_part(self.directory, part.name)
+        return read_chunk(self.directory, chunk.name)
 
-    def write(self, part: Part, columns: Columns) -> None:
+    def write(self, chunk: Chunk, columns: Columns) -> None:
         """Keep a finished part; what stood in its place was not whole."""
-        path = self.directory / CHUNKS / f"{part.name}.json"
+        path = self.directory / CHUNKS / f"{chunk.name}.json"
         path.unlink(missing_ok=True)
         write_new(path, _text({"columns": columns, "sha256": digest(columns)}))
 
 
-def read_part(directory: Path, name: str) -> Columns | None:
+def read_chunk(directory: Path, name: str) -> Columns | None:
     """The finished part of that name; None when it is not there or not whole."""
     try:
         data = json.loads((directory / CHUNKS / f"{name}.json").read_text(encoding="utf-8"))
@@ -77,7 +77,7 @@ def read_part(directory: Path, name: str) -> Columns | None:
 
 
 def manifest(
-    parts: Sequence[Part], facts: Mapping[str, Any], packages: Sequence[str]
+    chunks: Sequence[Chunk], facts: Mapping[str, Any], packages: Sequence[str]
 ) -> dict[str, Any]:
     """All that decides the numbers: versions, the code itself, what is run with what."""
     return {
@@ -86,8 +86,8 @@ def manifest(
         "code": code_digest(*packages),
         "numpy": np.__version__,
         **facts,
-        "chunks": [part.name for part in parts],
-        "samples": digest([part.facts() for part in parts]),
+        "chunks": [chunk.name for chunk in chunks],
+        "samples": digest([chunk.facts() for chunk in chunks]),
     }
 
 

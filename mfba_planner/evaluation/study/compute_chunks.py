@@ -15,13 +15,13 @@ from itertools import islice
 from typing import TypeVar
 
 from ...core.errors import ConfigError, MfbaError
-from .chunk import Columns, Part
+from .chunk import Chunk, Columns
 from .chunk_store import Store
 
 MAX_WORKERS = 256
 TRIES = 3  # of a part whose worker dies
 
-P = TypeVar("P", bound=Part)
+P = TypeVar("P", bound=Chunk)
 Done = Callable[[P], None]
 
 
@@ -36,7 +36,7 @@ def check_workers(workers: int) -> None:
 
 
 def compute(
-    parts: Sequence[P],
+    chunks: Sequence[P],
     *,
     workers: int = 1,
     executor: Executor | None = None,
@@ -54,67 +54,67 @@ def compute(
     check_workers(workers)
     found: dict[str, Columns] = {}
     missing = []
-    for part in parts:
-        columns = store.read(part) if store else None
+    for chunk in chunks:
+        columns = store.read(chunk) if store else None
         if columns is None:
-            missing.append(part)
+            missing.append(chunk)
         else:
-            found[part.name] = columns
-            done(part)
-    for part, columns in _computed(missing, workers, executor, say):
+            found[chunk.name] = columns
+            done(chunk)
+    for chunk, columns in _computed(missing, workers, executor, say):
         if store:
-            store.write(part, columns)
-        found[part.name] = columns
-        done(part)
+            store.write(chunk, columns)
+        found[chunk.name] = columns
+        done(chunk)
     return found
 
 
 def _computed(
-    parts: Sequence[P], workers: int, executor: Executor | None, say: Callable[[str], None]
+    chunks: Sequence[P], workers: int, executor: Executor | None, say: Callable[[str], None]
 ) -> Iterator[tuple[P, Columns]]:
-    if executor is None and (workers == 1 or len(parts) < 2):
-        yield from ((part, part.run()) for part in parts)
+    if executor is None and (workers == 1 or len(chunks) < 2):
+        yield from ((chunk, chunk.run()) for chunk in chunks)
         return
     died: Counter[str] = Counter()
-    left = {part.name: part for part in parts}
+    left = {chunk.name: chunk for chunk in chunks}
     while left:
-        suspects = [part for part in left.values() if died[part.name]]
+        suspects = [chunk for chunk in left.values() if died[chunk.name]]
         # What was under way when a worker died is tried again alone: then it is known.
         batch = suspects[:1] or list(left.values())
-        for part, outcome in _batch(batch, workers, executor):
+        for chunk, outcome in _batch(batch, workers, executor):
             if isinstance(outcome, WorkerDied):
-                died[part.name] += 1
-                _report(part, died[part.name], alone=len(batch) == 1, say=say)
+                died[chunk.name] += 1
+                _report(chunk, died[chunk.name], alone=len(batch) == 1, say=say)
             else:
-                del left[part.name]
-                yield part, outcome
+                del left[chunk.name]
+                yield chunk, outcome
 
 
-def _report(part: Part, times: int, *, alone: bool, say: Callable[[str], None]) -> None:
+def _report(chunk: Chunk, times: int, *, alone: bool, say: Callable[[str], None]) -> None:
     if alone and times >= TRIES:
         raise MfbaError(
-            f"{part.name}: a worker process died {times} times on it (out of memory?); run again "
+            f"{chunk.name}: a worker process died {times} times on it (out of memory?); run again "
             "with fewer --workers, finished parts are kept"
         )
-    say(f"{part.name}: its worker process may have died; trying it again alone")
+    say(f"{chunk.name}: its worker process may have died; trying it again alone")
 
 
 def _batch(
-    parts: Sequence[P], workers: int, executor: Executor | None
+    chunks: Sequence[P], workers: int, executor: Executor | None
 ) -> Iterator[tuple[P, Columns | WorkerDied]]:
     """Ends early where a worker has died: of what was not yet begun nothing is told."""
     if executor is not None:
-        yield from _gathered(parts, executor, len(parts))
+        yield from _gathered(chunks, executor, len(chunks))
         return
     # Spawned, not forked: the parent may have threads, and every platform does the same.
-    workers = min(workers, len(parts))
+    workers = min(workers, len(chunks))
     own = ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
         initializer=belong_to_the_parent,
     )
     try:
-        yield from _gathered(parts, own, workers + 1)
+        yield from _gathered(chunks, own, workers + 1)
     except BaseException:
         # A worker that a Ctrl-C met while it started may never end; what it does is not needed.
         for child in multiprocessing.active_children():
@@ -125,21 +125,21 @@ def _batch(
 
 
 def _gathered(
-    parts: Sequence[P], executor: Executor, at_once: int
+    chunks: Sequence[P], executor: Executor, at_once: int
 ) -> Iterator[tuple[P, Columns | WorkerDied]]:
     """Hand out at_once parts, and one more for each that comes back."""
-    waiting = iter(parts)
+    waiting = iter(chunks)
     running: dict[Future[Columns], P] = {}
     died = False
     try:
-        running.update((executor.submit(part.run), part) for part in islice(waiting, at_once))
+        running.update((executor.submit(chunk.run), chunk) for chunk in islice(waiting, at_once))
         while running:
             finished, _ = wait(running, return_when=FIRST_COMPLETED)
             outcomes = [(running.pop(future), _outcome(future)) for future in finished]
             died = died or any(isinstance(outcome, WorkerDied) for _, outcome in outcomes)
             if not died:
                 more = islice(waiting, len(finished))
-                running.update((executor.submit(part.run), part) for part in more)
+                running.update((executor.submit(chunk.run), chunk) for chunk in more)
             yield from outcomes
     finally:
         for future in running:

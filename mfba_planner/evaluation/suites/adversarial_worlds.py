@@ -66,18 +66,20 @@ def chasers(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
 
 def _chaser(trip: Trip, center: Point, speed: float, rng: np.random.Generator) -> Obstacle:
     every_s, end_s = 1.5, 1.5 * trip.time_s
-    legs: list[Turn] = []
+    segments: list[Turn] = []
     here, t = center, 0.0
     while t < end_s:
         heading = _lead(trip, here, t, speed) + rng.normal(0.0, math.radians(8.0))
-        legs.append(Turn(at_s=t, speed_mps=speed, heading_rad=math.remainder(heading, math.tau)))
+        segments.append(
+            Turn(at_s=t, speed_mps=speed, heading_rad=math.remainder(heading, math.tau))
+        )
         here, t = towards(here, heading, speed * every_s), t + every_s
     return Obstacle(
         center_m=center,
         radius_m=OBSTACLE_RADIUS_M,
         speed_mps=speed,
-        heading_rad=legs[0].heading_rad,
-        turns=tuple(legs[1:]),
+        heading_rad=segments[0].heading_rad,
+        turns=tuple(segments[1:]),
     )
 
 

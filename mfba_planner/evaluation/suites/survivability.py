@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.geometry import distance
 from ...simulation.scenario import Scenario
-from ...simulation.uniform_segments import Legs, uniform_legs
+from ...simulation.uniform_segments import UniformSegments, uniform_segments
 from .trip import ROOM
 
 _PLACES = 10  # per side of the area
@@ -32,7 +32,7 @@ def survivability(scenario: Scenario, speed_mps: float) -> Survivability:
     """
     horizon_s = distance(scenario.start_m, scenario.goal_m) / speed_mps
     places = _raster(scenario)
-    first = first_contact_s(uniform_legs(scenario, horizon_s), places)
+    first = first_contact_s(uniform_segments(scenario, horizon_s), places)
     standing = first > 0.0
     if not standing.any():
         return Survivability(share=0.0, mean_time_s=0.0, places=0)
@@ -53,19 +53,19 @@ def _raster(scenario: Scenario) -> np.ndarray:
     return np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
 
 
-def first_contact_s(legs: Legs, places: np.ndarray) -> np.ndarray:
+def first_contact_s(segments: UniformSegments, places: np.ndarray) -> np.ndarray:
     """When an enlarged circle first reaches each place, inf for never; places (n, 2) in m."""
-    if not legs.t0.size:
+    if not segments.t0.size:
         return np.full(len(places), np.inf)
-    px = legs.x - places[:, :1]  # (n, m): centre seen from the place
-    py = legs.y - places[:, 1:]
-    a = legs.vx**2 + legs.vy**2
-    b = px * legs.vx + py * legs.vy
-    c = px**2 + py**2 - legs.radius**2
+    px = segments.x - places[:, :1]  # (n, m): centre seen from the place
+    py = segments.y - places[:, 1:]
+    a = segments.vx**2 + segments.vy**2
+    b = px * segments.vx + py * segments.vy
+    c = px**2 + py**2 - segments.radius**2
     under = b * b - a * c
     with np.errstate(divide="ignore", invalid="ignore"):
         entry = (-b - np.sqrt(under)) / a
-    reached = (under >= 0.0) & (a > 0.0) & (entry >= 0.0) & (entry <= legs.t1 - legs.t0)
-    times = np.where(reached, legs.t0 + entry, np.inf)
-    times = np.where(c <= 0.0, legs.t0, times)  # inside as the leg begins
+    reached = (under >= 0.0) & (a > 0.0) & (entry >= 0.0) & (entry <= segments.t1 - segments.t0)
+    times = np.where(reached, segments.t0 + entry, np.inf)
+    times = np.where(c <= 0.0, segments.t0, times)  # inside as the leg begins
     return times.min(axis=1)

@@ -14,8 +14,8 @@ from ..study.chunk import Columns
 from ..suites import suite
 from ..suites.survivability import survivability
 from .columns import Row, lost_row, made_row, timing_row
-from .single_run import flies_together, play, play_together
-from .sweep_spec import Order, Run, Setting
+from .single_run import generates_paths_together, run_one, run_together
+from .sweep_spec import Run, Setting, SweepSpec
 from .worker import Lost, each
 
 RUNS_AT_ONCE = 100
@@ -44,7 +44,7 @@ class Runs:
     def run(self) -> Columns:
         """Make the runs; COLUMNS (without the oracle's) and TIMINGS."""
         batches: list[tuple[Run, ...]] = [(run,) for run in self.runs]
-        if flies_together(self.runs[0].planner, self.setting):
+        if generates_paths_together(self.runs[0].planner, self.setting):
             # One alone: what does a decision take?
             batches = [batch for batch in (self.runs[:1], self.runs[1:]) if batch]
         found = list(self._made(batches))
@@ -68,7 +68,7 @@ def make(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
     """Make some runs here, together where they are several; their rows and timings."""
     begun = perf_counter()
     alone = len(runs) == 1
-    all_played = [play(runs[0], setting, whole=False)] if alone else play_together(runs, setting)
+    all_played = [run_one(runs[0], setting, whole=False)] if alone else run_together(runs, setting)
     made = [(played.times_ns, made_row(run, played)) for run, played in zip(runs, all_played)]
     wall_ms = 1e3 * (perf_counter() - begun) / len(runs)
     return [{**timing_row(times_ns, wall_ms), **row} for times_ns, row in made]
@@ -122,24 +122,24 @@ def judge(world: int, of: Optima) -> Row:
     }
 
 
-def parts_of(order: Order) -> list[Runs | Optima]:
+def chunks_of(order: SweepSpec) -> list[Runs | Optima]:
     """All parts of a sweep; what they are does not depend on who computes them."""
     at_once = max(1, RUNS_AT_ONCE // order.seeds)
-    parts: list[Runs | Optima] = [*(_optima(order) if order.oracle else ())]
+    chunks: list[Runs | Optima] = [*(_optima(order) if order.oracle else ())]
     for planner in order.planners:
         for first in order.world_range[::at_once]:
             worlds = range(first, min(first + at_once, order.world_range.stop))
-            parts.append(
+            chunks.append(
                 Runs(
                     name=f"{order.suite}-{_plain(planner)}-{first}-{len(worlds)}",
                     runs=tuple(order.runs(planner, worlds)),
                     setting=order.setting_of(planner),
                 )
             )
-    return parts
+    return chunks
 
 
-def _optima(order: Order) -> Iterator[Optima]:
+def _optima(order: SweepSpec) -> Iterator[Optima]:
     worlds = suite(order.suite, order.setting.suite_seed)
     numbers = sorted({worlds.world_number(k) for k in order.world_range})
     for begin in range(0, len(numbers), WORLDS_AT_ONCE):
@@ -152,15 +152,15 @@ def _optima(order: Order) -> Iterator[Optima]:
 
 
 def gather(
-    parts: list[Runs | Optima], found: Mapping[str, Columns]
+    chunks: list[Runs | Optima], found: Mapping[str, Columns]
 ) -> tuple[list[Row], list[Row]]:
     """A row for each run, and one for each world that the oracle was asked about."""
     runs: list[Row] = []
     optima: list[Row] = []
-    for part in parts:
-        columns = found[part.name]
+    for chunk in chunks:
+        columns = found[chunk.name]
         rows_of = [dict(zip(columns, values)) for values in zip(*columns.values())]
-        (optima if isinstance(part, Optima) else runs).extend(rows_of)
+        (optima if isinstance(chunk, Optima) else runs).extend(rows_of)
     return runs, optima
 
 

@@ -11,10 +11,10 @@ from typing import Any
 
 from ...core.geometry import distance
 from ...simulation.episode import Outcome
-from ..contacts_and_clearances import Conduct
+from ..contacts_and_clearances import RunMotion
 from ..metrics import Result, assess
 from ..scores import barn_score, optimality_gap, spl, time_to_goal_s
-from .single_run import Played
+from .single_run import PlayedRun
 from .sweep_spec import Run
 
 Row = dict[str, Any]
@@ -63,7 +63,7 @@ _JUDGED: dict[str, tuple[type, str]] = {
     "spl": (float, "success weighted by path length, against the optimum"),
     "barn": (float, "BARN score, against the optimum at full speed"),
 }
-_OF_CONDUCT = [field.name for field in fields(Conduct) if field.name in _MADE]
+_OF_CONDUCT = [field.name for field in fields(RunMotion) if field.name in _MADE]
 _OF_RESULT = [field.name for field in fields(Result) if field.name in _MADE]
 COLUMNS = {**_KEY, **_MADE, **_JUDGED}
 # Clocks differ from run to run: these stand in a table of their own.
@@ -75,14 +75,14 @@ TIMINGS: dict[str, tuple[type, str]] = {
 }
 
 
-def made_row(run: Run, played: Played) -> Row:
+def made_row(run: Run, played: PlayedRun) -> Row:
     """What a run says of itself, without the oracle."""
-    result, conduct = assess(played.episode)
+    result, run_motion = assess(played.episode)
     scenario = played.episode.scenario
     row = {
         **dict.fromkeys(_MADE),
         **run._asdict(),
-        **{name: getattr(conduct, name) for name in _OF_CONDUCT},
+        **{name: getattr(run_motion, name) for name in _OF_CONDUCT},
         **{name: getattr(result, name) for name in _OF_RESULT},
         "outcome": FAILED if played.fault else result.outcome.value,
         "failure": played.fault_at,

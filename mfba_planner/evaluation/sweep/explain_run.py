@@ -15,23 +15,23 @@ from ...perception.sensory_vector import bits_text
 from ...simulation.batched_motion import Motion
 from ...simulation.episode import Episode, Outcome
 from ...simulation.obstacle_motion import velocity_at
-from ..contacts_and_clearances import Conduct
+from ..contacts_and_clearances import RunMotion
 from ..metrics import Result, assess, within_range
-from .single_run import Played
+from .single_run import PlayedRun
 
 BEFORE = 6  # decisions that are shown
 
 
-def _headline(played: Played, result: Result, conduct: Conduct) -> str:
+def _headline(played: PlayedRun, result: Result, run_motion: RunMotion) -> str:
     """How it ended, in one line."""
     episode = played.episode
     if played.fault:
         return f"the planner failed at {played.fault_at}"
     if result.collisions:
-        number, index = conduct.first_contact_with, _index(episode, conduct) or 0
+        number, index = run_motion.first_contact_with, _index(episode, run_motion) or 0
         did = "ran into" if _moves(episode, index) else "stood still and was hit by"
         more = f"; {result.collisions} contacts in all" if result.collisions > 1 else ""
-        return f"the robot {did} obstacle {number} at {conduct.first_contact_s:.2f} s{more}"
+        return f"the robot {did} obstacle {number} at {run_motion.first_contact_s:.2f} s{more}"
     if result.outcome is Outcome.GOAL_REACHED:
         return f"goal reached without collision after {result.length_m:.3f} m"
     left = distance(episode.ticks[-1].pose.position, episode.scenario.goal_m)
@@ -43,22 +43,22 @@ def contact_index(episode: Episode) -> int | None:
     return _index(episode, assess(episode)[1])
 
 
-def _index(episode: Episode, conduct: Conduct) -> int | None:
+def _index(episode: Episode, run_motion: RunMotion) -> int | None:
     times = [episode.time_s(tick.stamp_ns) for tick in episode.ticks]
-    contact_s = conduct.first_contact_s
+    contact_s = run_motion.first_contact_s
     return times.index(contact_s) if contact_s in times else None
 
 
-def explain(played: Played) -> list[str]:
+def explain(played: PlayedRun) -> list[str]:
     """Lines that tell what happened and why, the headline first."""
     episode = played.episode
-    result, conduct = assess(episode)
-    lines = [_headline(played, result, conduct)]
+    result, run_motion = assess(episode)
+    lines = [_headline(played, result, run_motion)]
     if not episode.ticks:
         return lines
-    index = _index(episode, conduct)
+    index = _index(episode, run_motion)
     if index is not None:
-        number = conduct.first_contact_with
+        number = run_motion.first_contact_with
         lines += [*_contact(episode, index, number), "", *_table(episode, index, number)]
     elif played.fault:
         last = len(episode.ticks) - 1
@@ -66,12 +66,12 @@ def explain(played: Played) -> list[str]:
     elif episode.outcome is not Outcome.GOAL_REACHED:
         lines += [
             *_held_up(episode, result),
-            *_passes(result, conduct),
+            *_passes(result, run_motion),
             "",
             *_table(episode, len(episode.ticks) - 1, 0),
         ]
     else:
-        lines += _passes(result, conduct)
+        lines += _passes(result, run_motion)
     return lines
 
 
@@ -138,12 +138,12 @@ def _held_up(episode: Episode, result: Result) -> Iterator[str]:
     )
 
 
-def _passes(result: Result, conduct: Conduct) -> Iterator[str]:
+def _passes(result: Result, run_motion: RunMotion) -> Iterator[str]:
     if math.isfinite(result.min_clearance_m):
-        ttc = f"{conduct.min_ttc_s:.2f} s" if math.isfinite(conduct.min_ttc_s) else "never"
+        ttc = f"{run_motion.min_ttc_s:.2f} s" if math.isfinite(run_motion.min_ttc_s) else "never"
         yield (
             f"near: smallest gap {result.min_clearance_m:.3f} m, on average "
-            f"{conduct.mean_clearance_m:.3f} m; smallest time to collision {ttc}"
+            f"{run_motion.mean_clearance_m:.3f} m; smallest time to collision {ttc}"
         )
 
 

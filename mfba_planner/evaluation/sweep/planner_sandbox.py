@@ -22,7 +22,7 @@ class HungError(BaseException):
     """An alarm went off while a planner decided; no `except Exception` of its own stops it."""
 
 
-class Guard:
+class PlannerSandbox:
     """Passes on what a planner decides; PlannerFault where it must not be followed.
 
     decisions are those that were followed, times_ns what each took by the machine's clock, and

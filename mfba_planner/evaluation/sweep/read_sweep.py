@@ -11,11 +11,11 @@ from ...core.errors import ConfigError, InputError
 from ...core.options import override
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
-from ..study.chunk_store import code_digest, read_manifest, read_part
-from .chunks import parts_of
+from ..study.chunk_store import code_digest, read_chunk, read_manifest
+from .chunks import chunks_of
 from .columns import Row
 from .run_sweep import COMMAND, PACKAGES
-from .sweep_spec import Order, Setting
+from .sweep_spec import Setting, SweepSpec
 from .table import build
 
 
@@ -23,7 +23,7 @@ from .table import build
 class ReadSweep:
     """What a directory holds; of an interrupted sweep the finished part."""
 
-    order: Order
+    order: SweepSpec
     rows: list[Row]
     code_changed: bool
 
@@ -39,20 +39,20 @@ def read_sweep(directory: Path) -> ReadSweep:
         raise InputError(
             f"{directory}: not of this version's `{COMMAND}` ({error}); sweep again"
         ) from None
-    parts = parts_of(order)
-    found = {part.name: read_part(directory, part.name) for part in parts}
-    finished = [part for part in parts if found[part.name] is not None]
+    chunks = chunks_of(order)
+    found = {chunk.name: read_chunk(directory, chunk.name) for chunk in chunks}
+    finished = [chunk for chunk in chunks if found[chunk.name] is not None]
     rows, _ = build(order, finished, {name: c for name, c in found.items() if c is not None})
     return ReadSweep(
         order=order, rows=rows, code_changed=facts.get("code") != code_digest(*PACKAGES)
     )
 
 
-def _order(facts: dict[str, Any]) -> Order:
+def _order(facts: dict[str, Any]) -> SweepSpec:
     told = dict(facts["setting"])
     params = override(PlannerParams(), told.pop("params"))
     sensor = override(SensorParams(), told.pop("sensor"))
-    return Order(
+    return SweepSpec(
         suite=facts["suite"],
         planners=tuple(facts["planners"]),
         worlds=facts["worlds"],

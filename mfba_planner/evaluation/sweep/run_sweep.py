@@ -12,12 +12,12 @@ from typing import Any
 
 from ...core.errors import ConfigError, MfbaError
 from ...core.options import flatten
-from ..study.chunk import Part
+from ..study.chunk import Chunk
 from ..study.chunk_store import Store
 from ..study.compute_chunks import compute
-from .chunks import parts_of
+from .chunks import chunks_of
 from .columns import Row
-from .sweep_spec import Order
+from .sweep_spec import SweepSpec
 from .table import build, sorted_hash
 
 COMMAND = "mfba sweep"
@@ -29,7 +29,7 @@ CONNECT_S = 10
 class Swept:
     """What came of a sweep."""
 
-    order: Order
+    order: SweepSpec
     rows: list[Row]
     timings: list[Row]
 
@@ -39,7 +39,7 @@ class Swept:
         return sorted_hash(self.rows)
 
 
-def order_facts(order: Order) -> dict[str, Any]:
+def spec_facts(order: SweepSpec) -> dict[str, Any]:
     """What the directory of a sweep says of it."""
     return {
         "suite": order.suite,
@@ -53,28 +53,28 @@ def order_facts(order: Order) -> dict[str, Any]:
     }
 
 
-def open_store(directory: Path, order: Order) -> Store:
+def open_store(directory: Path, order: SweepSpec) -> Store:
     """The directory of a sweep, new or to go on in. Raises OutputError as Store does."""
-    parts = parts_of(order)
-    return Store(directory, parts, order_facts(order), command=COMMAND, packages=PACKAGES)
+    chunks = chunks_of(order)
+    return Store(directory, chunks, spec_facts(order), command=COMMAND, packages=PACKAGES)
 
 
 def sweep(
-    order: Order,
+    order: SweepSpec,
     *,
     workers: int = 1,
     executor: Executor | None = None,
     store: Store | None = None,
-    done: Callable[[Part], None] = lambda _: None,
+    done: Callable[[Chunk], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Swept:
     """Make all runs (or read them back); the result does not depend on who makes them.
 
     workers, executor, store, done and say as in study.compute, which tells what is raised.
     """
-    parts = parts_of(order)
-    found = compute(parts, workers=workers, executor=executor, store=store, done=done, say=say)
-    rows, timings = build(order, parts, found)
+    chunks = chunks_of(order)
+    found = compute(chunks, workers=workers, executor=executor, store=store, done=done, say=say)
+    rows, timings = build(order, chunks, found)
     return Swept(order=order, rows=rows, timings=timings)
 
 

@@ -54,7 +54,7 @@ class Setting:
 
     def __post_init__(self) -> None:
         """Raise ConfigError for what cannot be."""
-        self.look(0)
+        self.observer(0)
         if not 0.0 < self.patience_s <= LONGEST_S:
             raise ConfigError(
                 f"--patience={self.patience_s:g}: out of range; give 0 to {LONGEST_S:g} s"
@@ -64,7 +64,7 @@ class Setting:
         """The world of a run."""
         return suite(run.suite, self.suite_seed).world(run.world, self.params.speed_mps)
 
-    def look(self, seed: int, *, sectors: bool = True) -> Perception:
+    def observer(self, seed: int, *, sectors: bool = True) -> Perception:
         """What a planner gets to see."""
         return Perception(
             self.perception,
@@ -74,7 +74,7 @@ class Setting:
             sectors=sectors,
         )
 
-    def brain(self, run: Run) -> PathPlanner:
+    def make_planner(self, run: Run) -> PathPlanner:
         """A fresh planner; see make_planner."""
         return make_planner(run.planner, self.params, self.sensor, run.seed)
 
@@ -88,7 +88,7 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
+class SweepSpec:
     """Worlds first .. first + worlds - 1 of a suite, each planner in each, seeds 0 .. seeds - 1.
 
     Where a suite repeats its worlds, each round of them has the next seed; seeds is 1 there.
@@ -122,7 +122,7 @@ class Order:
         if not self.planners:
             raise ConfigError("--planner: none given; name at least one")
         for k, name in enumerate(self.planners):
-            self.setting_of(name).brain(Run(self.suite, 0, name, 0))
+            self.setting_of(name).make_planner(Run(self.suite, 0, name, 0))
             if name in self.planners[:k]:
                 raise ConfigError(f"--planner {name}: given twice; name each planner once")
 

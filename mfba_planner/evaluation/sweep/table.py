@@ -18,16 +18,16 @@ from ..study.chunk import Columns
 from ..suites import suite
 from .chunks import Optima, Runs, gather
 from .columns import COLUMNS, TIMINGS, Row, judged
-from .sweep_spec import Order
+from .sweep_spec import SweepSpec
 
 Kinds = Mapping[str, tuple[type, str]]
 
 
 def build(
-    order: Order, parts: list[Runs | Optima], found: Mapping[str, Columns]
+    order: SweepSpec, chunks: list[Runs | Optima], found: Mapping[str, Columns]
 ) -> tuple[list[Row], list[Row]]:
     """The table's rows and the timings' rows, in the order of suite, world, planner, seed."""
-    runs, optima = gather(parts, found)
+    runs, optima = gather(chunks, found)
     by_world = {row["world"]: row for row in optima}
     worlds = suite(order.suite, order.setting.suite_seed)
     place = {name: k for k, name in enumerate(order.planners)}

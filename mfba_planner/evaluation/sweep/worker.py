@@ -44,15 +44,15 @@ def each(
             yield answer
 
 
-def _keeper() -> Keeper:
-    found: Keeper | None = getattr(_LOCAL, "keeper", None)
+def _keeper() -> Worker:
+    found: Worker | None = getattr(_LOCAL, "keeper", None)
     # A planner of the user's own may be found by a path that was added since.
     if found is None or not found.is_alive or found.paths != sys.path:
-        found = _LOCAL.keeper = Keeper()
+        found = _LOCAL.keeper = Worker()
     return found
 
 
-class Keeper:
+class Worker:
     """One child and the pipe to it."""
 
     def __init__(self) -> None:

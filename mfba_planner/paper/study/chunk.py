@@ -80,19 +80,19 @@ class Trips:
         return {name: [row[name] for row in rows] for name in rows[0]}
 
     def _row(self, seed: int) -> dict[str, float]:
-        result, conduct = assess(run(self.scenario, planner=self.planner, seed=seed))
+        result, run_motion = assess(run(self.scenario, planner=self.planner, seed=seed))
         return {
             "length_m": result.length_m,
             "clearance_m": result.min_clearance_m,
             "collisions": result.collisions,
             "reached": int(result.outcome.value == "goal_reached"),
-            "turning_rad": conduct.turning_rad,
+            "turning_rad": run_motion.turning_rad,
             "encounters": sum(1 << number for number in result.encounters),
         }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Chunk:
+class SampleChunk:
     """Seeds first .. first + count - 1 of the sample of that name."""
 
     sample: str
@@ -119,11 +119,13 @@ class Chunk:
         return self.work.run(range(self.first, self.first + self.count))
 
 
-def chunks(sample: str, work: Benchmark | Trips, first: int, runs: int, size: int) -> list[Chunk]:
+def chunks(
+    sample: str, work: Benchmark | Trips, first: int, runs: int, size: int
+) -> list[SampleChunk]:
     """A sample cut into chunks of that size."""
     last = first + runs
     return [
-        Chunk(sample=sample, work=work, first=start, count=min(size, last - start))
+        SampleChunk(sample=sample, work=work, first=start, count=min(size, last - start))
         for start in range(first, last, size)
     ]
 

@@ -10,7 +10,7 @@ from ...simulation.scenario import Scenario
 from ...swarm.bat_swarm import Algorithm, BatParams, Schedule
 from ..functions import FUNCTIONS
 from ..readings import PLANNERS, SWARMS
-from .chunk import Benchmark, Chunk, Trips, chunks
+from .chunk import Benchmark, SampleChunk, Trips, chunks
 
 DIMENSION = 2  # of F1 and F5 too: the paper does not say; the other four have it
 BENCHMARK_CHUNK, TRIP_CHUNK = 160, 20
@@ -69,7 +69,7 @@ def trip_sample(reading: str, case: str, law: str) -> str:
     return f"{reading}/{case}/{law}"
 
 
-def benchmark_plan(size: Size, seed: int) -> list[Chunk]:
+def benchmark_plan(size: Size, seed: int) -> list[SampleChunk]:
     """The chunks of Table 3."""
     wanted = [(name, bat, tuple(FUNCTIONS)) for name, bat in SWARM_READINGS.items()]
     wanted.append((EXCEPTIONS, EXCEPTION_SWARM, EXCEPTION_FUNCTIONS))
@@ -90,7 +90,7 @@ def benchmark_plan(size: Size, seed: int) -> list[Chunk]:
     ]
 
 
-def trip_plan(case: str, scenario: Scenario, size: Size, seed: int) -> list[Chunk]:
+def trip_plan(case: str, scenario: Scenario, size: Size, seed: int) -> list[SampleChunk]:
     """The chunks of Table 5 (case1) or 7 (case2)."""
     found = []
     for reading in PLANNER_READINGS:

@@ -13,23 +13,23 @@ from numpy.typing import NDArray
 from ...evaluation.study.chunk import Columns
 from ...evaluation.study.chunk_store import Store
 from ...evaluation.study.compute_chunks import compute
-from .chunk import Chunk
+from .chunk import SampleChunk
 
 PACKAGES = ("core", "paper")  # their code decides the numbers
 Sample = Mapping[str, NDArray[np.float64]]
 
 
-def open_store(directory: Path, plan: Sequence[Chunk], facts: Mapping[str, Any]) -> Store:
+def open_store(directory: Path, plan: Sequence[SampleChunk], facts: Mapping[str, Any]) -> Store:
     """The directory of a study of the paper. Raises OutputError as Store does."""
     return Store(directory, plan, facts, command="mfba tables", packages=PACKAGES)
 
 
 def run_plan(
-    plan: Sequence[Chunk],
+    plan: Sequence[SampleChunk],
     *,
     workers: int = 1,
     store: Store | None = None,
-    done: Callable[[Chunk], None] = lambda _: None,
+    done: Callable[[SampleChunk], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Sample]:
     """Compute (or read back) every chunk; {sample: {column: values by seed}}.
@@ -39,7 +39,7 @@ def run_plan(
     return samples(plan, compute(plan, workers=workers, store=store, done=done, say=say))
 
 
-def samples(plan: Sequence[Chunk], found: Mapping[str, Columns]) -> dict[str, Sample]:
+def samples(plan: Sequence[SampleChunk], found: Mapping[str, Columns]) -> dict[str, Sample]:
     """The columns of all chunks, joined in the plan's order."""
     gathered: dict[str, dict[str, list[float]]] = {}
     for chunk in plan:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from ...core.errors import ConfigError
 from ...core.options import did_you_mean
 from ...simulation.scenario import Scenario
-from ..study.chunk import Chunk
+from ..study.chunk import SampleChunk
 from ..study.plan import Size, benchmark_plan, trip_plan
 from ..study.run import Sample
 from .benchmark import benchmark_section
@@ -32,7 +32,7 @@ def check_sections(wanted: Sequence[str]) -> tuple[str, ...]:
 
 def plan(
     sections: Sequence[str], scenarios: Mapping[str, Scenario], size: Size, seed: int
-) -> list[Chunk]:
+) -> list[SampleChunk]:
     """All that these sections need to be run; scenarios are case1 and case2."""
     found = benchmark_plan(size, seed) if "3" in sections else []
     cases = {case for name in sections for case in _TRIPS.get(name, ())}

@@ -11,13 +11,13 @@ from typing import Any
 
 from ...core.geometry import Point, wrap_angle
 from ...core.types import NANO, Circle, Observation
-from ...perception.obstacle_memory import MemoryParams
+from ...perception.obstacle_memory import ObstacleMemoryParams
 from ...perception.sensory_vector import SensorParams
 from ..base_planner import Move
 from ..mode_transitions import Event
 from ..planner_params import PlannerParams
 from ..predictive import Predictive, PredictiveParams
-from ..trajectory_cost import Prediction, RiskParams, Way
+from ..trajectory_cost import RiskParams, TrajectoryCost, Way
 
 
 class BitsOnly(Predictive):
@@ -30,7 +30,7 @@ class BitsOnly(Predictive):
         circles = self._circles(obs)
         if not circles:
             return Move(velocity=straight, reason="no obstacle within SR")
-        world = Prediction((x, y), circles, self.options.risk, self.params.tick_ns * NANO)
+        world = TrajectoryCost((x, y), circles, self.options.risk, self.params.tick_ns * NANO)
         goes = self._cos[:1] * 0.0 + straight[0], self._sin[:1] * 0.0 + straight[1]
         if not world.closed(*goes)[0]:
             return Move(velocity=straight, reason="the straight way is free")
@@ -92,7 +92,7 @@ def no_margins(params: PlannerParams, sensor: SensorParams, seed: int) -> Predic
 
 def no_memory(params: PlannerParams, sensor: SensorParams, seed: int) -> Predictive:
     """Who leaves the sensing region is forgotten."""
-    memory = MemoryParams(way_m=0.0, longest_s=0.0)
+    memory = ObstacleMemoryParams(path_m=0.0, longest_s=0.0)
     return Predictive(params, sensor, seed, PredictiveParams(memory=memory))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.geometry import Point
 from ...core.types import Observation
-from ..base_planner import Move, Steering
+from ..base_planner import BasePlanner, Move
 from ..mode_transitions import Event
 from ..observed_circles import discs
 
@@ -17,7 +17,7 @@ REPULSION = 0.3  # of the pull, at the distance where 1/d - 1/SR is 1 per metre
 NEAREST_M = 0.02  # gaps below this push no harder
 
 
-class PotentialField(Steering):
+class PotentialField(BasePlanner):
     """Full speed along the sum of the forces; stuck in a minimum, it pushes on at random no more.
 
     Force: unit vector to the goal, plus REPULSION (1/d - 1/SR) / d^2 away from each enlarged

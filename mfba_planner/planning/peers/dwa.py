@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.geometry import Point
 from ...core.types import NANO, Observation
-from ..base_planner import Move, Steering
+from ..base_planner import BasePlanner, Move
 from ..mode_transitions import Event
 from ..observed_circles import discs
 
@@ -19,7 +19,7 @@ PROGRESS, CLEARANCE = 1.0, 0.005  # weights of metres towards the goal and of 1 
 NEAREST_M = 0.05  # clearance below which a velocity is admissible only if nothing is better
 
 
-class DynamicWindow(Steering):
+class DynamicWindow(BasePlanner):
     """Velocities of an omnidirectional robot, held for HORIZON_S among circles that move on.
 
     The window is the whole disc of speeds: this robot has no limit of acceleration. Objective:

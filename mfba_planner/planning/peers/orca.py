@@ -9,7 +9,7 @@ from ...core.errors import ConfigError
 from ...core.geometry import Point
 from ...core.types import NANO, Observation
 from ...perception.sensory_vector import SensorParams
-from ..base_planner import Move, Steering
+from ..base_planner import BasePlanner, Move
 from ..mode_transitions import Event
 from ..planner_params import PlannerParams
 
@@ -20,7 +20,7 @@ MARGIN_M = 0.06
 ROUNDS = 4
 
 
-class Orca(Steering):
+class Orca(BasePlanner):
     """One agent among others that keep their velocities; needs known circles."""
 
     reads_sectors = False

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from ...core.geometry import Point
 from ...core.types import Observation
-from ..base_planner import Move, Steering
+from ..base_planner import BasePlanner, Move
 
 
-class Straight(Steering):
+class Straight(BasePlanner):
     """Drives at the goal at full speed."""
 
     reads_sectors = False

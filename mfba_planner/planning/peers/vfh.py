@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.geometry import Point, bearing
 from ...core.types import Observation
-from ..base_planner import Move, Steering
+from ..base_planner import BasePlanner, Move
 from ..mode_transitions import Event
 from ..observed_circles import discs
 
@@ -18,7 +18,7 @@ MARGIN_M = 0.3  # added to every circle: it moves while the robot passes
 TO_GOAL, TO_LAST = 5.0, 2.0  # weights of the turn away from the goal and from the last heading
 
 
-class VectorFieldHistogram(Steering):
+class VectorFieldHistogram(BasePlanner):
     """Chooses among free headings; a heading is masked within the tangents of a circle in range.
 
     Circles stand still for it, as in VFH+; cost: TO_GOAL turn to the goal + TO_LAST turn to the

@@ -16,21 +16,21 @@ from ...simulation.world import World
 from ..interface import topics
 from ..interface.serialized_message import header_stamp_ns
 from ..node_parameters import WorldSimSettings
-from ..runtime.command_matching import Answers
-from ..runtime.command_timeout import Deadman
+from ..runtime.command_matching import CommandMatching
+from ..runtime.command_timeout import CommandTimeout
 from ..runtime.node_runtime import GraphNode, Refusals
-from ..runtime.polled_subscriptions import Letter, Letterboxes
-from .robot_namespace import Namespaced
+from ..runtime.polled_subscriptions import PolledSubscriptions, SerializedMessage
+from .robot_namespace import NamespacedNode
 
 REST: Point = (0.0, 0.0)
 
 
-class AnswerTopics:
+class CommandSubscriptions:
     """The subscriptions of world_sim to cmd_vel and goal_step, and what they have told last."""
 
     def __init__(
         self,
-        node: GraphNode | Namespaced,
+        node: GraphNode | NamespacedNode,
         settings: WorldSimSettings,
         world: Callable[[], World],
         refusals: Refusals,
@@ -42,20 +42,22 @@ class AnswerTopics:
         self._world = world
         self._refusals = refusals
         self._on_heard = on_heard
-        self._answers = Answers()
-        self._deadman = Deadman(settings)
+        self._command_matching = CommandMatching()
+        self._command_timeout = CommandTimeout(settings)
         stamped = TwistStamped if settings.enable_stamped_cmd_vel else None
         node.listen(topics.CMD_VEL, self._on_cmd_vel, stamped)
         # Looked into when a Twist has come: nothing more to wake up for.
-        self._goal_steps = Letterboxes()
+        self._goal_steps = PolledSubscriptions()
         step = topics.GOAL_STEP
-        node.open_boxes(self._goal_steps, step.type, step.name, self._on_goal_step, [step.qos])
+        node.subscribe_polled(
+            self._goal_steps, step.type, step.name, self._on_goal_step, [step.qos]
+        )
 
     def take(self, stamp: int) -> bool:
         """Lockstep: whether the Twist that answers this stamp has come, once; it is obeyed."""
         if not self._settings.enable_stamped_cmd_vel:
             self._goal_steps.empty()
-        message = self._answers.take(stamp)
+        message = self._command_matching.take(stamp)
         if message is not None:
             self._obey(message)
         return message is not None
@@ -66,7 +68,7 @@ class AnswerTopics:
 
     def rest_if_silent(self) -> None:
         """Real time: forget what was told too long ago."""
-        if self._deadman.lets_go(time.monotonic()):
+        if self._command_timeout.has_expired(time.monotonic()):
             self.rest()
 
     def _obey(self, message: Any) -> None:
@@ -80,14 +82,14 @@ class AnswerTopics:
 
     def _on_cmd_vel(self, message: Any, info: Any) -> None:
         if not self._settings.lockstep:
-            self._deadman.heard(time.monotonic())
+            self._command_timeout.heard(time.monotonic())
             self._obey(message)
             return
         sent_ns = info["source_timestamp"]
         if self._settings.enable_stamped_cmd_vel:
-            self._answers.goal_step(stamp_ns(message.header.stamp), sent_ns)
-        self._answers.cmd_vel(message, sent_ns)
+            self._command_matching.goal_step(stamp_ns(message.header.stamp), sent_ns)
+        self._command_matching.cmd_vel(message, sent_ns)
         self._on_heard()
 
-    def _on_goal_step(self, letter: Letter) -> None:
-        self._answers.goal_step(header_stamp_ns(letter.data), letter.sent_ns)
+    def _on_goal_step(self, message: SerializedMessage) -> None:
+        self._command_matching.goal_step(header_stamp_ns(message.data), message.sent_ns)

@@ -26,7 +26,7 @@ class DiagnosticTopic:
         self._hardware_id = settings.hardware_id
         self._period_ns = round(settings.diagnostics_period_s / NANO)
         self._last_ns = -1
-        self._last_gist: list[Any] = []
+        self._last_summary: list[Any] = []
         self._stamp_ns, self._stamp_s = node.get_clock().now().nanoseconds, time.monotonic()
 
     def at(self, stamp_ns: int, now_s: float) -> None:
@@ -41,9 +41,9 @@ class DiagnosticTopic:
 
     def publish(self, statuses: list[Status], now_s: float, *, news: bool) -> None:
         """Publish what is due, has changed its level, or is news for another reason."""
-        gist = [status.gist for status in statuses]
-        if news or gist != self._last_gist or self.is_due(now_s):
-            self._last_gist, self._last_ns = gist, self._stamp(now_s)
+        summary = [status.summary for status in statuses]
+        if news or summary != self._last_summary or self.is_due(now_s):
+            self._last_summary, self._last_ns = summary, self._stamp(now_s)
             message = conversions.diagnostics_msg(
                 statuses, self._who, self._hardware_id, self._last_ns
             )

@@ -13,15 +13,15 @@ from ...simulation.world import World
 from ..interface import conversions, topics
 from ..node_parameters import WorldSimSettings
 from ..runtime.node_runtime import GraphNode, Refusals
-from .robot_interface import Seat
+from .robot_interface import RobotInterface
 
 
-class Alone:
+class SingleRobot:
     """The world of one robot, handled as a Fleet is."""
 
     def __init__(self, world: World) -> None:
         """Take the world as it is."""
-        self.world, self.places = world, [world]
+        self.world, self.robot_worlds = world, [world]
 
     @property
     def tick(self) -> int:
@@ -38,7 +38,7 @@ class Alone:
         self.world.step(told[0])
 
 
-class Company:
+class FleetInterface:
     """One robot, or a fleet's: they move together, and arrive one by one."""
 
     def __init__(
@@ -52,8 +52,8 @@ class Company:
         """Advertise and subscribe for all; begin() comes before anything else."""
         self._settings, self._scenario = settings, scenario
         self._time = node.advertise(topics.CLOCK)
-        self.seats = [
-            Seat(node, settings, name, scenario, refusals, on_heard)
+        self.robots = [
+            RobotInterface(node, settings, name, scenario, refusals, on_heard)
             for name in scenario.robot_names or ("",)
         ]
 
@@ -65,50 +65,52 @@ class Company:
     @property
     def world(self) -> World | Fleet:
         """The world as it is now; of several robots their Fleet."""
-        return self._all.world if isinstance(self._all, Alone) else self._all
+        return self._all.world if isinstance(self._all, SingleRobot) else self._all
 
     @property
-    def are_heard(self) -> bool:
+    def have_subscribers(self) -> bool:
         """Whether somebody reads each robot's odom."""
-        return all(seat.is_heard for seat in self.seats)
+        return all(robot.has_subscribers for robot in self.robots)
 
     def begin(self, stamp_ns: int) -> None:
         """All are at their starts, at tick 0, whose stamp this is."""
         s, scenario = self._settings, self._scenario
         told = (scenario, s.tick_ns, s.goal_tolerance_m, s.seed)
-        self._all: Alone | Fleet = Fleet(*told) if scenario.robots else Alone(World(*told))
-        for seat, place in zip(self.seats, self._all.places):
-            seat.begin(place, stamp_ns)
-        self._asked = dict(enumerate(self.seats))
+        self._all: SingleRobot | Fleet = (
+            Fleet(*told) if scenario.robots else SingleRobot(World(*told))
+        )
+        for robot, place in zip(self.robots, self._all.robot_worlds):
+            robot.begin(place, stamp_ns)
+        self._asked = dict(enumerate(self.robots))
 
     def publish(self, stamp_ns: int) -> None:
         """Publish the present tick to whom it is for; to others too in real time."""
-        for seat in self.seats:
-            seat.answered = False
+        for robot in self.robots:
+            robot.answered = False
         self.publish_again(stamp_ns)
 
     def publish_again(self, stamp_ns: int) -> None:
         """Publish the present tick to those who have not answered it."""
         self._time.publish(conversions.clock_msg(stamp_ns))
         # In real time a robot that has arrived must see on: its planner would call it blind.
-        for seat in self._asked.values() if self._settings.lockstep else self.seats:
-            if not seat.answered:
-                seat.tick(stamp_ns)
+        for robot in self._asked.values() if self._settings.lockstep else self.robots:
+            if not robot.answered:
+                robot.tick(stamp_ns)
 
     def have_answered(self, stamp_ns: int) -> bool:
         """Lockstep: whether all answers to this stamp have come."""
-        for seat in self._asked.values():
-            seat.take(stamp_ns)
-        return all(seat.answered for seat in self._asked.values())
+        for robot in self._asked.values():
+            robot.take(stamp_ns)
+        return all(robot.answered for robot in self._asked.values())
 
     def absent(self) -> str:
         """Lockstep: who has not answered; empty of one that is alone."""
-        return ", ".join(seat.name for seat in self._asked.values() if not seat.answered)
+        return ", ".join(robot.name for robot in self._asked.values() if not robot.answered)
 
     def rest_if_silent(self) -> None:
         """Real time: let those rest who have been told nothing for too long."""
-        for seat in self.seats:
-            seat.rest_if_silent()
+        for robot in self.robots:
+            robot.rest_if_silent()
 
     def step(self) -> bool:
         """Do what was told last; False, and nothing is done, when all have come to their end."""
@@ -116,14 +118,14 @@ class Company:
             self._end_who_is_there()
         if not self._asked:
             return False
-        self._all.step({number: seat.told for number, seat in self._asked.items()})
+        self._all.step({number: robot.told for number, robot in self._asked.items()})
         return True
 
     def _end_who_is_there(self) -> None:
         outcomes = self._all.outcomes
-        for number, seat in [*self._asked.items()]:
+        for number, robot in [*self._asked.items()]:
             if outcome := outcomes[number]:
-                seat.end(outcome)
+                robot.end(outcome)
                 del self._asked[number]
 
     def ends(self) -> str:

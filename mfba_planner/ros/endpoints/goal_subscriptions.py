@@ -12,11 +12,11 @@ from ...core.errors import InputError
 from ...core.geometry import Point, Pose2D
 from ...recording.messages import goal_point, waypoint_points
 from ..interface import topics
-from ..runtime.goal_queue import Errands
+from ..runtime.goal_queue import GoalQueue
 from ..runtime.node_runtime import GraphNode, Refusals
 
 
-class Goals:
+class GoalSubscriptions:
     """Errands as messages give them; the newest order counts, one that is refused changes nothing.
 
     An order of what is being done already is none, unless that is over.
@@ -38,8 +38,8 @@ class Goals:
 
     def forget(self) -> None:
         """As if nothing had ever been ordered."""
-        self.errands = Errands()
-        self.heard_any = False
+        self.goal_queue = GoalQueue()
+        self.any_received = False
 
     def listen(self) -> None:
         """Subscribe."""
@@ -49,14 +49,14 @@ class Goals:
     def next_from(self, pose: Pose2D | str, tolerance_m: float) -> Point | None:
         """Where to go from here: of several goals, the first that is not reached."""
         if not isinstance(pose, str):
-            before = self.errands.leg
-            if self.errands.pass_by(pose.position, tolerance_m):
-                self._tell(f"goal {before} reached: on to {self.errands.goal}")
-        return self.errands.goal
+            before = self.goal_queue.leg
+            if self.goal_queue.pass_by(pose.position, tolerance_m):
+                self._tell(f"goal {before} reached: on to {self.goal_queue.goal}")
+        return self.goal_queue.goal
 
     def is_under_way(self) -> bool:
         """Whether somebody gives goals, of which a planner this young has not heard the last."""
-        return not self.heard_any and self._node.count_publishers(topics.GOAL_POSE.name) > 0
+        return not self.any_received and self._node.count_publishers(topics.GOAL_POSE.name) > 0
 
     def _tell(self, text: str) -> None:
         self._node.get_logger().info(text)
@@ -73,13 +73,13 @@ class Goals:
         except InputError as error:
             self._refusals.add(error, name)
             return
-        self.heard_any = True
-        if self.errands.order(goals, over=self._is_over()):
+        self.any_received = True
+        if self.goal_queue.order(goals, over=self._is_over()):
             self._on_new()
-            self._tell(f"{name}: on to {self.errands.goal}, goal {self.errands.leg}")
+            self._tell(f"{name}: on to {self.goal_queue.goal}, goal {self.goal_queue.leg}")
 
     def _on_cancel(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        goal = self.errands.cancel()
+        goal = self.goal_queue.cancel()
         response.success = goal is not None
         response.message = f"no longer on the way to {goal}" if goal else "there was no goal"
         self._tell(f"cancel: {response.message}")

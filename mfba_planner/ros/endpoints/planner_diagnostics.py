@@ -6,11 +6,11 @@ from __future__ import annotations
 import time
 
 from ...core.types import Decision
-from ...planning.supervised_planner import Guarded
+from ...planning.supervised_planner import SupervisedPlanner
 from ...recording.messages import points_text
 from ..interface.health import Health, driving
 from ..node_parameters import PlannerSettings
-from ..runtime.goal_queue import Errands
+from ..runtime.goal_queue import GoalQueue
 from ..runtime.node_runtime import GraphNode, Refusals
 from .diagnostics_publisher import DiagnosticTopic
 
@@ -30,35 +30,41 @@ class PlannerHealth:
         self._health.heard(name, stamp_ns, now_s)
         self._health.judged(name, fault)
 
-    def decided(self, decision: Decision, brain: Guarded, errands: Errands, state: str) -> None:
+    def decided(
+        self,
+        decision: Decision,
+        path_planner: SupervisedPlanner,
+        goal_queue: GoalQueue,
+        state: str,
+    ) -> None:
         """Report at once where something has changed; everything else can wait."""
         now_s = time.monotonic()
         self._topic.at(decision.stamp_ns, now_s)
-        seen = (decision.mode, brain.phase, errands.number, *self._health.faults)
+        seen = (decision.mode, path_planner.phase, goal_queue.number, *self._health.faults)
         news, self._seen = seen != self._seen, seen
         if news or self._topic.is_due(now_s):
-            self.report(decision, brain, errands, state, news=news)
+            self.report(decision, path_planner, goal_queue, state, news=news)
 
     def report(
         self,
         decision: Decision | None,
-        brain: Guarded,
-        errands: Errands,
+        path_planner: SupervisedPlanner,
+        goal_queue: GoalQueue,
         state: str,
         *,
         news: bool = False,
     ) -> None:
         """Publish, if it is time to, or if a level has changed."""
-        now_s, timeout_s = time.monotonic(), brain.params.input_timeout_s
+        now_s, timeout_s = time.monotonic(), path_planner.params.input_timeout_s
         values = {
-            "method": brain.params.label,
-            "goal": points_text([errands.goal] if errands.goal else []),
-            "leg": errands.leg,
-            "errand": str(errands.number),
+            "method": path_planner.params.label,
+            "goal": points_text([goal_queue.goal] if goal_queue.goal else []),
+            "leg": goal_queue.leg,
+            "errand": str(goal_queue.number),
             "last refused": self._refusals.last,
         }
         statuses = [
             self._health.inputs(now_s, timeout_s, self._refusals.by_kind),
-            driving(decision, brain.phase, state, values),
+            driving(decision, path_planner.phase, state, values),
         ]
         self._topic.publish(statuses, now_s, news=news)

@@ -9,13 +9,13 @@ from geometry_msgs.msg import Twist, TwistStamped
 
 from ...core.geometry import Point
 from ...core.types import Decision, Mode
-from ...planning.odometry_jump import carried_off
+from ...planning.odometry_jump import is_jump_reason
 from ..interface import conversions, markers, topics
 from ..node_parameters import PlannerSettings
 from ..runtime.node_runtime import GraphNode
 
 
-class PlannerTopics:
+class PlannerPublishers:
     """The publishers of planner."""
 
     def __init__(
@@ -30,7 +30,7 @@ class PlannerTopics:
         self._decision = node.advertise(topics.DECISION)
         self._markers = node.advertise(topics.MARKERS)
         self.reach_m = 0.0  # of the sectors: what the ring shows
-        self._view = markers.Seldom(settings.view_period_s)
+        self._view = markers.RateLimit(settings.view_period_s)
         stamped = TwistStamped if settings.enable_stamped_cmd_vel else None
         self._cmd_vel = node.advertise(topics.CMD_VEL, stamped)
 
@@ -39,7 +39,7 @@ class PlannerTopics:
     ) -> None:
         """What the world waits for first, everything about the decision while it moves on."""
         self.move(decision)
-        if decision.mode is Mode.STOPPED or carried_off(decision.reason):
+        if decision.mode is Mode.STOPPED or is_jump_reason(decision.reason):
             self._log.warning(decision.reason, throttle_duration_sec=1.0)
         frame = self._settings.odom_frame
         self._plan.publish(conversions.plan_msg(decision, frame))

@@ -12,12 +12,12 @@ from ...simulation.scenario import Scenario
 from ...simulation.world import World
 from ..node_parameters import WorldSimSettings
 from ..runtime.node_runtime import GraphNode, Refusals
-from .command_subscriptions import AnswerTopics
-from .robot_namespace import Namespaced
-from .world_publishers import WorldTopics
+from .command_subscriptions import CommandSubscriptions
+from .robot_namespace import NamespacedNode
+from .world_publishers import WorldPublishers
 
 
-class Seat:
+class RobotInterface:
     """One robot's publishers and subscriptions, in its namespace if it is one of a fleet."""
 
     def __init__(
@@ -33,31 +33,33 @@ class Seat:
         self.name = name
         self.answered = False
         self.place: World
-        here: GraphNode | Namespaced = node
+        here: GraphNode | NamespacedNode = node
         if name:
-            here = Namespaced(node, name)
+            here = NamespacedNode(node, name)
             settings = replace(
                 settings,
                 base_frame=f"{name}/{settings.base_frame}",
                 scan_frame=f"{name}/{settings.scan_frame}",
             )
-        self._out = WorldTopics(here, settings, scenario.robot)
-        self._answers = AnswerTopics(here, settings, lambda: self.place, refusals, on_heard)
+        self._out = WorldPublishers(here, settings, scenario.robot)
+        self._commands = CommandSubscriptions(
+            here, settings, lambda: self.place, refusals, on_heard
+        )
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether somebody reads the robot's odom."""
-        return self._out.are_heard
+        return self._out.have_subscribers
 
     @property
     def told(self) -> Point:
         """What the planner has told last, as World.step takes it."""
-        return self._answers.told
+        return self._commands.told
 
     def begin(self, place: World, stamp_ns: int) -> None:
         """A run begins, with the robot at its start."""
         self.place = place
-        self._answers.rest()
+        self._commands.rest()
         self._out.begin(place.scenario.goal_m, stamp_ns)
 
     def tick(self, stamp_ns: int) -> None:
@@ -66,11 +68,11 @@ class Seat:
 
     def take(self, stamp_ns: int) -> None:
         """Lockstep: take the answer to this stamp, if it has come; it will be obeyed."""
-        self.answered = self.answered or self._answers.take(stamp_ns)
+        self.answered = self.answered or self._commands.take(stamp_ns)
 
     def rest_if_silent(self) -> None:
         """Real time: rest where nothing has been told for too long."""
-        self._answers.rest_if_silent()
+        self._commands.rest_if_silent()
 
     def end(self, outcome: Outcome) -> None:
         """The run has ended for this robot, at the present tick."""

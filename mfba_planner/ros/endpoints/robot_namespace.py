@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 
 from ..interface.topics import GRAPH, Topic
 from ..runtime.node_runtime import GraphNode
-from ..runtime.polled_subscriptions import Deliver, Letterboxes
+from ..runtime.polled_subscriptions import Deliver, PolledSubscriptions
 
 
 def below(namespace: str, topic: Topic) -> Topic:
@@ -31,7 +31,7 @@ def everywhere(namespaces: set[str]) -> Iterator[tuple[Topic, str]]:
                 yield topic, called
 
 
-class Namespaced:
+class NamespacedNode:
     """A node that speaks and listens in a namespace other than its own."""
 
     def __init__(self, node: GraphNode, namespace: str) -> None:
@@ -46,13 +46,13 @@ class Namespaced:
         """As GraphNode.listen()."""
         self._node.listen(below(self._namespace, topic), callback, kind)
 
-    def open_boxes(
+    def subscribe_polled(
         self,
-        letterboxes: Letterboxes,
+        polled: PolledSubscriptions,
         kind: Any,
         name: str,
         deliver: Deliver,
         profiles: list[QoSProfile],
     ) -> None:
         """As GraphNode.open_boxes()."""
-        self._node.open_boxes(letterboxes, kind, f"{self._namespace}/{name}", deliver, profiles)
+        self._node.subscribe_polled(polled, kind, f"{self._namespace}/{name}", deliver, profiles)

@@ -17,7 +17,7 @@ from ..runtime.node_runtime import GraphNode, Refusals
 from ..runtime.stamp_pairing import StampPairs
 
 
-class Sight:
+class ScanSync:
     """Hands sectors on with the scan of their stamp; without tracking, at once and alone."""
 
     def __init__(

@@ -9,14 +9,14 @@ from ...scenarios.plain_data import scenario_to_json
 from ...scenarios.scenario_files import load_scenario
 from ...simulation.scenario import Scenario
 from ..interface import parameters
-from ..node_parameters import Rig
+from ..node_parameters import RobotParameters
 from ..runtime.node_runtime import GraphNode
 
 
 def declare_scenario(node: GraphNode, source: str) -> Scenario:
     """Load a scenario, declare its robot's options and state the whole; ConfigError if bad."""
     scenario = load_scenario(source)
-    rig = parameters.declare(node, Rig(robot=scenario.robot), read_only=True)
+    rig = parameters.declare(node, RobotParameters(robot=scenario.robot), read_only=True)
     scenario = replace(scenario, robot=rig.robot)
     parameters.state(node, "scenario_json", scenario_to_json(scenario), "scenario in full")
     return scenario

@@ -13,16 +13,16 @@ from ...simulation.world import World
 from ..interface import conversions, markers, topics
 from ..node_parameters import WorldSimSettings
 from ..runtime.node_runtime import GraphNode
-from .robot_namespace import Namespaced
+from .robot_namespace import NamespacedNode
 
 TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is shown
 
 
-class WorldTopics:
+class WorldPublishers:
     """The publishers of world_sim for one robot; the time is everybody's."""
 
     def __init__(
-        self, node: GraphNode | Namespaced, settings: WorldSimSettings, robot: Robot
+        self, node: GraphNode | NamespacedNode, settings: WorldSimSettings, robot: Robot
     ) -> None:
         """Advertise them all."""
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
@@ -40,10 +40,10 @@ class WorldTopics:
         self._markers = node.advertise(topics.MARKERS)
         self._tf = node.advertise(topics.TF) if topics.TF else None
         self._path: deque[Point] = deque(maxlen=TRAIL_POINTS)
-        self._view = markers.Seldom(settings.view_period_s)
+        self._view = markers.RateLimit(settings.view_period_s)
 
     @property
-    def are_heard(self) -> bool:
+    def have_subscribers(self) -> bool:
         """Whether somebody reads odom."""
         return bool(self._odom.get_subscription_count())
 

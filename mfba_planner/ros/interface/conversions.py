@@ -19,7 +19,7 @@ from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 from ...core.geometry import Point, Pose2D, half_turn
 from ...core.types import Bits, Decision, Mode, Ranges, Scan
 from ...perception.sensory_vector import SensorParams, bits_text, longest_range_m
-from ...planning.odometry_jump import carried_off
+from ...planning.odometry_jump import is_jump_reason
 from ...recording.messages import SECOND_NS, body_velocity, points_text, rotated
 from ...simulation.episode import Outcome
 from ...simulation.robot_model import Base
@@ -203,7 +203,7 @@ def decision_msg(
     }
     status = DiagnosticStatus(level=_LEVELS.get(decision.mode, DiagnosticStatus.OK), name=name)
     status.message = decision.reason
-    if carried_off(decision.reason) and status.level == DiagnosticStatus.OK:
+    if is_jump_reason(decision.reason) and status.level == DiagnosticStatus.OK:
         status.level = DiagnosticStatus.WARN
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     message = DiagnosticArray(status=[status])

@@ -32,12 +32,12 @@ class Status(NamedTuple):
     values: dict[str, str]
 
     @property
-    def gist(self) -> tuple[str, Level, str]:
+    def summary(self) -> tuple[str, Level, str]:
         """What makes it another status, figures aside."""
         return (self.name, self.level, self.values.get("silent", ""))
 
 
-class Pulse:
+class InputRate:
     """When messages of one input came; now_s is of any steady clock."""
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class Pulse:
         self._times_s: deque[float] = deque(maxlen=WINDOW)
         self._stamp_ns = -1
 
-    def beat(self, stamp_ns: int, now_s: float) -> None:
+    def add(self, stamp_ns: int, now_s: float) -> None:
         """A message was accepted; one with the stamp of the last is no news."""
         if stamp_ns != self._stamp_ns:
             self._stamp_ns = stamp_ns
@@ -68,7 +68,7 @@ class Health:
 
     def __init__(self, inputs: tuple[str, ...]) -> None:
         """Watch these inputs."""
-        self.pulses = {name: Pulse() for name in inputs}
+        self.pulses = {name: InputRate() for name in inputs}
         self._faults: dict[str, str] = {}
 
     @property
@@ -78,7 +78,7 @@ class Health:
 
     def heard(self, name: str, stamp_ns: int, now_s: float) -> None:
         """An input came."""
-        self.pulses[name].beat(stamp_ns, now_s)
+        self.pulses[name].add(stamp_ns, now_s)
 
     def judged(self, name: str, fault: str) -> None:
         """Why the newest of an input is refused, "": it is sound."""
@@ -89,13 +89,13 @@ class Health:
         fault = next(filter(None, self.faults), "")
         values: dict[str, str] = {}
         silent: dict[str, str] = {}
-        for name, pulse in self.pulses.items():
-            age_s = pulse.age_s(now_s)
+        for name, rate in self.pulses.items():
+            age_s = rate.age_s(now_s)
             if age_s is None:
                 silent[name] = f"no {name} yet"
             elif age_s > timeout_s:
                 silent[name] = f"{name} stale for {age_s:.2f} s (input_timeout_s={timeout_s:g})"
-            values[f"{name}: rate [Hz]"] = f"{pulse.rate_hz(now_s):.2f}"
+            values[f"{name}: rate [Hz]"] = f"{rate.rate_hz(now_s):.2f}"
             values[f"{name}: age [s]"] = "never" if age_s is None else f"{age_s:.3f}"
         values["silent"] = " ".join(silent)
         values["input_timeout_s"] = f"{timeout_s:g}"

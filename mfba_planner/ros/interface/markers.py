@@ -40,7 +40,7 @@ MODE_COLORS = {
 ARROW_S = 2.0  # a velocity arrow shows where the obstacle will be after so long
 
 
-class Seldom:
+class RateLimit:
     """Viewers need no message per tick: says when a period of simulated time has passed."""
 
     def __init__(self, period_s: float) -> None:

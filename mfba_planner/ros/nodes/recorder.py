@@ -28,8 +28,8 @@ from ..interface.serialized_message import has_header, header_stamp_ns, type_nam
 from ..node_parameters import RecorderSettings, names
 from ..runtime.drain import drain
 from ..runtime.node_runtime import GraphNode, spin_node
-from ..runtime.parameter_client import Found, ParameterSurvey
-from ..runtime.polled_subscriptions import Deliver, Letter, Letterboxes
+from ..runtime.parameter_client import Found, ParameterClient
+from ..runtime.polled_subscriptions import Deliver, PolledSubscriptions, SerializedMessage
 
 EMPTY_PERIOD_S = 0.02  # far below what a crash may cost, and a hundred times a message's cost
 
@@ -48,13 +48,13 @@ class Recorder(GraphNode):
         self._types: dict[str, tuple[str, OfferedQos]] = {}
         self.directory = Path(s.output) if s.output else new_run_directory()
         self.writer = BagWriter(self.directory)
-        self._letterboxes = Letterboxes()
+        self._polled = PolledSubscriptions()
         for topic, called in everywhere(names(s.namespaces)):
             self._record(topic, called)
-        self.every(EMPTY_PERIOD_S, self._letterboxes.empty)
+        self.every(EMPTY_PERIOD_S, self._polled.empty)
         self.every(0.25, self._flush)
-        self._survey = ParameterSurvey(self, names(s.nodes), self.explain)
-        self.offer_ready(names(s.wait_for))
+        self._parameter_client = ParameterClient(self, names(s.nodes), self.explain)
+        self.advertise_ready(names(s.wait_for))
         self.get_logger().info(f"recording to {self.directory}")
 
     def _record(self, topic: topics.Topic, called: str) -> None:
@@ -70,25 +70,25 @@ class Recorder(GraphNode):
         # In simulated time world_sim writes what every tick brings, and nobody else.
         from_anyone = not (topic.every_tick and self.settings.sim_time)
         profiles = topics.recording_qos(topic, from_anyone=from_anyone)
-        self.open_boxes(self._letterboxes, kind, called, deliver, profiles)
+        self.subscribe_polled(self._polled, kind, called, deliver, profiles)
 
-    def _on_clock(self, letter: Letter) -> None:
+    def _on_clock(self, message: SerializedMessage) -> None:
         self._tick_before_ns = self._log_time_ns
-        self._log_time_ns = stamp_ns(deserialize_message(letter.data, ClockMsg).clock)
-        for name, data in [*self._held, ("/clock", letter.data)]:
+        self._log_time_ns = stamp_ns(deserialize_message(message.data, ClockMsg).clock)
+        for name, data in [*self._held, ("/clock", message.data)]:
             self._write(name, data, self._log_time_ns)
         self._held.clear()
 
-    def _on_message(self, name: str, is_of_tick: bool, letter: Letter) -> None:
+    def _on_message(self, name: str, is_of_tick: bool, message: SerializedMessage) -> None:
         log_time_ns = self._log_time_ns
         if not self.settings.sim_time:
-            log_time_ns = letter.received_ns or time.time_ns()  # not all middleware says
+            log_time_ns = message.received_ns or time.time_ns()  # not all middleware says
         elif not log_time_ns:
-            self._held.append((name, letter.data))  # latched before the first tick
+            self._held.append((name, message.data))  # latched before the first tick
             return
-        elif is_of_tick and header_stamp_ns(letter.data) == self._tick_before_ns:
+        elif is_of_tick and header_stamp_ns(message.data) == self._tick_before_ns:
             log_time_ns = self._tick_before_ns or log_time_ns  # said while the world moved on
-        self._write(name, letter.data, log_time_ns)
+        self._write(name, message.data, log_time_ns)
 
     def _write(self, name: str, data: bytes, log_time_ns: int) -> None:
         if name in self._types:  # its writer came late
@@ -112,7 +112,7 @@ class Recorder(GraphNode):
 
     def missing(self) -> str:
         """Until the parameters of all nodes are in the bag, whose are missing."""
-        absent = ", ".join(self._survey.absent)
+        absent = ", ".join(self._parameter_client.absent)
         return f"parameters of {absent} not read yet" if absent else ""
 
     def drain(self, executor: Executor) -> None:
@@ -120,17 +120,17 @@ class Recorder(GraphNode):
         drain(executor, self._count)
 
     def _count(self) -> int:
-        self._letterboxes.empty()
+        self._polled.empty()
         return self.writer.message_count
 
     def close(self) -> None:
         """Write what has come or is held and finish the bag."""
         for _ in range(2):  # what was sent during the first round waits for the second
-            self._letterboxes.empty()
+            self._polled.empty()
         now_ns = time.time_ns()  # of a clock that never came
         for name, held in self._held:
             self._write(name, held, now_ns)
-        self.explain(self._survey.found)
+        self.explain(self._parameter_client.found)
         self.writer.close()
 
 

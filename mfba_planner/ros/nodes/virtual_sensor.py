@@ -42,7 +42,7 @@ class VirtualSensor(GraphNode):
         self._source = topics.OBSTACLES if s.source is Source.OBSTACLES else topics.SCAN
         self._health = SensorHealth(self, s, self._refusals, self._source.name)
         self.listen(self._source, self._on_measurement)
-        self.offer_ready(names(s.wait_for))
+        self.advertise_ready(names(s.wait_for))
         self.on_time_set_back(self._start_afresh)
 
     def _set_sensor(self, sensor: SensorParams) -> None:

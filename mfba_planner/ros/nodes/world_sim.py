@@ -16,12 +16,12 @@ from ...core.errors import ConfigError, InputError
 from ...core.types import NANO
 from ...recording.messages import pose2d
 from ...simulation.episode import stamp_of
-from ..endpoints.fleet_interface import Company
+from ..endpoints.fleet_interface import FleetInterface
 from ..endpoints.scenario_parameter import declare_scenario
 from ..interface import parameters, topics
 from ..node_parameters import WorldSimSettings, names
 from ..runtime.node_runtime import GraphNode, Refusals, spin_node
-from ..runtime.tick_control import Pace
+from ..runtime.tick_control import TickControl
 
 
 class WorldSim(GraphNode):
@@ -34,15 +34,15 @@ class WorldSim(GraphNode):
         self.scenario = declare_scenario(self, s.scenario)
         if s.run_on and self.scenario.robots:
             raise ConfigError("parameter run_on=True: a fleet's run ends; give false")
-        self.pace = Pace(s)
+        self.tick_control = TickControl(s)
         self._refusals = Refusals(self)
-        self._all = Company(self, s, self.scenario, self._refusals, self._look_for_answers)
+        self._all = FleetInterface(self, s, self.scenario, self._refusals, self._look_for_answers)
         if not self.scenario.robots:
             self.listen(topics.INITIALPOSE, self._on_initialpose)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
         self.create_service(Trigger, "~/reset", self._on_reset)
-        self.offer_ready(names(s.wait_for))
+        self.advertise_ready(names(s.wait_for))
         period_s, on_timer = s.tick_ns * NANO / s.speed_factor, self._on_timer
         if s.lockstep:
             period_s, on_timer = min(s.answer_timeout_s / 4, 0.25), self._watch
@@ -61,7 +61,7 @@ class WorldSim(GraphNode):
 
     def resume(self) -> None:
         """Go on from a pause; nothing when not paused."""
-        if self.pace.resume():
+        if self.tick_control.resume():
             self._move_on()
 
     def _begin(self, ticks_before: int) -> None:
@@ -79,12 +79,16 @@ class WorldSim(GraphNode):
 
     def _publish_tick(self) -> None:
         self._published = True
-        self.pace.published(time.monotonic())
+        self.tick_control.published(time.monotonic())
         self._all.publish(self.stamp_ns)
 
     def _on_timer(self) -> None:
         """Real time: one more tick; the first when everybody of wait_for is there."""
-        if not self.pace.paused and not self.over and (self._published or not self.missing()):
+        if (
+            not self.tick_control.paused
+            and not self.over
+            and (self._published or not self.missing())
+        ):
             self._all.rest_if_silent()
             self._move_on()
 
@@ -92,34 +96,42 @@ class WorldSim(GraphNode):
         """Lockstep: begin when everybody is there; publish an unanswered tick again."""
         self._look_for_answers()  # a goal_step may have come after its Twist
         if not self._published:
-            if self.pace.may_move_on() and self._all.are_heard and not self.missing():
+            if (
+                self.tick_control.may_move_on()
+                and self._all.have_subscribers
+                and not self.missing()
+            ):
                 self._publish_tick()
-        elif self.pace.must_repeat(time.monotonic(), self._all.tick):
+        elif self.tick_control.must_repeat(time.monotonic(), self._all.tick):
             by = f" by {absent}" if (absent := self._all.absent()) else ""
             self.get_logger().warning(f"tick {self._all.tick} unanswered{by}: published again")
             self._all.publish_again(self.stamp_ns)
 
     def _look_for_answers(self) -> None:
-        has_come = self.pace.is_open and self._all.have_answered(self.stamp_ns)
-        if has_come and self.pace.answered():
+        has_come = self.tick_control.is_open and self._all.have_answered(self.stamp_ns)
+        if has_come and self.tick_control.answered():
             self._move_on()
 
     def _on_initialpose(self, message: PoseWithCovarianceStamped) -> None:
         try:
-            self._all.seats[0].place.put(pose2d(message.pose.pose, "initialpose"))
+            self._all.robots[0].place.put(pose2d(message.pose.pose, "initialpose"))
         except InputError as error:
             self._refusals.add(error)
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if request.data:
-            self.pace.paused = True
+            self.tick_control.paused = True
         else:
             self.resume()
         response.success, response.message = True, "paused" if request.data else "running"
         return response
 
     def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        refusal = "refused: the run is over; reset first" if self.over else self.pace.cannot_step()
+        refusal = (
+            "refused: the run is over; reset first"
+            if self.over
+            else self.tick_control.cannot_step()
+        )
         if not refusal:
             self._move_on()
         response.success, response.message = not refusal, refusal or f"tick {self._all.tick}"
@@ -127,7 +139,7 @@ class WorldSim(GraphNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._begin(self._ticks_before + self._all.tick + 1)
-        if self.pace.answered():
+        if self.tick_control.answered():
             self._publish_tick()
         response.success, response.message = True, f"tick 0 at stamp {self.stamp_ns} ns"
         return response

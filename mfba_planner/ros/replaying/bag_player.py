@@ -17,7 +17,7 @@ from ..interface import topics
 from ..interface.conversions import clock_msg
 from ..runtime.node_runtime import SPIN_S, GraphNode
 from .flow_control import FlowControl, all_acknowledged, windowed
-from .reader_readiness import Awaited
+from .reader_readiness import Readiness
 from .replay_arguments import ReplaySettings
 from .topic_selection import awaited, choose
 
@@ -67,7 +67,7 @@ class Player:
             )
             for topic in found
         }
-        self._awaited = Awaited(self._node, self._publishers, wanted, s.inputs_of)
+        self._awaited = Readiness(self._node, self._publishers, wanted, s.inputs_of)
         self._latched = {t.recorded: t.qos.depth or UNKNOWN_DEPTH for t in found if t.latched}
         self._flow = FlowControl(self._node, self._publishers, s.wait_timeout, lossless=fast)
         self._clock = self._node.advertise(topics.CLOCK) if s.clock else None

@@ -11,7 +11,7 @@ from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
 
-class Awaited:
+class Readiness:
     """Subscribers on our topics, and nodes of the graph that are ready for their own part."""
 
     def __init__(

@@ -16,7 +16,7 @@ class Sent(NamedTuple):
     value: Any
 
 
-class Answers:
+class CommandMatching:
     """Joins cmd_vel, which has no stamp, with goal_step, which has the tick's.
 
     A planner sends goal_step, then cmd_vel. A Twist therefore belongs to the last goal_step sent

@@ -9,7 +9,7 @@ from ..node_parameters import WorldSimSettings
 TICKS = 1.25  # a Twist is meant for a tick: that long it always holds
 
 
-class Deadman:
+class CommandTimeout:
     """Real time: after cmd_vel_timeout_s of silence, but no less than a tick, the robot rests."""
 
     def __init__(self, settings: WorldSimSettings) -> None:
@@ -23,6 +23,6 @@ class Deadman:
         """A Twist came; now_s is of any steady clock."""
         self._heard_s = now_s
 
-    def lets_go(self, now_s: float) -> bool:
+    def has_expired(self, now_s: float) -> bool:
         """Whether the last Twist is too old to be obeyed."""
         return self._on and now_s - self._heard_s > self._timeout_s

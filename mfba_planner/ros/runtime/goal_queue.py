@@ -6,7 +6,7 @@ from __future__ import annotations
 from ...core.geometry import Point, distance
 
 
-class Errands:
+class GoalQueue:
     """The goals still to be reached, in order; number counts what was ordered so far."""
 
     def __init__(self) -> None:

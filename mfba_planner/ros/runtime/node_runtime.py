@@ -24,7 +24,7 @@ from std_srvs.srv import Trigger
 from ...core.errors import FrameError, StampError
 from ..interface import parameters
 from ..interface.topics import Topic, expected_readers, reading_qos
-from .polled_subscriptions import Deliver, Letterboxes, Once
+from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
 
 SPIN_S = 0.1  # longest time until a signal is noticed
 
@@ -131,9 +131,9 @@ class GraphNode(Node):
                 self.create_subscription(kind, name, call, qos, event_callbacks=events)
             )
 
-    def open_boxes(
+    def subscribe_polled(
         self,
-        letterboxes: Letterboxes,
+        polled: PolledSubscriptions,
         kind: Any,
         name: str,
         deliver: Deliver,
@@ -141,21 +141,21 @@ class GraphNode(Node):
     ) -> None:
         """Subscribe with each QoS profile to serialized messages, which no executor waits for."""
         silent = SubscriptionEventCallbacks(use_default_callbacks=False)
-        boxes = [
+        subscriptions = [
             self.create_subscription(
                 kind,
                 name,
                 lambda _: None,
                 qos,
-                callback_group=letterboxes.group,
+                callback_group=polled.group,
                 event_callbacks=silent,
                 raw=True,
             )
             for qos in profiles
         ]
-        letterboxes.add(boxes, deliver)
+        polled.add(subscriptions, deliver)
 
-    def hang_up(self, keep: Collection[Topic] = ()) -> None:
+    def unsubscribe(self, keep: Collection[Topic] = ()) -> None:
         """Destroy what advertise and listen have created, but the publishers of these topics."""
         while self._readers:
             self.destroy_subscription(self._readers.pop())
@@ -178,7 +178,7 @@ class GraphNode(Node):
             self.get_clock().create_jump_callback(threshold, post_callback=lambda _: callback())
         )
 
-    def offer_ready(self, peers: set[str]) -> None:
+    def advertise_ready(self, peers: set[str]) -> None:
         """Offer ~/ready: true once every peer's subscription to our topics is matched.
 
         The last thing a node does to get going: what it was told in vain is named here.
@@ -224,7 +224,7 @@ class GraphNode(Node):
 
 def _once(callback: Callable[[Any], None]) -> Callable[[Any, Any], None]:
     """Hand each message on once, though two subscriptions bring it."""
-    once = Once()
+    once = DuplicateFilter()
 
     def call(message: Any, info: Any) -> None:
         if once.is_new(info):

@@ -20,7 +20,7 @@ ASK_AGAIN_S = 1.0  # an answer can get lost while a server still looks for its c
 Found = dict[str, dict[str, Any]]
 
 
-class ParameterSurvey:
+class ParameterClient:
     """Asks every wanted node until it answers; done(found) when all have answered."""
 
     def __init__(self, node: GraphNode, wanted: set[str], done: Callable[[Found], None]) -> None:

@@ -14,7 +14,7 @@ from rclpy.subscription import Subscription
 ONCE_LIMIT = 2000  # messages by which two subscriptions to one topic may be apart
 
 
-class Once:
+class DuplicateFilter:
     """Tells whether a message is new, where two subscriptions bring each of them."""
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class Once:
         return True
 
 
-class Unwaited(CallbackGroup):
+class NeverWaitedFor(CallbackGroup):
     """Its subscriptions never enter an executor's wait set: their owner takes from them."""
 
     def can_execute(self, _: Any) -> bool:
@@ -47,7 +47,7 @@ class Unwaited(CallbackGroup):
         """Nothing was begun."""
 
 
-class Letter(NamedTuple):
+class SerializedMessage(NamedTuple):
     """One serialized message; when it was sent and when it came, in ns of the wall clocks."""
 
     sent_ns: int
@@ -55,10 +55,10 @@ class Letter(NamedTuple):
     data: bytes
 
 
-Deliver = Callable[[Letter], None]
+Deliver = Callable[[SerializedMessage], None]
 
 
-class Letterboxes:
+class PolledSubscriptions:
     """The boxes of one node; what they hold is handed on in the order in which it was sent.
 
     While boxes are looked into one by one, newer letters fall into all of them: what was sent
@@ -68,28 +68,28 @@ class Letterboxes:
 
     def __init__(self) -> None:
         """Start without a box."""
-        self.group = Unwaited()
-        self._boxes: list[tuple[Subscription, Once | None, Deliver]] = []
-        self._waiting: list[tuple[Letter, Deliver]] = []
+        self.group = NeverWaitedFor()
+        self._subscriptions: list[tuple[Subscription, DuplicateFilter | None, Deliver]] = []
+        self._waiting: list[tuple[SerializedMessage, Deliver]] = []
 
-    def add(self, boxes: list[Subscription], deliver: Deliver) -> None:
+    def add(self, subscriptions: list[Subscription], deliver: Deliver) -> None:
         """Take over all raw subscriptions to one topic; they must be of self.group."""
-        once = Once() if len(boxes) > 1 else None
-        self._boxes += [(box, once, deliver) for box in boxes]
+        once = DuplicateFilter() if len(subscriptions) > 1 else None
+        self._subscriptions += [(box, once, deliver) for box in subscriptions]
 
     def empty(self) -> None:
         """Deliver what has come."""
         began_ns = time.time_ns()
-        letters, self._waiting = self._waiting, []
-        for box, once, deliver in self._boxes:
+        messages, self._waiting = self._waiting, []
+        for box, once, deliver in self._subscriptions:
             with box.handle:
                 while (taken := box.handle.take_message(box.msg_type, box.raw)) is not None:
                     data, info = taken
                     if once is None or once.is_new(info):
                         sent_ns = info["source_timestamp"]
-                        letter = Letter(sent_ns, info["received_timestamp"], data)
-                        on_time = letters if sent_ns <= began_ns else self._waiting
-                        on_time.append((letter, deliver))
-        letters.sort(key=lambda item: item[0].sent_ns)
-        for letter, deliver in letters:
-            deliver(letter)
+                        message = SerializedMessage(sent_ns, info["received_timestamp"], data)
+                        on_time = messages if sent_ns <= began_ns else self._waiting
+                        on_time.append((message, deliver))
+        messages.sort(key=lambda item: item[0].sent_ns)
+        for message, deliver in messages:
+            deliver(message)

@@ -7,7 +7,7 @@ from ...core.errors import GraphError
 from ..node_parameters import WorldSimSettings
 
 
-class Pace:
+class TickControl:
     """Lockstep: a tick stays open until its answer comes; otherwise the wall timer drives."""
 
     def __init__(self, settings: WorldSimSettings) -> None:
