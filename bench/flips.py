@@ -35,7 +35,7 @@ def main() -> int:
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     made: Counter[str] = Counter()
-    detect: Counter[str] = Counter()
+    noticed: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as root:
         bag = record(Path(root) / "bag", "case2", 4)
         ticks = len(verify(bag).recorded)
@@ -48,11 +48,11 @@ def main() -> int:
             if verify(edited).is_identical:
                 print(f"NOT noticed: {what}, message {place}")
             else:
-                detect[what] += 1
+                noticed[what] += 1
     for what, count in sorted(made.items()):
-        print(f"{what:<28} {detect[what]:>4} of {count:>4} noticed")
-    print(f"{detect.total()} of {made.total()} noticed")
-    return int(detect.total() < made.total())
+        print(f"{what:<28} {noticed[what]:>4} of {count:>4} noticed")
+    print(f"{noticed.total()} of {made.total()} noticed")
+    return int(noticed.total() < made.total())
 
 
 def flip(rng: np.random.Generator) -> tuple[str, str, Callable[[Any], None]]:

@@ -81,19 +81,19 @@ def main() -> None:
     parser.add_argument("--graph", type=int, default=0)
     found = parser.parse_args()
     for name, (robot, params) in ROWS.items():
-        arrived = clean = detect = equal = 0
+        arrived = clean = noticed = equal = 0
         for k in range(found.count):
             scenario = kidnapped(k, robot, params)
             episode = play(scenario, params, k)
             arrived += episode.outcome is Outcome.GOAL_REACHED
             clean += evaluate(episode).success
-            detect += any(is_jump_reason(tick.reason) for tick in episode.ticks)
+            noticed += any(is_jump_reason(tick.reason) for tick in episode.ticks)
             if k < found.graph:
                 equal += by_graph(scenario, params, k) == digest(episode.ticks)
         graph = f"; graph: {equal} of {found.graph} digests equal" if found.graph else ""
         print(
             f"{name:36} arrived {arrived} of {found.count}, without contact {clean}, "
-            f"noticed {detect}{graph}",
+            f"noticed {noticed}{graph}",
             flush=True,
         )
 

@@ -65,15 +65,15 @@ ARRIVE = st.sampled_from(["goal_step", "cmd_vel"])
 def test_no_twist_is_ever_taken_for_another_ticks(events: list[tuple[bool, bool] | str]) -> None:
     """A planner answers the open tick any number of times; each topic keeps its own order."""
     heard = CommandMatching()
-    running: dict[str, list[tuple[int, int]]] = {"goal_step": [], "cmd_vel": []}
+    pending: dict[str, list[tuple[int, int]]] = {"goal_step": [], "cmd_vel": []}
     tick = 1
     for now, event in enumerate(events):
         if isinstance(event, tuple):
-            for later, (queue, arrives) in enumerate(zip(running.values(), event)):
+            for later, (queue, arrives) in enumerate(zip(pending.values(), event)):
                 if arrives:
                     queue.append((tick, 10 * now + later))
-        elif running[event]:
-            about, sent_ns = running[event].pop(0)
+        elif pending[event]:
+            about, sent_ns = pending[event].pop(0)
             if event == "goal_step":
                 heard.goal_step(about, sent_ns)
             else:

@@ -143,9 +143,9 @@ def test_what_was_written_by_hand_stays_and_pictures_are_small(made: Path) -> No
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     assert page.partition("<!-- generated")[0] == PAGE.partition("<!-- generated")[0]
     assert " --worlds 2 --first 10184 --others 2 --few 2 --out runs/benchmark " in page
-    params_for_method = re.findall(r"!\[.*?\]\((.*?)\)", page.partition("<!-- generated")[2])
-    assert len(params_for_method) >= 3
-    for name in params_for_method:
+    named = re.findall(r"!\[.*?\]\((.*?)\)", page.partition("<!-- generated")[2])
+    assert len(named) >= 3
+    for name in named:
         assert 1000 < (made / "docs" / name).stat().st_size < 200_000
 
 

@@ -14,8 +14,8 @@ PAGE = (Path(__file__).parents[1] / "docs/planners.md").read_text(encoding="utf-
 
 
 def test_every_planner_has_its_line() -> None:
-    params_for_method = set(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
-    assert params_for_method == set(PLANNERS) - {"mfba", "ba"}
+    named = set(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
+    assert named == set(PLANNERS) - {"mfba", "ba"}
     assert "`mfba` and `ba` are it" in PAGE
 
 

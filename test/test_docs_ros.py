@@ -21,12 +21,10 @@ def test_parameters_and_files_that_are_named_exist() -> None:
         for defaults in (PlannerSettings(), PlannerParams(), WorldSimSettings())
         for name, _, _ in walk(defaults)
     }
-    params_for_method = set(
-        re.findall(r"`((?:speed_limit|recovery)\.\w+|\w+_(?:s|m|mps)|hardware_id)`", PAGE)
-    )
+    named = set(re.findall(r"`((?:speed_limit|recovery)\.\w+|\w+_(?:s|m|mps)|hardware_id)`", PAGE))
     shortened = {"wait_s", "slow_within_m"}
-    assert len(params_for_method) > 8
-    assert params_for_method - shortened <= declared
+    assert len(named) > 8
+    assert named - shortened <= declared
     for file in re.findall(r"(?:config|layout|test)/[\w.]+", PAGE):
         assert (ROOT / file).is_file(), file
 

@@ -246,8 +246,8 @@ def test_the_others_are_seen_and_remembered_in_the_scenario_s_order() -> None:
 def test_options_of_the_planner_count_in_a_fleet_without_a_brain_of_its_own() -> None:
     params = PlannerParams(speed_limit=SpeedLimitParams(slow_within_m=0.8))
     own = run_fleet(head_on(), planner=params, seed=3)
-    params_for_method = simulate_fleet(head_on(), planner=params, sensor=SensorParams(), seed=3)
-    assert [e.ticks for e in own] == [e.ticks for e in params_for_method]
+    again = simulate_fleet(head_on(), planner=params, sensor=SensorParams(), seed=3)
+    assert [e.ticks for e in own] == [e.ticks for e in again]
     assert any("% speed so near" in tick.reason for e in own for tick in e.ticks)
 
 

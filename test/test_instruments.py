@@ -42,14 +42,12 @@ def seen(scan: Any, k: int) -> float:
     return float(scan.ranges_m[k])
 
 
-@pytest.mark.parametrize(("left_m", "there"), [(0.49, True), (0.51, False)])
-def test_who_errs_may_miss_the_goal_by_four_deviations_more(
-    distance_to_goal_m: float, there: bool
-) -> None:
+@pytest.mark.parametrize(("away_m", "there"), [(0.49, True), (0.51, False)])
+def test_who_errs_may_miss_the_goal_by_four_deviations_more(away_m: float, there: bool) -> None:
     scenario = Scenario(
         name="x",
         start_m=(0.0, 0.0),
-        goal_m=(distance_to_goal_m, 0.0),
+        goal_m=(away_m, 0.0),
         robot=Robot(noise=Noise(odom_m=0.1)),
     )
     assert World(scenario, TICK_NS, 0.1).outcome() is (Outcome.GOAL_REACHED if there else None)

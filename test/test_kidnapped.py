@@ -61,13 +61,13 @@ def played(scenario: Scenario, planner: PlannerParams) -> Episode:
 def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams) -> None:
     episode = played(KIDNAPPED, planner)
     assert evaluate(episode).success
-    detect = carried(episode)
-    times_s = [episode.time_s(episode.ticks[k].stamp_ns) for k in detect]
+    noticed = carried(episode)
+    times_s = [episode.time_s(episode.ticks[k].stamp_ns) for k in noticed]
     tick_s = planner.tick_ns * 1e-9
     assert [t - at.at_s for t, at in zip(times_s, KIDNAPPED.kidnappings)] == pytest.approx(
         [tick_s / 2] * 2, abs=tick_s / 2 + 1e-9
     )
-    for k, kidnapping in zip(detect, KIDNAPPED.kidnappings):
+    for k, kidnapping in zip(noticed, KIDNAPPED.kidnappings):
         assert episode.ticks[k].pose.position == kidnapping.to_m
         assert ", beginning anew; " in episode.ticks[k].reason
 

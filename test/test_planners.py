@@ -219,8 +219,8 @@ def test_noise_is_the_seed_s_and_as_large_as_told(name: str) -> None:
     world = world_with(Obstacle(center_m=(6.0, 5.0), radius_m=0.3))
 
     def errors(seed: int) -> list[float]:
-        observe_sectors = Perception(name, noise_m=0.02, seed=seed)
-        found, true = observe_sectors(world, SENSOR), Perception(name)(world, SENSOR)
+        observer = Perception(name, noise_m=0.02, seed=seed)
+        found, true = observer(world, SENSOR), Perception(name)(world, SENSOR)
         if found.circles is not None and true.circles is not None:
             pairs = zip(found.circles[0].center_m, true.circles[0].center_m)
             return [a - b for a, b in pairs]

@@ -38,10 +38,8 @@ def planner(seed: int = 0) -> Predictive:
 
 
 def drive(scenario: Scenario, seed: int = 0, name: str = "known", **kw: float) -> Episode:
-    observe_sectors = Perception(name, sectors=False, seed=seed, **kw)  # type: ignore[arg-type]
-    return run(
-        scenario, planner=PARAMS, path_planner=planner(seed), seed=seed, observe=observe_sectors
-    )
+    observer = Perception(name, sectors=False, seed=seed, **kw)  # type: ignore[arg-type]
+    return run(scenario, planner=PARAMS, path_planner=planner(seed), seed=seed, observe=observer)
 
 
 def seeing(*circles: Circle, stamp_ns: int = 10**9, goal: Point = GOAL) -> Observation:

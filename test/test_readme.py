@@ -33,10 +33,8 @@ def test_generated_tables_are_up_to_date() -> None:
 
 
 def test_files_named_in_the_docs_exist() -> None:
-    params_for_method = re.compile(
-        r"`((?:docs|config|test|tools|bench|launch)/[\w./-]+)`|\]\(([\w./-]+)\)"
-    )
-    found = {a or b for text in DOCS for a, b in params_for_method.findall(text)}
+    named = re.compile(r"`((?:docs|config|test|tools|bench|launch)/[\w./-]+)`|\]\(([\w./-]+)\)")
+    found = {a or b for text in DOCS for a, b in named.findall(text)}
     assert len(found) >= 5
     places = ("", "docs", "docs/how-to")
     here = {name for name in found if any((ROOT / at / name).exists() for at in places)}

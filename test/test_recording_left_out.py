@@ -187,13 +187,13 @@ def test_no_more_decisions_wait_for_the_end_than_can_be_held(
 )
 @pytest.mark.parametrize("count", [1, 2])
 def test_verify_checks_what_is_left(
-    bag: Path, tmp_path: Path, topics: tuple[str, ...], params_for_method: str, count: int
+    bag: Path, tmp_path: Path, topics: tuple[str, ...], named: str, count: int
 ) -> None:
     report = verify(rewrite(bag, tmp_path / "cut", without(topics, *range(-count, 0))))
     whole = read_episode(bag)
     assert (report.faults, report.divergence) == ((), None)
     assert report.recorded == whole.ticks[:-count]
-    assert report.notes == (said_of(whole, count, params_for_method),)
+    assert report.notes == (said_of(whole, count, named),)
 
 
 def test_verify_leaves_out_what_was_decided_on_a_scan_that_is_lost(tmp_path: Path) -> None:

@@ -150,9 +150,9 @@ def test_the_moments_are_what_they_are_called(name: str) -> None:
     for scene in trips.scenes(episode):
         tick = episode.ticks[scene.index]
         near = within_range(episode, tick)
-        params_for_method = tuple(int(word) for word in scene.caption.split() if word.isdigit())
-        assert near == params_for_method
-        assert (tick.mode is Mode.OBSTACLE_AVOIDANCE) == bool(params_for_method)
+        named = tuple(int(word) for word in scene.caption.split() if word.isdigit())
+        assert near == named
+        assert (tick.mode is Mode.OBSTACLE_AVOIDANCE) == bool(named)
 
 
 def test_a_run_that_avoids_nothing_has_no_such_figure() -> None:

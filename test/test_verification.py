@@ -106,14 +106,14 @@ def other_bit(bits: str) -> str:
     ],
 )
 def test_what_was_edited_by_hand_is_named(
-    bag: Path, tmp_path: Path, edit: Edit, params_for_method: str
+    bag: Path, tmp_path: Path, edit: Edit, named: str
 ) -> None:
     report = verify(rewrite(bag, tmp_path / "edited", edit))
     assert not report.is_identical
     found = list(report.faults)
     if report.divergence:
         found.append(f"tick {report.divergence.tick}")
-    assert any(params_for_method in text for text in found), found
+    assert any(named in text for text in found), found
 
 
 def test_sectors_that_the_obstacles_do_not_make_are_named(bag: Path, tmp_path: Path) -> None:
@@ -161,11 +161,11 @@ def twice(topic: str, index: int) -> Edit:
     ],
 )
 def test_missing_and_reordered_messages_are_named(
-    bag: Path, tmp_path: Path, edit: Edit, params_for_method: str
+    bag: Path, tmp_path: Path, edit: Edit, named: str
 ) -> None:
     report = verify(rewrite(bag, tmp_path / "edited", edit))
     assert not report.is_identical
-    assert any(params_for_method in fault for fault in report.faults), report.faults
+    assert any(named in fault for fault in report.faults), report.faults
 
 
 def test_a_stamp_between_two_ticks_is_named(bag: Path, tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def main(args: list[str]) -> int:
 
     check_size(len(found.paths))
     refuse_existing(found.out)
-    params_for_method = named_episodes(found.paths, found.robots)
-    write_page(params_for_method.runs, found.out, params_for_method.roster)
+    named = named_episodes(found.paths, found.robots)
+    write_page(named.runs, found.out, named.roster)
     print(f"wrote {found.out}")
     return 0
