@@ -21,7 +21,7 @@ import numpy as np
 from mfba_planner.core.types import Mode
 from mfba_planner.verification.verify_bag import verify
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "test"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "test" / "helpers"))
 from edited_bags import one_changed, record, rewrite, set_field
 
 DECISION = "/planner/decision"

@@ -27,9 +27,9 @@ from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "test"))
-from graph import Graph
-from launching import Program
+sys.path.insert(0, str(Path(__file__).parents[1] / "test" / "helpers"))
+from launched_programs import Program
+from ros_graph import Graph
 
 FAST = ["--as-fast-as-possible", "--wait-timeout", "30", "--inputs-of", "planner"]
 

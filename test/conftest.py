@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from helpers import claim_domain
 from hypothesis import settings
+from waiting import claim_domain
 
 # A busy machine is not a failure: no property has a time limit of its own.
 settings.register_profile("mfba", deadline=None)
@@ -48,7 +48,7 @@ def ros_context(domain_id: int) -> Iterator[Any]:
 @pytest.fixture
 def graph(ros_context: Any) -> Iterator[Any]:
     """Open a Graph: nodes of ours and a probe, on one executor."""
-    from graph import Graph
+    from ros_graph import Graph
 
     opened = Graph(ros_context)
     yield opened

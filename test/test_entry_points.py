@@ -7,14 +7,12 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
+from project import ROOT
 
 from mfba_planner.core.errors import BagError
 from mfba_planner.entry_points import run_and_return_exit_code
-
-ROOT = Path(__file__).parents[1]
 
 
 def start(code: str, **options: object) -> "subprocess.Popen[str]":

@@ -16,13 +16,13 @@ from typing import Any
 
 import pytest
 import yaml
+from project import ROOT
 
 from mfba_planner import __version__
 from mfba_planner.cli import COMMANDS as COMMANDS_OF_MFBA
 from mfba_planner.core import resources
 from mfba_planner.core.errors import InputError
 
-ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "mfba_planner"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 NODES = ("planner", "world_sim", "virtual_sensor", "recorder", "replay")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Store the quick form's numbers for test/test_cli_tables.py, after a change that is meant.
+"""Store the quick form's numbers for test/cli/test_cli_tables.py, after a change that is meant.
 
 `python tools/store_tables.py` runs `mfba tables --quick` and writes test/data/tables_quick.json.
 """
@@ -12,12 +12,12 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "test")]
+sys.path[:0] = [str(ROOT), str(ROOT / "test" / "helpers")]
 
 
 def main() -> int:
     """Run and store."""
-    from test_cli_tables import STORED, flat, libm
+    from stored_tables import STORED, flat, libm
 
     from mfba_planner import cli
 

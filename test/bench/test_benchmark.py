@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shown
+import shown_commands
+from project import ROOT
 
 from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.evaluation.suites import suite_names
@@ -20,13 +21,12 @@ from mfba_planner.evaluation.sweep.read_sweep import read_sweep
 from mfba_planner.planning.peers.dwa import DynamicWindow
 from mfba_planner.report.sweep_tables import HEAD
 
-ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "bench" / "benchmark.py"
 PAGE = (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-SHOWN = shown.commands(PAGE)
+SHOWN = shown_commands.commands(PAGE)
 WHOLE, MADE_BY = (words for words in SHOWN if words[0] == "python")
-SMALL = shown.reduced(MADE_BY)[2:]
+SMALL = shown_commands.reduced(MADE_BY)[2:]
 SEVEN = ["paper", "predictive", "orca", "dwa", "vfh", "apf", "straight"]
 OUT = Path("runs/benchmark")
 
@@ -188,8 +188,8 @@ def test_bad_scales_and_pages_are_refused_before_any_work(tmp_path: Path) -> Non
 def test_all_suites_are_made_by_the_command_shown_but_for_its_numbers(tmp_path: Path) -> None:
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "benchmark.md").write_text(PAGE, encoding="utf-8")
-    assert shown.reduced(WHOLE) != WHOLE
-    shown.script(shown.reduced(WHOLE), tmp_path)
+    assert shown_commands.reduced(WHOLE) != WHOLE
+    shown_commands.script(shown_commands.reduced(WHOLE), tmp_path)
     page = (tmp_path / "docs" / "benchmark.md").read_text(encoding="utf-8")
     for suite in suite_names():
         labels = lines(page, f"### {suite}")  # where there are cases: "case 1: orca"
@@ -206,9 +206,9 @@ def test_the_runs_shown_go_as_the_page_says(command: list[str], tmp_path: Path) 
     (said,) = re.findall(rf"The first: (.*):\n\n```sh\n{' '.join(command)}\n", PAGE)
     sweep = f"sweep {suite} --planner {planner} --first {world} --worlds 1 --workers 1"
     step = "--set planner.step_length_m=0.08"  # which is predictive's own
-    shown.mfba([*sweep.split(), *step.split(), "--out", directory], tmp_path)
+    shown_commands.mfba([*sweep.split(), *step.split(), "--out", directory], tmp_path)
     assert show == "show"
-    told = shown.mfba(command[1:], tmp_path)
+    told = shown_commands.mfba(command[1:], tmp_path)
     assert told.splitlines()[:2] == [run, said]
 
 

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from launching import PROGRAM, ROOT, complete
+from launched_programs import PROGRAM, ROOT, complete
 
 from mfba_planner import __version__, cli
 from mfba_planner.entry_points import run_and_return_exit_code

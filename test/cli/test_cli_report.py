@@ -2,11 +2,12 @@
 """`mfba report`: from bags and results to a page, or one line that says why not."""
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from project import ROOT
+from report_readers import data_of
 
 from mfba_planner import cli
 from mfba_planner.entry_points import run_and_return_exit_code
@@ -16,7 +17,6 @@ from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.run_episode import run
 
 Said = pytest.CaptureFixture[str]
-ROOT = Path(__file__).parents[1]
 
 
 def report(said: Said, *args: str | Path) -> tuple[int, str, str]:
@@ -47,13 +47,6 @@ def kept(tmp_path: Path, episode: Episode) -> Path:
     (tmp_path / "kept").mkdir()
     write_result(tmp_path / "kept/result.json", result_to_dict(episode))
     return tmp_path / "kept"
-
-
-def data_of(path: Path) -> dict[str, Any]:
-    found = re.search(r'id="data">(.*?)</script>', path.read_text(encoding="utf-8"), re.DOTALL)
-    assert found
-    data: dict[str, Any] = json.loads(found[1])
-    return data
 
 
 def changed(result: Path, **values: Any) -> Path:

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from helpers import wait_until
-from launching import Program, complete
+from launched_programs import Program, complete
+from waiting import wait_until
 
 from mfba_planner import cli
 from mfba_planner.cli.sweep import command

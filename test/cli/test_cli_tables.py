@@ -3,7 +3,6 @@
 
 import base64
 import csv
-import hashlib
 import io
 import json
 import os
@@ -17,10 +16,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from helpers import wait_until
-from launching import PROGRAM, Program, complete
+from launched_programs import PROGRAM, Program, complete
+from project import ROOT
+from stored_tables import STORED, flat, libm, numbers, short
+from waiting import wait_until
 
 from mfba_planner import __version__, cli
 from mfba_planner.entry_points import run_and_return_exit_code
@@ -30,8 +30,6 @@ from mfba_planner.paper.tables.model import Verdict
 from mfba_planner.report.tables import html
 from mfba_planner.report.tables.text import Origin
 
-ROOT = Path(__file__).parents[1]
-STORED = ROOT / "test/data/tables_quick.json"
 PAGE = ROOT / "docs/reproduction.md"
 FORMS = {"tables.html", "tables.md", "tables.csv", "tables.json"}
 
@@ -63,12 +61,6 @@ def made(quick: Path) -> Any:
     return json.loads((quick / "tables.json").read_text(encoding="utf-8"))
 
 
-def numbers(made: Any) -> dict[str, dict[str, Any]]:
-    return {
-        f"{n['place']}/{n['row']}/{n['column']}": n for s in made["sections"] for n in s["numbers"]
-    }
-
-
 def test_every_printed_number_is_there_with_a_verdict_and_a_reason(made: Any) -> None:
     found = numbers(made)
     for printed in published.ALL:
@@ -80,31 +72,6 @@ def test_every_printed_number_is_there_with_a_verdict_and_a_reason(made: Any) ->
     assert {key for key, n in found.items() if n["verdict"] == Verdict.IMPOSSIBLE.value} == set(
         doubts.IMPOSSIBLE
     )
-
-
-def flat(made: Any) -> dict[str, Any]:
-    """Every number of ours: {place: value or [middle, low, high]}."""
-    found: dict[str, Any] = {}
-    for key, n in numbers(made).items():
-        for reading, ours in n["ours"].items():
-            found[f"{key}/{reading}"] = _short(ours["value"])
-    for section in made["sections"]:
-        for name, grid in section["grids"].items():
-            for i, row in enumerate(grid["rows"]):
-                for j, value in enumerate(row):
-                    found[f"{section['key']}/{name}/{i}/{j}"] = _short(value)
-    return found
-
-
-def _short(value: Any) -> Any:
-    return [value["middle"], value["low"], value["high"]] if isinstance(value, dict) else value
-
-
-def libm() -> str:
-    """Which sin, cos and exp numpy has here: they may differ in the last bit between machines."""
-    x = np.linspace(-20.0, 20.0, 20_001)
-    bits = b"".join(f(x).tobytes() for f in (np.sin, np.cos, np.exp))
-    return hashlib.sha256(bits).hexdigest()[:16]
 
 
 def test_the_quick_form_s_numbers_are_those_stored(made: Any) -> None:
@@ -173,7 +140,7 @@ def test_all_forms_tell_the_same(quick: Path, made: Any) -> None:
         assert (x["printed"], x["verdict"], x["why"]) == (n["printed"], n["verdict"], n["why"])
         if x["low"]:
             ours = n["ours"][x["reading"]]["value"]
-            assert [float(x[c]) for c in ("ours", "low", "high")] == _short(ours)
+            assert [float(x[c]) for c in ("ours", "low", "high")] == short(ours)
     for name in ("tables.md", "tables.html"):
         text = unescape((quick / name).read_text(encoding="utf-8"))
         for n in found.values():

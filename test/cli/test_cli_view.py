@@ -2,13 +2,11 @@
 """`mfba view`: what is written for Rerun's viewer, as Rerun's own reader tells of it."""
 
 import math
-import re
-import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import pytest
+from report_readers import rows_of
 
 from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
@@ -18,20 +16,6 @@ from mfba_planner.report.rerun_viewer import save
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.run_episode import run
-
-RERUN = Path(sys.executable).parent / "rerun"
-ROWS = re.compile(r"^Chunk\(\w+\) with (\d+) rows .*? - (/\S+)", re.MULTILINE)
-
-
-def rows_of(path: Path) -> Counter[str]:
-    """How often each entity was logged, as `rerun rrd print` says."""
-    done = subprocess.run(
-        [RERUN, "rrd", "print", path], capture_output=True, text=True, timeout=120, check=True
-    )
-    found: Counter[str] = Counter()
-    for rows, entity in ROWS.findall(done.stdout):
-        found[entity] += int(rows)
-    return found
 
 
 @pytest.fixture(scope="module")

@@ -7,19 +7,21 @@ import sys
 from pathlib import Path
 
 import pytest
-import shown
-from shown import ROOT
+import shown_commands
+from shown_commands import ROOT
 
 from mfba_planner import cli
 from mfba_planner.scenarios import yaml_schema
 
 DOCS = ROOT / "docs"
-PAGES = {name[len("docs/") :]: page for name, page in shown.PAGES.items() if "docs/" in name}
+PAGES = {
+    name[len("docs/") :]: page for name, page in shown_commands.PAGES.items() if "docs/" in name
+}
 # They have tests of their own, which know what their commands and code must print.
 ELSEWHERE = {
-    "benchmark.md": "test_bench_benchmark.py",
-    "planners.md": "test_docs_planners.py",
-    "optimizer.md": "test_docs_optimizer.py",
+    "benchmark.md": "bench/test_benchmark.py",
+    "planners.md": "docs/test_docs_planners.py",
+    "optimizer.md": "docs/test_docs_optimizer.py",
 }
 
 
@@ -58,4 +60,4 @@ def test_the_reference_holds_every_command_and_every_key(built: Path) -> None:
 
 @pytest.mark.parametrize("name", [n for n in PAGES if n not in ELSEWHERE])
 def test_a_page_does_what_it_shows(name: str, tmp_path: Path) -> None:
-    shown.follow(PAGES[name], tmp_path)
+    shown_commands.follow(PAGES[name], tmp_path)

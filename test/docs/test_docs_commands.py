@@ -5,18 +5,20 @@ import re
 from pathlib import Path
 
 import pytest
-import shown
+import shown_commands
 from ros2_session import kind_of
-from shown import PAGES, REDUCED, ROOT, ours
+from shown_commands import PAGES, REDUCED, ROOT, ours
 
 CI = re.findall(r"^make (\w+)$", (ROOT / ".ci/run").read_text(encoding="utf-8"), re.MULTILINE)
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 COLCON = (ROOT / "tools/colcon_check.sh").read_text(encoding="utf-8")
 SETUP = (ROOT / "setup.py").read_text(encoding="utf-8")
 EVERYTHING = [
-    (n, w) for n, page in PAGES.items() for w in shown.commands(page) + shown.inline(page)
+    (n, w)
+    for n, page in PAGES.items()
+    for w in shown_commands.commands(page) + shown_commands.inline(page)
 ]
-# `make docs` is what test_docs.py does; the target calls the same builder as strictly.
+# `make docs` is what docs/test_docs_build.py does; the target calls the same builder as strictly.
 BY_TESTS = {"docs": "--builder html --nitpicky --fail-on-warning --keep-going"}
 
 
@@ -76,4 +78,4 @@ def test_commands_are_found_and_none_is_reduced_that_is_not_shown() -> None:
     ],
 )
 def test_what_makes_the_tables_of_other_pages_runs(line: str, said: str, tmp_path: Path) -> None:
-    assert said in shown.script(shown.reduced(line.split()), tmp_path)
+    assert said in shown_commands.script(shown_commands.reduced(line.split()), tmp_path)

@@ -2,15 +2,15 @@
 """The examples of docs/optimizer.md run, and say what they should."""
 
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from project import ROOT
 
 from mfba_planner.paper.readings import SWARMS
 
-PAGE = (Path(__file__).parents[1] / "docs/optimizer.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/optimizer.md").read_text(encoding="utf-8")
 
 
 def test_the_examples_run_one_after_the_other(capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,12 +5,13 @@ import re
 from pathlib import Path
 
 import pytest
-import shown
+import shown_commands
+from project import ROOT
 
 from mfba_planner import cli
 from mfba_planner.planning.planner_registry import PLANNERS
 
-PAGE = (Path(__file__).parents[1] / "docs/planners.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/planners.md").read_text(encoding="utf-8")
 
 
 def test_every_planner_has_its_line() -> None:
@@ -19,12 +20,12 @@ def test_every_planner_has_its_line() -> None:
     assert "`mfba` and `ba` are it" in PAGE
 
 
-RUN, SIM, SWEEP = map(shown.reduced, shown.commands(PAGE))
+RUN, SIM, SWEEP = map(shown_commands.reduced, shown_commands.commands(PAGE))
 
 
 def test_the_other_commands_run(tmp_path: Path) -> None:
-    assert "goal reached" in shown.mfba(RUN[1:], tmp_path)
-    assert "3 of 3 at the goal without collision" in shown.mfba(SIM[1:], tmp_path)
+    assert "goal reached" in shown_commands.mfba(RUN[1:], tmp_path)
+    assert "3 of 3 at the goal without collision" in shown_commands.mfba(SIM[1:], tmp_path)
 
 
 def test_the_planner_of_one_s_own_runs_in_a_sweep(

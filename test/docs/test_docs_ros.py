@@ -2,16 +2,15 @@
 """docs/ros.md keeps its word: its commands name what there is, the node takes what they say."""
 
 import re
-from pathlib import Path
 
 import pytest
+from project import ROOT
 
 from mfba_planner.core.options import walk
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.recovery import RecoveryParams, longest_s
 from mfba_planner.ros.node_parameters import PlannerSettings, WorldSimSettings
 
-ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs/ros.md").read_text(encoding="utf-8")
 
 

@@ -10,10 +10,10 @@ from itertools import count
 from pathlib import Path
 
 import pytest
-import shown
+import shown_commands
 import yaml
 from ros2_session import KINDS, SOON_S, Session, holds, kind_of
-from shown import PAGES, ROOT
+from shown_commands import PAGES, ROOT
 
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.scenarios.run_config import RunConfig
@@ -21,18 +21,21 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 
 # Other people's programs, and who holds us to what is said of them.
 MENTIONED = {
-    "ros2 bag": "test_recording_writer.py",
-    "ros2 bag info": "test_recording_metadata.py",
-    "ros2 bag play": "test_recording_qos.py",
-    "ros2 bag record": "test_recording_reader.py",
-    "ros2 pkg prefix mfba_planner": "test_layout.py",
+    "ros2 bag": "recording/test_bag_writer.py",
+    "ros2 bag info": "recording/test_bag_metadata.py",
+    "ros2 bag play": "recording/test_qos_profiles.py",
+    "ros2 bag record": "recording/test_bag_reader.py",
+    "ros2 pkg prefix mfba_planner": "ros/test_viewer_layouts.py",
 }
 SAID = re.compile(r"\bros2 [a-z]+(?: \w+)*")
 
 
 def blocks(page: str) -> list[list[list[str]]]:
     """The `ros2` lines of each block of a page that has any, then those within its text."""
-    fences = [shown.commands(f"```sh\n{block}```\n") for block in shown.blocks(page, "sh")]
+    fences = [
+        shown_commands.commands(f"```sh\n{block}```\n")
+        for block in shown_commands.blocks(page, "sh")
+    ]
     found = [[w for w in block if w[0] == "ros2"] for block in fences]
     inline = [[shlex.split(line)] for line in re.findall(r"`(ros2 run [^`]+)`", page)]
     return [block for block in (*found, *inline) if block]
@@ -94,7 +97,7 @@ def _is_kept(session: Session, bag: Path, home: Path, turns: Iterator[int]) -> b
 def test_the_commands_of_a_page_do_what_it_says(name: str, home: Path, domain_id: int) -> None:
     bag = None
     if name.startswith("docs/how-to/"):
-        shown.save(PAGES[name], home)
+        shown_commands.save(PAGES[name], home)
     with Session(domain_id, home) as session:
         for block in blocks(PAGES[name]):
             for words in block:

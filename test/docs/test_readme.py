@@ -6,14 +6,16 @@ import re
 from pathlib import Path
 
 import reference
-import shown
-from shown import ROOT, ours
+import shown_commands
+from shown_commands import ROOT, ours
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 DOCS = [README, *(path.read_text(encoding="utf-8") for path in sorted(ROOT.glob("docs/**/*.md")))]
 
-COMMANDS = shown.commands(README)
-MFBA = [found for command in COMMANDS if (found := ours(shown.reduced(command))) is not None]
+COMMANDS = shown_commands.commands(README)
+MFBA = [
+    found for command in COMMANDS if (found := ours(shown_commands.reduced(command))) is not None
+]
 
 
 def test_mfba_commands_run_in_order(tmp_path: Path) -> None:
@@ -21,9 +23,9 @@ def test_mfba_commands_run_in_order(tmp_path: Path) -> None:
     for name in ("config", "test"):
         (tmp_path / name).symlink_to(ROOT / name)
     for words in MFBA:
-        shown.mfba(words, tmp_path)
-    for code in shown.blocks(README, "python"):
-        assert "arrived" in shown.python(code, tmp_path)
+        shown_commands.mfba(words, tmp_path)
+    for code in shown_commands.blocks(README, "python"):
+        assert "arrived" in shown_commands.python(code, tmp_path)
 
 
 def test_generated_tables_are_up_to_date() -> None:

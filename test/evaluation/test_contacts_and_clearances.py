@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from trips import SECOND, post, trip
+from trip_samples import SECOND, post, trip
 
 from mfba_planner.core.types import Mode
 from mfba_planner.evaluation import metrics

@@ -4,7 +4,7 @@
 import math
 
 import pytest
-from trips import trip
+from trip_samples import trip
 
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.scores import barn_score, optimality_gap, spl, time_to_goal_s

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import wait_until
 from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
+from waiting import wait_until
 
 CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
 _ARGUMENTS = (

@@ -17,8 +17,9 @@ from typing import Any
 
 import pytest
 import yaml
+from project import ROOT
 
-LAUNCH = Path(__file__).parents[1] / "launch"
+LAUNCH = ROOT / "launch"
 
 
 @dataclass(kw_only=True)

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from helpers import wait_until
+from project import ROOT
+from waiting import wait_until
 
-ROOT = Path(__file__).parents[1]
 MARK = "MFBA_TEST_MARK"
 INSTALLED = Path(sys.executable).parent
 PROGRAM = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.{}())"

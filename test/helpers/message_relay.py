@@ -4,7 +4,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from graph import Graph
+from ros_graph import Graph
 
 from mfba_planner.recording.messages import stamp_ns
 from mfba_planner.ros.interface import topics

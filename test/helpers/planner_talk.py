@@ -5,8 +5,8 @@ import math
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, TwistStamped
-from graph import Graph
 from nav_msgs.msg import Odometry, Path
+from ros_graph import Graph
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.geometry import Pose2D

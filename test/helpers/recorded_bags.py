@@ -13,6 +13,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from nav_msgs.msg import Odometry
+from project import TEST_DATA
 from pybag.mcap_reader import McapFileReader
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
@@ -23,7 +24,7 @@ from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.message_definitions import definition_of
 from mfba_planner.recording.qos_profiles import OfferedQos
 
-FOREIGN = Path(__file__).parent / "data" / "rosbag2_foreign_scan"
+FOREIGN = TEST_DATA / "rosbag2_foreign_scan"
 SECOND = 1_000_000_000
 START_NS = 1_700_000_000 * SECOND
 

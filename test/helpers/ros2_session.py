@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from graph import Graph
 from launch_standin import Node, launched
-from launching import INSTALLED, Program
+from launched_programs import INSTALLED, Program
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from planner_talk import INF, goal, odom
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.context import Context
-from talk import INF, goal, odom
+from ros_graph import Graph
 
 from mfba_planner.core.errors import MfbaError
 from mfba_planner.recording.bag_reader import BagReader

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import rclpy
-from helpers import spin_until
 from rclpy.context import Context
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from waiting import spin_until
 
 from mfba_planner.ros.interface.topics import Topic
 from mfba_planner.ros.runtime.node_runtime import GraphNode, make_executor

@@ -8,7 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from project import ROOT
+
 MFBA = Path(sys.executable).parent / "mfba"
 # README and docs, but for what the build writes (docs/reference).
 PAGES = {

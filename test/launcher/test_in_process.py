@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
-from graph import Graph
+from ros_graph import Graph
 
 from mfba_planner.core.errors import GraphError
 from mfba_planner.core.options import override

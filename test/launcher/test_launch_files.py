@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 import reference
 import yaml
-from graph import Graph
 from launch_standin import declared, launched
+from project import ROOT
+from ros_graph import Graph
 
 from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.core.options import flatten
@@ -26,7 +27,7 @@ from mfba_planner.ros.replaying.replay_arguments import parse
 from mfba_planner.scenarios.run_config import NODES, OF_ROBOT, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
 
-LAUNCH = Path(__file__).parents[1] / "launch"
+LAUNCH = ROOT / "launch"
 
 
 def given(**changes: str) -> dict[str, str]:

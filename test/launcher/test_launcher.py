@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
-from launching import Program, complete
+from launched_programs import Program, complete
 
 from mfba_planner.core.options import override
 from mfba_planner.launcher.run_arguments import read_request

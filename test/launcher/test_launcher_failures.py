@@ -8,8 +8,8 @@ import threading
 from pathlib import Path
 
 import pytest
-from helpers import wait_until
-from launching import LONG, Program, complete
+from launched_programs import LONG, Program, complete
+from waiting import wait_until
 
 from mfba_planner import launcher
 from mfba_planner.entry_points import run_and_return_exit_code

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from helpers import wait_until
-from launching import Program, complete
+from launched_programs import Program, complete
+from waiting import wait_until
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.launcher import node_processes

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from helpers import wait_until
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.context import Context
 from rclpy.node import Node
+from waiting import wait_until
 
 from mfba_planner.core.errors import GraphError, OutputError
 from mfba_planner.core.options import flatten

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from project import ROOT
 
 from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, OutputError
@@ -195,7 +196,7 @@ def test_csv_table_and_picture_tell_the_same_rows() -> None:
 
 
 def test_the_page_has_the_readings_of_this_code() -> None:
-    page = (Path(__file__).parents[1] / "docs/sensitivity.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/sensitivity.md").read_text(encoding="utf-8")
     lines = [line.split(" | ") for line in page.splitlines() if line.startswith("|")][2:]
     assert [line[1].strip() for line in lines] == [r.label for r in [BASE, *OTHERS]]
     marks = {line[1].strip(): (line[3].strip(), line[6].strip()) for line in lines}

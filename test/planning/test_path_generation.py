@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
-from any_bats import ANY_READING
+from any_bat_params import ANY_READING
 from hypothesis import given
 from hypothesis import strategies as st
 

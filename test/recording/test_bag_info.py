@@ -3,7 +3,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from recording_bags import FOREIGN, START_NS, foreign_mcap, numbers, write_bag
+from recorded_bags import FOREIGN, START_NS, foreign_mcap, numbers, write_bag
 
 from mfba_planner.core.errors import BagError
 from mfba_planner.recording.bag_info import describe, format_info

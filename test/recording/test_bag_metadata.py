@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 import yaml
-from recording_bags import FOREIGN, LATCHED, SECOND, SENSOR, START_NS, write_bag
+from recorded_bags import FOREIGN, LATCHED, SECOND, SENSOR, START_NS, write_bag
 
 from mfba_planner.core.errors import BagError
 from mfba_planner.recording.bag_metadata import (

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
 from rclpy.serialization import deserialize_message
-from recording_bags import (
+from recorded_bags import (
     FOREIGN,
     LATCHED,
     SECOND,

@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from mcap.records import Chunk, Header
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
-from recording_bags import (
+from recorded_bags import (
     SECOND,
     SENSOR,
     START_NS,

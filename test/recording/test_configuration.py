@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from recording_bags import FOREIGN
+from recorded_bags import FOREIGN
 
 from mfba_planner.core.errors import BagError, OutputError
 from mfba_planner.recording.bag_reader import BagReader

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from edited_bags import last_bit, one_changed, record, rewrite, set_field
 from pyarrow import parquet
-from recording_bags import FOREIGN
-from test_cli_report import data_of
-from test_cli_view import rows_of
+from recorded_bags import FOREIGN
+from report_readers import data_of, rows_of
+from trio_scenario import TRIO
 
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, InputError
@@ -25,24 +25,9 @@ from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.fleet import run_fleet
-from mfba_planner.simulation.obstacle_motion import Obstacle, center_at
-from mfba_planner.simulation.robot_model import Noise, Robot
-from mfba_planner.simulation.scenario import Member, Scenario
+from mfba_planner.simulation.obstacle_motion import center_at
 from mfba_planner.verification.verify_bag import verify
 
-# b has arrived long before the others; odometry errs, so that truth is recorded as well.
-TRIO = Scenario(
-    name="trio",
-    start_m=(-2.0, 0.0),
-    goal_m=(2.0, 0.2),
-    obstacles=(Obstacle(center_m=(0.0, 3.0), radius_m=0.3, speed_mps=0.1),),
-    robots=(
-        Member(name="a", start_m=(-2.0, 0.0), goal_m=(2.0, 0.2)),
-        Member(name="b", start_m=(-1.0, -2.0), goal_m=(-1.0, -1.2)),
-        Member(name="c", start_m=(2.0, -0.6), goal_m=(-2.0, -0.4)),
-    ),
-    robot=Robot(noise=Noise(odom_m=0.002)),
-)
 Said = pytest.CaptureFixture[str]
 
 

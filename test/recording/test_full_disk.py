@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import pytest
-from recording_bags import count_with_all, fill, text, write_bag
+from recorded_bags import count_with_all, fill, text, write_bag
 
 from mfba_planner.core.errors import OutputError
 from mfba_planner.recording import file_storage

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from mcap_ros2._dynamic import generate_dynamic
-from recording_bags import FOREIGN
+from recorded_bags import FOREIGN
 from rosbags.typesys import get_types_from_msg
 
 from mfba_planner.core.errors import InputError

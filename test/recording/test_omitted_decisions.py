@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from edited_bags import Edit, record, rewrite, swapped
-from test_fleet_bag import TRIO
+from trio_scenario import TRIO
 
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError

@@ -5,7 +5,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recording_bags import FOREIGN
+from recorded_bags import FOREIGN
 from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9, parse_qos
 
 from mfba_planner.core.errors import BagError

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from edited_bags import each_changed, record, rewrite, swapped
-from recording_bags import FOREIGN
+from recorded_bags import FOREIGN
 
 from mfba_planner.core.errors import BagError
 from mfba_planner.evaluation.metrics import evaluate

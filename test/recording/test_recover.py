@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from mcap.writer import IndexType
-from recording_bags import (
+from recorded_bags import (
     FOREIGN,
     SENSOR,
     START_NS,

@@ -12,7 +12,7 @@ import pytest
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
-from recording_bags import FOREIGN, foreign_mcap, write_bag
+from recorded_bags import FOREIGN, foreign_mcap, write_bag
 
 from mfba_planner.core.errors import BagError
 from mfba_planner.recording.bag_reader import BagReader

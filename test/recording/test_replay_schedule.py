@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from recording_bags import FOREIGN, LATCHED, SECOND, SENSOR, START_NS, text
+from recorded_bags import FOREIGN, LATCHED, SECOND, SENSOR, START_NS, text
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.recording.bag_reader import BagReader

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from edited_bags import record
-from recording_bags import count_with_all
+from recorded_bags import count_with_all
 
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.recording.bag_reader import BagReader

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 from browser import Browser
-from helpers import wait_until
-from launching import complete
+from launched_programs import complete
+from project import ROOT
 from selenium.webdriver.common.keys import Keys
+from waiting import wait_until
 
 from mfba_planner.core.errors import InputError, OutputError
 from mfba_planner.core.types import Mode
@@ -130,7 +131,7 @@ def test_nothing_in_it_leads_elsewhere(single: Path, bag: Path) -> None:
     assert addresses <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
     assert "default-src 'none'" in text
     assert str(bag.parent) not in text
-    assert str(Path(__file__).parents[1]) not in text
+    assert str(ROOT) not in text
 
 
 def test_every_tick_shows_what_the_bag_holds(
@@ -629,7 +630,7 @@ def test_without_a_chromium_one_line_says_what_to_install(tmp_path: Path) -> Non
     for name in ("bash", "env"):
         (tmp_path / name).symlink_to(str(shutil.which(name)))
     done = subprocess.run(
-        [Path(__file__).parents[1] / "tools/chromium.sh"],
+        [ROOT / "tools/chromium.sh"],
         env={"PATH": str(tmp_path)},
         capture_output=True,
         text=True,

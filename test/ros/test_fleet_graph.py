@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import Twist, Vector3
-from graph import Graph
+from ros_graph import Graph
 from std_srvs.srv import SetBool, Trigger
 
 from mfba_planner.core.errors import ConfigError, GraphError

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 from edited_bags import rewrite
-from graph import Graph
 from nav_msgs.msg import Path
+from planner_talk import FREE, GOAL, LOCKSTEP, NAN, Talk, fields, goal, mode, odom, sectors
 from rclpy.qos import qos_profile_system_default
 from rclpy.serialization import serialize_message
+from ros_graph import Graph
 from std_srvs.srv import Trigger
-from talk import FREE, GOAL, LOCKSTEP, NAN, Talk, fields, goal, mode, odom, sectors
 
 from mfba_planner.core.options import override
 from mfba_planner.core.types import Mode

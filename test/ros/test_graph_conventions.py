@@ -5,8 +5,8 @@ from collections import Counter
 from typing import Any
 
 import pytest
-from graph import Graph
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from ros_graph import Graph
 from std_srvs.srv import Trigger
 
 from mfba_planner.planning.planner_params import PlannerParams

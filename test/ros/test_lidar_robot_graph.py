@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from edited_bags import rewrite
-from graph import Graph
+from ros_graph import Graph
 
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams

@@ -4,11 +4,11 @@
 from typing import Any
 
 import pytest
-from graph import Graph
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from planner_talk import FREE, GOAL, LOCKSTEP, Talk, fields, goal, mode, odom, sectors
+from ros_graph import Graph
 from std_srvs.srv import Trigger
-from talk import FREE, GOAL, LOCKSTEP, Talk, fields, goal, mode, odom, sectors
 
 from mfba_planner.core.types import Mode
 from mfba_planner.recording.messages import decision as read_decision

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from graph import Graph
-from launching import PROGRAM, ROOT
+from launched_programs import PROGRAM, ROOT
 from nav_msgs.msg import Path as PathMsg
+from ros_graph import Graph
 
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import CHUNK_BYTES

@@ -7,12 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
-from graph import Graph
 from nav_msgs.msg import Odometry
-from rclpy.qos import qos_profile_sensor_data, qos_profile_system_default
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
-from talk import (
+from planner_talk import (
     FREE,
     GOAL,
     INF,
@@ -26,6 +22,10 @@ from talk import (
     odom,
     sectors,
 )
+from rclpy.qos import qos_profile_sensor_data, qos_profile_system_default
+from ros_graph import Graph
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance

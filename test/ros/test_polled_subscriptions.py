@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from graph import Graph
 from rclpy.serialization import deserialize_message
+from ros_graph import Graph
 from std_msgs.msg import String
 
 from mfba_planner.ros.runtime import polled_subscriptions

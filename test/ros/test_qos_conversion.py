@@ -2,9 +2,9 @@
 """rclpy's QoS as it is recorded, and recorded QoS as a publisher offers it again."""
 
 import pytest
-from graph import Graph
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from ros_graph import Graph
 from std_msgs.msg import String
 
 from mfba_planner.recording.qos_profiles import OfferedQos

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from edited_bags import record as record_run
 from geometry_msgs.msg import TwistStamped
-from graph import Graph
 from rclpy.context import Context
 from rclpy.qos import qos_profile_sensor_data
+from ros_graph import Graph
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 import rclpy
 from geometry_msgs.msg import PoseStamped
-from graph import Graph
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.serialization import serialize_message
-from recording_bags import FOREIGN, LATCHED, SECOND, START_NS, odometry, scan, write_bag
+from recorded_bags import FOREIGN, LATCHED, SECOND, START_NS, odometry, scan, write_bag
+from ros_graph import Graph
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger

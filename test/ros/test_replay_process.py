@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from graph import Graph
-from launching import Program, complete
+from launched_programs import Program, complete
 from nav_msgs.msg import Odometry
-from recording_bags import FOREIGN, odometry, scan, write_bag
+from recorded_bags import FOREIGN, odometry, scan, write_bag
+from ros_graph import Graph
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.types import Decision, Mode

@@ -9,8 +9,8 @@ from itertools import groupby
 from typing import Any
 
 import pytest
-from graph import Graph
-from relay import SPEED_FACTOR, TIMEOUT_S, Tamper, Wired
+from message_relay import SPEED_FACTOR, TIMEOUT_S, Tamper, Wired
+from ros_graph import Graph
 from std_srvs.srv import SetBool
 
 from mfba_planner.core.options import flatten

@@ -6,7 +6,7 @@ import sys
 import pytest
 from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from recording_bags import FOREIGN, LATCHED, SENSOR
+from recorded_bags import FOREIGN, LATCHED, SENSOR
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.recording.bag_metadata import BagTopic

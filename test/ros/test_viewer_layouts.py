@@ -5,19 +5,19 @@ import json
 import re
 from collections.abc import Iterator
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from graph import Graph
+from planner_talk import LOCKSTEP, Talk
+from project import ROOT
+from ros_graph import Graph
 from std_srvs.srv import Trigger
-from talk import LOCKSTEP, Talk
 
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.serialized_message import type_name
 
-LAYOUT = Path(__file__).parents[1] / "layout"
+LAYOUT = ROOT / "layout"
 GRAPH = {f"/{topic.name.lstrip('/')}": topic for topic in topics.GRAPH}
 PLUGINS = "rviz_default_plugins/"
 # What rviz_default_plugins' plugins_description.xml (Jazzy) says of those that are used here.

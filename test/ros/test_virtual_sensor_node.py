@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseArray
-from graph import Graph
 from nav_msgs.msg import Odometry
 from rclpy.qos import qos_profile_sensor_data
+from ros_graph import Graph
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header

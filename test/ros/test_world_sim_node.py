@@ -14,7 +14,7 @@ from geometry_msgs.msg import (
     TwistStamped,
     Vector3,
 )
-from graph import Graph
+from ros_graph import Graph
 from std_srvs.srv import SetBool, Trigger
 
 from mfba_planner.core.errors import ConfigError, GraphError

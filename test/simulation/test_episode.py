@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from trips import post, trip
+from trip_samples import post, trip
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
-from graph import Graph
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ros_graph import Graph
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, distance

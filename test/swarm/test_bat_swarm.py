@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from any_bats import ANY_READING, OURS, READINGS
+from any_bat_params import ANY_READING, OURS, READINGS
 from hypothesis import given
 from hypothesis import strategies as st
 

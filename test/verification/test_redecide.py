@@ -12,7 +12,7 @@ from edited_bags import record
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
-from recording_bags import FOREIGN, SECOND
+from recorded_bags import FOREIGN, SECOND
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import LaserScan
 

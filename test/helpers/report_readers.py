@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a written report holds, as its own readers tell."""
+
+import json
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+
+def data_of(path: Path) -> dict[str, Any]:
+    found = re.search(r'id="data">(.*?)</script>', path.read_text(encoding="utf-8"), re.DOTALL)
+    assert found
+    data: dict[str, Any] = json.loads(found[1])
+    return data
+
+
+RERUN = Path(sys.executable).parent / "rerun"
+
+
+ROWS = re.compile(r"^Chunk\(\w+\) with (\d+) rows .*? - (/\S+)", re.MULTILINE)
+
+
+def rows_of(path: Path) -> Counter[str]:
+    """How often each entity was logged, as `rerun rrd print` says."""
+    done = subprocess.run(
+        [RERUN, "rrd", "print", path], capture_output=True, text=True, timeout=120, check=True
+    )
+    found: Counter[str] = Counter()
+    for rows, entity in ROWS.findall(done.stdout):
+        found[entity] += int(rows)
+    return found
