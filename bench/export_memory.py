@@ -24,7 +24,7 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.configuration import attach_configuration
-from mfba_planner.ros.interface.conversions import decision_msg, sectors_msg, set_stamp
+from mfba_planner.ros.interface.to_messages import decision_msg, sectors_msg, set_stamp
 from mfba_planner.scenarios.run_config import RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.run_episode import run

@@ -20,7 +20,7 @@ from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.launcher.node_processes import parameters_yaml
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings
-from mfba_planner.recording.messages import decision, stamp_ns
+from mfba_planner.recording.from_messages import decision, stamp_ns
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios.run_config import RunConfig

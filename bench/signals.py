@@ -116,7 +116,7 @@ def traffic(domain: int) -> Iterator[None]:
 
     from mfba_planner.core.geometry import Pose2D
     from mfba_planner.perception.sensory_vector import SensorParams
-    from mfba_planner.ros.interface import conversions, topics
+    from mfba_planner.ros.interface import to_messages, topics
 
     context = Context()
     context.init(domain_id=domain)
@@ -130,11 +130,11 @@ def traffic(domain: int) -> Iterator[None]:
             now = time.monotonic_ns()
             pose = Pose2D(0.0, 0.0)
             odom, obstacles, sectors, goal = writers
-            odom.publish(conversions.odometry_msg(pose, (0.0, 0.0), now, "odom", "base_link"))
-            obstacles.publish(conversions.obstacles_msg([(1.0, 1.0)], now, "odom"))
-            sectors.publish(conversions.sectors_msg((9.0,) * 12, SensorParams(), 0.3, now, "odom"))
+            odom.publish(to_messages.odometry_msg(pose, (0.0, 0.0), now, "odom", "base_link"))
+            obstacles.publish(to_messages.obstacles_msg([(1.0, 1.0)], now, "odom"))
+            sectors.publish(to_messages.sectors_msg((9.0,) * 12, SensorParams(), 0.3, now, "odom"))
             if now // 10_000_000 % 100 == 0:
-                goal.publish(conversions.pose_stamped_msg((5.0, 5.0), now, "odom"))
+                goal.publish(to_messages.pose_stamped_msg((5.0, 5.0), now, "odom"))
 
     thread = threading.Thread(target=publish)
     thread.start()

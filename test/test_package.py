@@ -7,15 +7,16 @@ import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from configparser import ConfigParser
-from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import import_graph
 import pytest
 import yaml
+from import_graph import PACKAGE, ROOMS, ROS_ROOMS, imports_of, module_graph, tree_of
 from project import ROOT
 
 from mfba_planner import __version__
@@ -23,125 +24,114 @@ from mfba_planner.cli import COMMANDS as COMMANDS_OF_MFBA
 from mfba_planner.core import resources
 from mfba_planner.core.errors import InputError
 
-PACKAGE = ROOT / "mfba_planner"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 NODES = ("planner", "world_sim", "virtual_sensor", "recorder", "replay")
 COMMANDS = ("launcher", "mfba")
 
-# Who may import whom, inside the package and outside; "*" is everything but cli.
+# What a room may import from outside the package, beside the standard library.
 ROS = (
     {"rclpy", "tf2_msgs", "builtin_interfaces", "rcl_interfaces", "ament_index_python"}
     | {f"{kind}_msgs" for kind in ("diagnostic", "geometry", "nav", "rosgraph", "sensor", "std")}
     | {"std_srvs", "visualization_msgs"}
 )
-MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
-    "__init__": (set(), set()),
-    "core": ({"core"}, {"numpy"}),
-    "resources": ({"core"}, set()),
-    "outputs": ({"core"}, set()),
-    "arguments": ({"core"}, set()),
-    "entry": ({"core"}, set()),
-    "figures": ({"core", "paper", "report", "scenarios"}, set()),
-    "watched": ({"core", "paper", "study"}, {"rich"}),
-    "statistics": (set(), {"numpy", "scipy"}),
-    "leash": (set(), set()),
-    "sweep": (
-        {"core", "leash", "messages", "oracle", "outputs", "planners", "statistics", "study"}
-        | {"sweep", "worlds"},
-        {"distributed", "numpy", "pyarrow"},
-    ),
-    "study": ({"core", "outputs", "study"}, {"numpy"}),
-    "planners": ({"core", "planners"}, {"numpy", "pyrvo"}),
-    "scenarios": ({"core", "resources", "scenario_model"}, set()),
-    "scenario_model": ({"core", "scenarios"}, {"pydantic", "yaml"}),
-    "worlds": ({"core", "scenarios", "worlds"}, {"numpy"}),
-    "oracle": ({"core", "oracle"}, {"numpy", "scipy"}),
-    "messages": ({"core"}, {"numpy"}),
-    "node_settings": ({"core"}, set()),
-    "run_config": ({"core", "scenarios"}, {"numpy"}),
-    "paper": ({"core", "paper", "statistics", "study"}, {"numpy", "scipy"}),
-    "recording": (
-        {"core", "messages", "recording", "scenarios"},
-        {"mcap", "mcap_ros2", "yaml", "zstandard"},
-    ),
-    "verification": ({"core", "messages", "planners", "recording", "verification"}, set()),
-    "report": (
-        {"core", "outputs", "paper", "report", "scenarios", "statistics", "sweep"},
-        {"matplotlib", "numpy", "rerun", "rich"},
-    ),
-    "ros": (
-        {"arguments", "core", "messages", "outputs", "recording", "ros", "run_config"}
-        | {"node_settings", "planners", "scenarios"},
-        {"numpy"} | ROS,
-    ),
-    "launcher": ({"*"}, {"launch", "launch_ros", "rich", "yaml"} | ROS),
-    "cli": ({"*"}, {"pyarrow", "rich", "yaml"}),
+OUTSIDE: dict[str, set[str]] = {
+    "": set(),
+    "core": {"numpy"},
+    "swarm": {"numpy"},
+    "perception": {"numpy"},
+    "planning": {"numpy", "pyrvo"},
+    "simulation": {"numpy"},
+    "scenarios": {"numpy", "pydantic", "yaml"},
+    "evaluation": {"distributed", "numpy", "pyarrow", "scipy"},
+    "paper": {"numpy", "scipy"},
+    "recording": {"mcap", "mcap_ros2", "numpy", "yaml", "zstandard"},
+    "verification": set(),
+    "report": {"matplotlib", "numpy", "rerun", "rich"},
+    "ros": {"numpy"} | ROS,
+    "launcher": {"launch", "launch_ros", "rich", "yaml"} | ROS,
+    "cli": {"pyarrow", "rich", "yaml"},
 }
-# The core is handed the time and its random generators, and lets others do the talking.
-CORE_NEVER = {"asyncio", "datetime", "logging", "multiprocessing", "random", "threading", "time"}
-
-
-@cache
-def tree_of(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"), str(path))
-
-
-def imports_of(path: Path) -> Iterator[str]:
-    """Every module that a file names in an import, absolute, lazy ones included."""
-    package = path.relative_to(ROOT).parent.parts
-    for node in ast.walk(tree_of(path)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] if node.level else ()
-            module = ".".join((*base, *filter(None, [node.module])))
-            yield from (f"{module}.{alias.name}" for alias in node.names)
-
-
-def layer_of(path: Path) -> str:
-    return path.relative_to(PACKAGE).with_suffix("").parts[0]
+# What decides is handed the time and its random generators, and lets others do the talking.
+DECIDING = ("core", "swarm", "perception", "planning", "simulation")
+NEVER = {"asyncio", "datetime", "logging", "multiprocessing", "random", "threading", "time"}
+# core's own tools for programs: files, processes, arguments.
+TOP = {"__init__.py", "entry_points.py", "py.typed"}
 
 
 def is_node(path: Path) -> bool:
-    return path.parent.name == "ros" and path.stem in NODES
+    return path.parent.name == "nodes" and path.stem in NODES
 
 
 def relative(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
+def room(path: Path) -> str:
+    parts = path.relative_to(PACKAGE).parts
+    return parts[0] if len(parts) > 1 else ""
+
+
+def test_nothing_lies_loose_at_the_top_and_every_folder_is_a_room() -> None:
+    found = [path for path in PACKAGE.iterdir() if path.name != "__pycache__"]
+    assert {path.name for path in found if path.is_file()} == TOP
+    assert {path.name for path in found if path.is_dir()} == set(ROOMS) == set(OUTSIDE) - {""}
+    inside = {path.name for path in (PACKAGE / "ros").iterdir() if path.is_dir()}
+    assert inside - {"__pycache__"} == set(ROS_ROOMS)
+
+
 @pytest.mark.parametrize("path", SOURCES, ids=relative)
-def test_imports_stay_within_their_layer(path: Path) -> None:
-    layer = layer_of(path)
-    assert layer in MAY_IMPORT, f"{layer} is new: say in MAY_IMPORT whom it may import"
-    inside, outside = MAY_IMPORT[layer]
+def test_imports_point_down_only(path: Path) -> None:
+    """Lazy ones included; ROOMS and ROS_ROOMS are from the ground up."""
+    here, order = room(path), list(ROOMS)
     for name in imports_of(path):
         top, *rest = name.split(".")
         if top == "mfba_planner":
+            if rest[0] in ("__version__", "entry_points"):
+                continue
+            allowed = order[: order.index(here) + 1] if here else ["core"]
+            assert rest[0] in allowed, f"{relative(path)} must not import {name}"
             if rest[0] == "cli":
-                assert layer == "cli", f"{name}: nothing imports cli"
                 assert rest[1] not in COMMANDS_OF_MFBA, f"{name}: no command imports another"
-            assert {rest[0], "*"} & (inside | {"__version__"}), f"{layer} must not import {name}"
+            if here == "ros" and rest[0] == "ros" and path.parent.name in ROS_ROOMS:
+                above = ROS_ROOMS[ROS_ROOMS.index(path.parent.name) + 1 :]
+                assert rest[1] not in above, f"{relative(path)} must not import {name}"
         elif top in sys.stdlib_module_names:
-            assert layer != "core" or top not in CORE_NEVER, f"core must not import {name}"
+            assert here not in DECIDING or top not in NEVER, f"{here} must not import {name}"
         else:
-            assert top in outside, f"{layer} must not import {name}"
+            assert top in OUTSIDE[here], f"{here} must not import {name}"
 
 
-def test_no_module_of_ros_but_the_in_process_driver_imports_a_node() -> None:
+def test_no_module_imports_another_in_a_circle() -> None:
+    try:
+        TopologicalSorter(module_graph()).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_the_picture_of_the_rooms_is_that_of_the_imports() -> None:
+    assert import_graph.PICTURE.read_text(encoding="utf-8") == import_graph.svg(), (
+        "run `python tools/import_graph.py --write`"
+    )
+
+
+def test_a_picture_shows_every_room_and_no_arrow_that_follows_from_others() -> None:
+    drawn = import_graph.direct({("c", "b"), ("b", "a"), ("c", "a")})
+    assert drawn == {("c", "b"), ("b", "a")}
+
+
+def test_no_node_imports_another() -> None:
     for path in SOURCES:
-        if layer_of(path) == "ros" and path.stem != "in_process":
+        if room(path) == "ros":
             for name in imports_of(path):
-                parts = name.split(".")
-                assert not (parts[:2] == ["mfba_planner", "ros"] and parts[2] in NODES), (
+                assert not name.startswith("mfba_planner.ros.nodes."), (
                     f"{relative(path)} imports the node {name}"
                 )
 
 
-def test_core_tells_no_time_and_draws_no_hidden_random_numbers() -> None:
+def test_what_decides_draws_no_hidden_random_numbers() -> None:
     hidden = re.compile(r"np\.random\.(seed|rand|randn|random|uniform|normal)\b|default_rng\(\)")
     for path in SOURCES:
-        if layer_of(path) == "core":
+        if room(path) in DECIDING:
             assert not hidden.search(path.read_text(encoding="utf-8")), relative(path)
 
 
@@ -285,7 +275,7 @@ def test_programs_lead_to_a_main(distribution: Any) -> None:
     for name, target in scripts.items():
         assert target == f"mfba_planner.entry_points:{name}"
         assert callable(getattr(entry_points, name))
-    for module in (*(f"ros/{name}" for name in NODES), "launcher", "cli"):
+    for module in (*(f"ros/nodes/{name}" for name in NODES), "launcher", "cli"):
         path = PACKAGE / f"{module}.py"
         path = path if path.exists() else PACKAGE / module / "__init__.py"
         assert path.exists(), f"{module} is missing"

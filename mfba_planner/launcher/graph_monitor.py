@@ -16,7 +16,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import SetBool, Trigger
 
-from ..recording.messages import points, stamp_ns
+from ..recording.from_messages import points, stamp_ns
 from ..recording.robot_topics import NO_NAMESPACE
 from ..ros.endpoints.robot_namespace import below
 from ..ros.interface import topics

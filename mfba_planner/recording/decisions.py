@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ..core.errors import BagError, InputError
 from ..core.types import Decision, Ranges
 from .bag_reader import BagReader, DecodedMessage
-from .messages import decision, sector_ranges, stamp_ns
+from .from_messages import decision, sector_ranges, stamp_ns
 from .omitted_decisions import left_out
 from .robot_topics import NO_NAMESPACE, below, messages_by_robot, of_robot
 

@@ -19,7 +19,7 @@ from ..simulation.fleet import scenarios_with_others
 from ..simulation.scenario import Scenario
 from .bag_reader import BagReader
 from .decisions import rising_decisions, stream_decisions
-from .messages import robot_pose, stamp_ns
+from .from_messages import robot_pose, stamp_ns
 from .robot_topics import NO_NAMESPACE, below, chosen, messages_by_robot
 from .run_setup import read_setup, read_setups
 

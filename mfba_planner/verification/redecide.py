@@ -20,7 +20,7 @@ from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions import DECISION, SECTORS, robots_with_decisions
 from ..recording.file_integrity import check_data
-from ..recording.messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
+from ..recording.from_messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
 from ..recording.robot_topics import NO_NAMESPACE
 from ..simulation.decision_digest import digest
 from .lidar_extrinsics import StaticFrames

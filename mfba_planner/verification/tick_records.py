@@ -12,7 +12,7 @@ from ..core.errors import InputError
 from ..core.geometry import Point
 from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions import DECISION, SECTORS, ranges_of, require_decisions
-from ..recording.messages import goal_point, stamp_ns, waypoint_points
+from ..recording.from_messages import goal_point, stamp_ns, waypoint_points
 from ..recording.omitted_decisions import left_out
 from ..recording.robot_topics import messages_by_robot
 

@@ -19,7 +19,7 @@ from ..perception.sensory_vector import sense_circles, sensory_vector
 from ..planning.planner_factory import make_planner
 from ..recording.bag_reader import BagReader
 from ..recording.file_integrity import check_data
-from ..recording.messages import (
+from ..recording.from_messages import (
     body_velocity,
     decision_value,
     laser_scan,
@@ -29,7 +29,7 @@ from ..recording.messages import (
     sector_ranges,
     velocity,
 )
-from ..recording.messages import decision as read_decision
+from ..recording.from_messages import decision as read_decision
 from ..recording.robot_topics import NO_NAMESPACE, chosen
 from ..recording.run_setup import Setup, read_setup, read_setups
 from ..simulation.decision_digest import digest
@@ -111,7 +111,7 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
     goal: Point | None = None
     pose = Pose2D(0.0, 0.0)
     recorded, decided = [], []
-    unchecked, errand = 0, ""
+    unchecked, goal_id = 0, ""
     for tick in tick_records.ticks:
         if DECISION not in tick.said or tick.stamp_ns in tick_records.left_out:
             continue  # named by evidence where it must not be
@@ -125,8 +125,8 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
         except InputError as error:
             faults.append(f"stamp {tick.stamp_ns} ns: {error}")
             continue
-        before, errand = errand, decision_value(tick.said[DECISION], "errand")
-        if errand != before:
+        before, goal_id = goal_id, decision_value(tick.said[DECISION], "goal_id")
+        if goal_id != before:
             planner.reset()  # ordered anew, be it to the same goal, or cancelled
             goal = goal if was.goal else None
         if was.goal != goal:

@@ -6,7 +6,7 @@ from typing import Any
 
 from ros_graph import Graph
 
-from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor

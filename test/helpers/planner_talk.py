@@ -13,7 +13,7 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Mode, Ranges
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import odometry_msg, pose_stamped_msg, sectors_msg
+from mfba_planner.ros.interface.to_messages import odometry_msg, pose_stamped_msg, sectors_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
 
 INF, NAN = math.inf, math.nan

@@ -21,7 +21,7 @@ from ros_graph import Graph
 
 from mfba_planner.core.errors import MfbaError
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.messages import decision
+from mfba_planner.recording.from_messages import decision
 from mfba_planner.recording.recover import recover
 from mfba_planner.ros.interface import topics
 

@@ -19,10 +19,10 @@ from mfba_planner.paper import readings
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
-from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import pose_msg
+from mfba_planner.ros.interface.to_messages import pose_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim

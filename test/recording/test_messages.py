@@ -28,14 +28,14 @@ from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D, wrap_angle
 from mfba_planner.core.types import Decision, Mode
 from mfba_planner.perception.sensory_vector import SensorParams, sensory_vector
-from mfba_planner.recording import messages
-from mfba_planner.ros.interface import conversions
+from mfba_planner.recording import from_messages
+from mfba_planner.ros.interface import to_messages
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 moderate = st.floats(-1e6, 1e6)
 points = st.tuples(finite, finite)
 angles = st.floats(-math.pi, math.pi)
-stamps = st.integers(0, (2**31 - 1) * messages.SECOND_NS)
+stamps = st.integers(0, (2**31 - 1) * from_messages.SECOND_NS)
 # A text in a message ends at the first NUL.
 reasons = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=30)
 ranges = st.lists(
@@ -77,8 +77,8 @@ def bits(*numbers: float) -> bytes:
 
 @given(stamps)
 def test_stamps_come_back(stamp_ns: int) -> None:
-    assert messages.stamp_ns(sent(conversions.time_msg(stamp_ns))) == stamp_ns
-    assert messages.stamp_ns(sent(conversions.clock_msg(stamp_ns)).clock) == stamp_ns
+    assert from_messages.stamp_ns(sent(to_messages.time_msg(stamp_ns))) == stamp_ns
+    assert from_messages.stamp_ns(sent(to_messages.clock_msg(stamp_ns)).clock) == stamp_ns
 
 
 @given(finite, finite, angles, points, stamps)
@@ -86,48 +86,48 @@ def test_odometry_comes_back(
     x: float, y: float, yaw: float, velocity: tuple[float, float], stamp_ns: int
 ) -> None:
     message = sent(
-        conversions.odometry_msg(Pose2D(x, y, yaw), velocity, stamp_ns, "odom", "base_link")
+        to_messages.odometry_msg(Pose2D(x, y, yaw), velocity, stamp_ns, "odom", "base_link")
     )
-    pose = messages.robot_pose(message)
+    pose = from_messages.robot_pose(message)
     assert bits(*pose.position) == bits(x, y)
     assert abs(wrap_angle(pose.yaw - yaw)) < 1e-12
-    assert messages.stamp_ns(message.header.stamp) == stamp_ns
+    assert from_messages.stamp_ns(message.header.stamp) == stamp_ns
     assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
 
 
 @given(points)
 def test_a_robot_that_looks_along_x_loses_no_bit(velocity: tuple[float, float]) -> None:
-    message = sent(conversions.odometry_msg(Pose2D(0.0, 0.0), velocity, 1, "odom", "base_link"))
-    assert messages.robot_pose(message).yaw == 0.0
+    message = sent(to_messages.odometry_msg(Pose2D(0.0, 0.0), velocity, 1, "odom", "base_link"))
+    assert from_messages.robot_pose(message).yaw == 0.0
     linear = message.twist.twist.linear
     assert bits(linear.x, linear.y) == bits(*velocity)
 
 
 def test_odometry_gives_the_velocity_in_the_body_frame() -> None:
     """REP-105: a robot that looks north and moves east moves to its right, which is -y."""
-    message = conversions.odometry_msg(Pose2D(0.0, 0.0, NORTH), (1.0, 0.0), 1, "odom", "base_link")
+    message = to_messages.odometry_msg(Pose2D(0.0, 0.0, NORTH), (1.0, 0.0), 1, "odom", "base_link")
     linear = message.twist.twist.linear
     assert (linear.x, linear.y) == pytest.approx((0.0, -1.0))
 
 
 @given(st.lists(points, max_size=12), stamps)
 def test_obstacles_come_back_in_order(centers: list[tuple[float, float]], stamp_ns: int) -> None:
-    message = sent(conversions.obstacles_msg(centers, stamp_ns, "odom"))
-    assert messages.obstacle_centers(message) == centers
-    assert messages.stamp_ns(message.header.stamp) == stamp_ns
+    message = sent(to_messages.obstacles_msg(centers, stamp_ns, "odom"))
+    assert from_messages.obstacle_centers(message) == centers
+    assert from_messages.stamp_ns(message.header.stamp) == stamp_ns
 
 
 @given(points, stamps)
 def test_a_goal_comes_back(goal: tuple[float, float], stamp_ns: int) -> None:
-    message = sent(conversions.pose_stamped_msg(goal, stamp_ns, "odom"))
-    assert bits(*messages.goal_point(message)) == bits(*goal)
+    message = sent(to_messages.pose_stamped_msg(goal, stamp_ns, "odom"))
+    assert bits(*from_messages.goal_point(message)) == bits(*goal)
 
 
 @given(ranges, st.floats(0.01, 1000.0))
 def test_sectors_come_back(seen: tuple[float, ...], sensing_range_m: float) -> None:
     params = SensorParams(sectors=len(seen), sensing_range_m=sensing_range_m)
-    message = sent(conversions.sectors_msg(seen, params, 0.3, 1, "odom"))
-    assert messages.sector_ranges(message) == seen
+    message = sent(to_messages.sectors_msg(seen, params, 0.3, 1, "odom"))
+    assert from_messages.sector_ranges(message) == seen
     assert tuple(message.intensities) == sensory_vector(seen)
     # What LaserScan's own rules ask for: every finite range within its limits, a full ring.
     finite_ranges = [r for r in message.ranges if math.isfinite(r)]
@@ -138,14 +138,14 @@ def test_sectors_come_back(seen: tuple[float, ...], sensing_range_m: float) -> N
 
 
 def test_the_first_beam_looks_through_the_middle_of_sector_1() -> None:
-    message = conversions.sectors_msg((math.inf,) * 12, SensorParams(), 0.3, 1, "odom")
+    message = to_messages.sectors_msg((math.inf,) * 12, SensorParams(), 0.3, 1, "odom")
     assert math.degrees(message.angle_min) == pytest.approx(15.0)
     assert math.degrees(message.angle_increment) == pytest.approx(30.0)
 
 
 @given(st.lists(st.integers(0, 1), min_size=3).map(tuple))
 def test_the_sensory_vector_says_what_it_is(vs: tuple[int, ...]) -> None:
-    message = sent(conversions.sensory_vector_msg(vs))
+    message = sent(to_messages.sensory_vector_msg(vs))
     assert tuple(message.data) == vs
     (dimension,) = message.layout.dim
     assert (dimension.label, dimension.size, dimension.stride) == ("sector", len(vs), len(vs))
@@ -154,13 +154,13 @@ def test_the_sensory_vector_says_what_it_is(vs: tuple[int, ...]) -> None:
 @settings(max_examples=50)
 @given(decisions())
 def test_a_decision_comes_back_whole(decision: Decision) -> None:
-    message = sent(conversions.decision_msg(decision, "mfba", 3, "/planner"))
-    assert messages.decision(message, decision.ranges_m) == decision
+    message = sent(to_messages.decision_msg(decision, "mfba", 3, "/planner"))
+    assert from_messages.decision(message, decision.ranges_m) == decision
 
 
 def test_a_decision_tells_people_how_bad_it_is() -> None:
     def level(mode: Mode) -> bytes:
-        message = conversions.decision_msg(a_decision(mode=mode), "ba", 7, "/robot1/planner")
+        message = to_messages.decision_msg(a_decision(mode=mode), "ba", 7, "/robot1/planner")
         status = message.status[0]
         found = {item.key: item.value for item in status.values}
         assert (found["algorithm"], found["refused_inputs"]) == ("ba", "7")
@@ -202,7 +202,7 @@ def a_decision(**changes: Any) -> Decision:
 def test_the_plan_leads_from_here_over_the_step_to_the_goal(
     changes: dict[str, Any], expected: list[tuple[float, float]]
 ) -> None:
-    plan = sent(conversions.plan_msg(a_decision(**changes), "odom"))
+    plan = sent(to_messages.plan_msg(a_decision(**changes), "odom"))
     assert [(p.pose.position.x, p.pose.position.y) for p in plan.poses] == expected
     assert all(p.header == plan.header for p in plan.poses)
 
@@ -213,12 +213,12 @@ def test_the_twist_is_the_decision_in_the_body_frame(
 ) -> None:
     decision = a_decision(velocity=velocity, pose=Pose2D(0.0, 0.0, yaw))
     for message in (
-        conversions.twist_msg(decision),
-        conversions.twist_stamped_msg(decision, "base_link"),
+        to_messages.twist_msg(decision),
+        to_messages.twist_stamped_msg(decision, "base_link"),
     ):
-        vx, vy, wz = messages.velocity(sent(message))
+        vx, vy, wz = from_messages.velocity(sent(message))
         assert wz == 0.0
-        back = messages.rotated((vx, vy), yaw)
+        back = from_messages.rotated((vx, vy), yaw)
         # the smallest floats have no digits left to be exact in
         assert math.dist(back, velocity) <= 1e-12 * math.hypot(*velocity) + 1e-300
         if yaw == 0.0:
@@ -226,8 +226,8 @@ def test_the_twist_is_the_decision_in_the_body_frame(
 
 
 def test_the_stamped_twist_names_frame_and_stamp() -> None:
-    header = conversions.twist_stamped_msg(a_decision(stamp_ns=5), "base_link").header
-    assert (messages.stamp_ns(header.stamp), header.frame_id) == (5, "base_link")
+    header = to_messages.twist_stamped_msg(a_decision(stamp_ns=5), "base_link").header
+    assert (from_messages.stamp_ns(header.stamp), header.frame_id) == (5, "base_link")
 
 
 @given(st.lists(finite, min_size=4, max_size=4))
@@ -235,22 +235,22 @@ def test_any_quaternion_gives_a_yaw_or_is_refused(q: list[float]) -> None:
     pose = Pose(orientation=Quaternion(**dict(zip("xyzw", q))))
     sound = 1e-6 < sum(value * value for value in q) < 1e6
     with nullcontext() if sound else pytest.raises(InputError, match="send a unit quaternion"):
-        assert math.isfinite(messages.pose2d(pose, "odom").yaw)
+        assert math.isfinite(from_messages.pose2d(pose, "odom").yaw)
 
 
 @given(angles, st.floats(0.01, 100.0))
 def test_a_quaternion_need_not_be_normal(yaw: float, scale: float) -> None:
     half = 0.5 * yaw
     q = Quaternion(x=0.0, y=0.0, z=scale * math.sin(half), w=scale * math.cos(half))
-    pose = messages.pose2d(Pose(orientation=q), "odom")
+    pose = from_messages.pose2d(Pose(orientation=q), "odom")
     assert abs(wrap_angle(pose.yaw - yaw)) < 1e-9
 
 
 def test_a_message_nobody_filled_in_is_a_sound_pose() -> None:
     """The default quaternion of ROS 2 has w = 1; one of zeros is refused."""
-    assert messages.robot_pose(Odometry()) == Pose2D(0.0, 0.0, 0.0)
+    assert from_messages.robot_pose(Odometry()) == Pose2D(0.0, 0.0, 0.0)
     with pytest.raises(InputError, match="odom orientation has norm 0; send a unit quaternion"):
-        messages.robot_pose(odometry_with(qw=0.0))
+        from_messages.robot_pose(odometry_with(qw=0.0))
 
 
 def odometry_with(**numbers: float) -> Odometry:
@@ -271,20 +271,20 @@ def pose_at(**numbers: float) -> Pose:
 @pytest.mark.parametrize(
     ("read", "make"),
     [
-        (messages.robot_pose, lambda v: odometry_with(x=v)),
-        (messages.robot_pose, lambda v: odometry_with(y=v)),
-        (messages.robot_pose, lambda v: odometry_with(qx=v)),
-        (messages.robot_pose, lambda v: odometry_with(qy=v)),
-        (messages.robot_pose, lambda v: odometry_with(qz=v)),
-        (messages.robot_pose, lambda v: odometry_with(qw=v)),
-        (messages.goal_point, lambda v: PoseStamped(pose=pose_at(x=v))),
-        (messages.goal_point, lambda v: PoseStamped(pose=pose_at(y=v))),
-        (messages.obstacle_centers, lambda v: PoseArray(poses=[pose_at(), pose_at(x=v)])),
-        (messages.obstacle_centers, lambda v: PoseArray(poses=[pose_at(y=v)])),
-        (messages.velocity, lambda v: Twist(linear=Vector3(x=v))),
-        (messages.velocity, lambda v: Twist(linear=Vector3(y=v))),
-        (messages.velocity, lambda v: Twist(angular=Vector3(z=v))),
-        (messages.velocity, lambda v: TwistStamped(twist=Twist(linear=Vector3(x=v)))),
+        (from_messages.robot_pose, lambda v: odometry_with(x=v)),
+        (from_messages.robot_pose, lambda v: odometry_with(y=v)),
+        (from_messages.robot_pose, lambda v: odometry_with(qx=v)),
+        (from_messages.robot_pose, lambda v: odometry_with(qy=v)),
+        (from_messages.robot_pose, lambda v: odometry_with(qz=v)),
+        (from_messages.robot_pose, lambda v: odometry_with(qw=v)),
+        (from_messages.goal_point, lambda v: PoseStamped(pose=pose_at(x=v))),
+        (from_messages.goal_point, lambda v: PoseStamped(pose=pose_at(y=v))),
+        (from_messages.obstacle_centers, lambda v: PoseArray(poses=[pose_at(), pose_at(x=v)])),
+        (from_messages.obstacle_centers, lambda v: PoseArray(poses=[pose_at(y=v)])),
+        (from_messages.velocity, lambda v: Twist(linear=Vector3(x=v))),
+        (from_messages.velocity, lambda v: Twist(linear=Vector3(y=v))),
+        (from_messages.velocity, lambda v: Twist(angular=Vector3(z=v))),
+        (from_messages.velocity, lambda v: TwistStamped(twist=Twist(linear=Vector3(x=v)))),
     ],
 )
 def test_what_is_not_finite_is_refused_by_its_value(
@@ -300,19 +300,19 @@ def test_sectors_of_a_blind_sensor_are_refused(bad: float, sector: int) -> None:
     seen = [math.inf] * 12
     seen[sector - 1] = bad
     with pytest.raises(InputError, match=rf"^sector {sector} holds .*the sensor was blind$"):
-        messages.sector_ranges(sent(LaserScan(ranges=seen)))
+        from_messages.sector_ranges(sent(LaserScan(ranges=seen)))
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_fewer_than_three_sectors_are_refused(count: int) -> None:
     with pytest.raises(InputError, match=rf"^sectors hold {count} ranges; .* at least 3$"):
-        messages.sector_ranges(LaserScan(ranges=[1.0] * count))
+        from_messages.sector_ranges(LaserScan(ranges=[1.0] * count))
 
 
 @pytest.mark.parametrize("key", ["mode", "vs", "gap", "pose", "waypoint", "candidates"])
 @pytest.mark.parametrize("value", [None, "garbage"])
 def test_a_garbled_decision_is_refused(key: str, value: str | None) -> None:
-    message = conversions.decision_msg(a_decision(), "mfba", 0, "/planner")
+    message = to_messages.decision_msg(a_decision(), "mfba", 0, "/planner")
     status = message.status[0]
     kept = [item for item in status.values if item.key != key or value is not None]
     for item in kept:
@@ -320,29 +320,29 @@ def test_a_garbled_decision_is_refused(key: str, value: str | None) -> None:
             item.value = value
     status.values = kept
     with pytest.raises(InputError, match=r"^planner/decision lacks or garbles .*|not a list of"):
-        messages.decision(message, (math.inf,) * 12)
+        from_messages.decision(message, (math.inf,) * 12)
 
 
 def test_an_empty_diagnostic_is_no_decision() -> None:
-    message = conversions.decision_msg(a_decision(), "mfba", 0, "/planner")
+    message = to_messages.decision_msg(a_decision(), "mfba", 0, "/planner")
     message.status = []
     with pytest.raises(InputError, match="lacks or garbles"):
-        messages.decision(message, ())
+        from_messages.decision(message, ())
 
 
 @given(st.lists(points))
 def test_points_as_text_come_back(some: list[tuple[float, float]]) -> None:
-    assert messages.points(messages.points_text(some)) == tuple(some)
+    assert from_messages.points(from_messages.points_text(some)) == tuple(some)
 
 
 @pytest.mark.parametrize("text", ["1", "1,2,3", "a,b", "1,2 3"])
 def test_text_that_is_no_points_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="not a list of points"):
-        messages.points(text)
+        from_messages.points(text)
 
 
 @given(st.tuples(moderate, moderate), angles)
 def test_turning_there_and_back(vector: tuple[float, float], angle: float) -> None:
-    turned = messages.rotated(vector, angle)
+    turned = from_messages.rotated(vector, angle)
     assert math.hypot(*turned) == pytest.approx(math.hypot(*vector))
-    assert messages.rotated(turned, -angle) == pytest.approx(vector, abs=1e-6)
+    assert from_messages.rotated(turned, -angle) == pytest.approx(vector, abs=1e-6)

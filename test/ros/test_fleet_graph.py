@@ -11,10 +11,10 @@ from std_srvs.srv import SetBool, Trigger
 
 from mfba_planner.core.errors import ConfigError, GraphError
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.recording.messages import obstacle_centers, robot_pose, stamp_ns
+from mfba_planner.recording.from_messages import obstacle_centers, robot_pose, stamp_ns
 from mfba_planner.ros.endpoints.robot_namespace import below
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import pose_stamped_msg
+from mfba_planner.ros.interface.to_messages import pose_stamped_msg
 from mfba_planner.ros.nodes.world_sim import WorldSim
 from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.simulation.obstacle_motion import Obstacle

@@ -18,9 +18,9 @@ from mfba_planner.core.types import Mode
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings
-from mfba_planner.recording.messages import decision as read_decision
+from mfba_planner.recording.from_messages import decision as read_decision
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import path_msg
+from mfba_planner.ros.interface.to_messages import path_msg
 from mfba_planner.scenarios.run_config import Driver, RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.verification.verify_bag import verify
@@ -40,8 +40,8 @@ def test_waypoints_are_visited_in_order_and_the_leg_is_told(graph: Graph) -> Non
     for stamp in range(1, 40):
         message = talk.answer(odom(stamp, x, y), sectors(stamp))
         told = fields(message)
-        if not visited or visited[-1][0] != told["leg"]:
-            visited.append((told["leg"], told["goal"]))
+        if not visited or visited[-1][0] != told["goal_index"]:
+            visited.append((told["goal_index"], told["goal"]))
         answer = read_decision(message, FREE)
         if answer.mode is Mode.ARRIVED:
             break
@@ -54,11 +54,11 @@ def test_waypoints_are_visited_in_order_and_the_leg_is_told(graph: Graph) -> Non
 def test_a_goal_takes_the_place_of_a_route_and_the_other_way_round(graph: Graph) -> None:
     talk = Talk(graph, LOCKSTEP, at=None)
     told = fields(talk.answer(route(A, B), odom(1), sectors(1)))
-    assert (told["goal"], told["errand"]) == ("1.0,0.0", "1")
+    assert (told["goal"], told["goal_id"]) == ("1.0,0.0", "1")
     told = fields(talk.answer(goal(*C), odom(2), sectors(2)))
-    assert (told["goal"], told["leg"], told["errand"]) == ("3.0,1.0", "1 of 1", "2")
+    assert (told["goal"], told["goal_index"], told["goal_id"]) == ("3.0,1.0", "1 of 1", "2")
     told = fields(talk.answer(route(B), odom(3), sectors(3)))
-    assert (told["goal"], told["errand"]) == ("1.0,1.0", "3")
+    assert (told["goal"], told["goal_id"]) == ("1.0,1.0", "3")
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_waypoints_are_heard_from_a_command_line(graph: Graph) -> None:
     talk = Talk(graph, LOCKSTEP, at=None)
     talk.waypoints = graph.writer(topics.WAYPOINTS, qos=qos_profile_system_default)
     told = fields(talk.answer(route(A, B), odom(1), sectors(1)))
-    assert (told["leg"], told["errand"]) == ("1 of 2", "1")
+    assert (told["goal_index"], told["goal_id"]) == ("1 of 2", "1")
 
 
 def test_cancelled_it_rests_until_the_next_goal(graph: Graph) -> None:
@@ -109,7 +109,7 @@ def test_cancelled_it_rests_until_the_next_goal(graph: Graph) -> None:
     done = graph.call(Trigger, "planner/cancel")
     assert (done.success, done.message) == (True, "no longer on the way to (10.0, 5.0)")
     idle = talk.answer(odom(2), sectors(2))
-    assert (mode(idle), fields(idle)["errand"]) == (Mode.IDLE, "2")
+    assert (mode(idle), fields(idle)["goal_id"]) == (Mode.IDLE, "2")
     assert talk.velocity == (0.0, 0.0)
     done = graph.call(Trigger, "planner/cancel")
     assert (done.success, done.message) == (False, "there was no goal")
@@ -118,12 +118,12 @@ def test_cancelled_it_rests_until_the_next_goal(graph: Graph) -> None:
 
 def test_the_same_goal_again_is_a_new_one_only_after_arrival(graph: Graph) -> None:
     talk = Talk(graph, LOCKSTEP, at=A)
-    assert fields(talk.answer(odom(1), sectors(1)))["errand"] == "1"
-    assert fields(talk.answer(goal(*A), odom(2), sectors(2)))["errand"] == "1"
+    assert fields(talk.answer(odom(1), sectors(1)))["goal_id"] == "1"
+    assert fields(talk.answer(goal(*A), odom(2), sectors(2)))["goal_id"] == "1"
     assert mode(talk.answer(odom(3, *A), sectors(3))) is Mode.ARRIVED
     assert mode(talk.answer(odom(4, 5.0), sectors(4))) is Mode.ARRIVED
     again = talk.answer(goal(*A), odom(5, 5.0), sectors(5))
-    assert (mode(again), fields(again)["errand"]) == (Mode.PATH_GENERATION, "2")
+    assert (mode(again), fields(again)["goal_id"]) == (Mode.PATH_GENERATION, "2")
 
 
 @pytest.fixture(scope="module")

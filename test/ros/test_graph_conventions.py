@@ -11,7 +11,7 @@ from std_srvs.srv import Trigger
 
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import pose_stamped_msg
+from mfba_planner.ros.interface.to_messages import pose_stamped_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.recorder import Recorder
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor

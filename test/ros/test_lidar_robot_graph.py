@@ -14,7 +14,7 @@ from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
-from mfba_planner.recording.messages import laser_scan, robot_pose
+from mfba_planner.recording.from_messages import laser_scan, robot_pose
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.nodes.planner import PlannerNode

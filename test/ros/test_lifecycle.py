@@ -11,7 +11,7 @@ from ros_graph import Graph
 from std_srvs.srv import Trigger
 
 from mfba_planner.core.types import Mode
-from mfba_planner.recording.messages import decision as read_decision
+from mfba_planner.recording.from_messages import decision as read_decision
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.nodes.planner import PlannerNode
 

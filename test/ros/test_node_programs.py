@@ -16,7 +16,7 @@ from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import CHUNK_BYTES
 from mfba_planner.recording.recover import recover
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import path_msg
+from mfba_planner.ros.interface.to_messages import path_msg
 
 PARAMS_FILE = "/**: {ros__parameters: {bat.population: 1}}\n"
 

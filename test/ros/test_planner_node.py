@@ -32,10 +32,10 @@ from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.types import NANO, Decision, Mode, Observation
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
-from mfba_planner.recording.messages import decision as read_decision
-from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.from_messages import decision as read_decision
+from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import time_msg
+from mfba_planner.ros.interface.to_messages import time_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.swarm.bat_swarm import Algorithm
 
@@ -194,8 +194,8 @@ def test_a_goal_that_is_not_finite_changes_nothing(graph: Graph, bad: float) -> 
     before = fields(talk.answer(odom(1), sectors(1)))
     after = fields(talk.answer(goal(bad, 1.0), odom(2), sectors(2)))
     assert after["refused_inputs"] == "1"
-    assert {key: after[key] for key in ("mode", "goal", "errand")} == {
-        key: before[key] for key in ("mode", "goal", "errand")
+    assert {key: after[key] for key in ("mode", "goal", "goal_id")} == {
+        key: before[key] for key in ("mode", "goal", "goal_id")
     }
 
 

@@ -23,19 +23,19 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.recording.message_definitions import definition_of
-from mfba_planner.recording.messages import stamp_ns
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import parameters as params
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import (
+from mfba_planner.ros.interface.qos_conversion import offered
+from mfba_planner.ros.interface.to_messages import (
     clock_msg,
     odometry_msg,
     path_msg,
     pose_stamped_msg,
     time_msg,
 )
-from mfba_planner.ros.interface.qos_conversion import offered
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.recorder import Recorder
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor

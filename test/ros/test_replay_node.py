@@ -25,10 +25,10 @@ from mfba_planner.core.types import Mode
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_writer import BagWriter
-from mfba_planner.recording.messages import decision, sector_ranges
+from mfba_planner.recording.from_messages import decision, sector_ranges
 from mfba_planner.recording.qos_profiles import OfferedQos
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import (
+from mfba_planner.ros.interface.to_messages import (
     clock_msg,
     odometry_msg,
     pose_stamped_msg,

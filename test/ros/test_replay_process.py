@@ -18,7 +18,7 @@ from sensor_msgs.msg import LaserScan
 from mfba_planner.core.types import Decision, Mode
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.messages import decision
+from mfba_planner.recording.from_messages import decision
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario

@@ -15,10 +15,10 @@ from std_srvs.srv import SetBool
 
 from mfba_planner.core.options import flatten
 from mfba_planner.planning.recovery import RecoveryParams, longest_s
-from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.ros.endpoints.diagnostics_publisher import DiagnosticTopic
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import pose_stamped_msg
+from mfba_planner.ros.interface.to_messages import pose_stamped_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
 
 INF, NAN = math.inf, math.nan

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from nav_msgs.msg import Path
 from rclpy.serialization import serialize_message
 
-from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.serialized_message import has_header, header_stamp_ns
 

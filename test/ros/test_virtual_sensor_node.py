@@ -19,9 +19,9 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Scan
 from mfba_planner.perception.scan_to_sectors import sense_scan
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
-from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import obstacles_msg, odometry_msg, time_msg
+from mfba_planner.ros.interface.to_messages import obstacles_msg, odometry_msg, time_msg
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 
 RADII = [0.3, 0.5, 0.2, 0.7, 1.0]

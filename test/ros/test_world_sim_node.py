@@ -20,9 +20,9 @@ from std_srvs.srv import SetBool, Trigger
 from mfba_planner.core.errors import ConfigError, GraphError
 from mfba_planner.core.types import NANO
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.recording.messages import robot_pose, stamp_ns, velocity
+from mfba_planner.recording.from_messages import robot_pose, stamp_ns, velocity
 from mfba_planner.ros.interface import topics
-from mfba_planner.ros.interface.conversions import pose_msg, pose_stamped_msg, set_header
+from mfba_planner.ros.interface.to_messages import pose_msg, pose_stamped_msg, set_header
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
 from mfba_planner.scenarios.scenario_files import load_scenario

@@ -22,7 +22,7 @@ from edited_bags import (
 from mfba_planner.core.errors import BagError
 from mfba_planner.core.types import Mode
 from mfba_planner.recording.file_integrity import check_data
-from mfba_planner.recording.messages import stamp_ns
+from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation import run_episode
 from mfba_planner.simulation.decision_digest import digest

@@ -11,7 +11,7 @@ from geometry_msgs.msg import TwistStamped
 
 from ...core.errors import InputError
 from ...core.geometry import Point
-from ...recording.messages import stamp_ns, told
+from ...recording.from_messages import stamp_ns, told
 from ...simulation.world import World
 from ..interface import topics
 from ..interface.serialized_message import header_stamp_ns

@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from ...core.types import NANO
-from ..interface import conversions, topics
+from ..interface import to_messages, topics
 from ..interface.health import Status
 from ..node_parameters import PlannerSettings, VirtualSensorSettings
 from ..runtime.node_runtime import GraphNode
@@ -44,7 +44,7 @@ class DiagnosticTopic:
         summary = [status.summary for status in statuses]
         if news or summary != self._last_summary or self.is_due(now_s):
             self._last_summary, self._last_ns = summary, self._stamp(now_s)
-            message = conversions.diagnostics_msg(
+            message = to_messages.diagnostics_msg(
                 statuses, self._who, self._hardware_id, self._last_ns
             )
             self._publisher.publish(message)

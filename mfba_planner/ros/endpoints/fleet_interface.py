@@ -10,7 +10,7 @@ from ...simulation.episode import Outcome
 from ...simulation.fleet import Fleet
 from ...simulation.scenario import Scenario
 from ...simulation.world import World
-from ..interface import conversions, topics
+from ..interface import to_messages, topics
 from ..node_parameters import WorldSimSettings
 from ..runtime.node_runtime import GraphNode, Refusals
 from .robot_interface import RobotInterface
@@ -91,7 +91,7 @@ class FleetInterface:
 
     def publish_again(self, stamp_ns: int) -> None:
         """Publish the present tick to those who have not answered it."""
-        self._time.publish(conversions.clock_msg(stamp_ns))
+        self._time.publish(to_messages.clock_msg(stamp_ns))
         # In real time a robot that has arrived must see on: its planner would call it blind.
         for robot in self._asked.values() if self._settings.lockstep else self.robots:
             if not robot.answered:

@@ -10,7 +10,7 @@ from std_srvs.srv import Trigger
 
 from ...core.errors import InputError
 from ...core.geometry import Point, Pose2D
-from ...recording.messages import goal_point, waypoint_points
+from ...recording.from_messages import goal_point, waypoint_points
 from ..interface import topics
 from ..runtime.goal_queue import GoalQueue
 from ..runtime.node_runtime import GraphNode, Refusals

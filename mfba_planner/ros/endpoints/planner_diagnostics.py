@@ -7,7 +7,7 @@ import time
 
 from ...core.types import Decision
 from ...planning.supervised_planner import SupervisedPlanner
-from ...recording.messages import points_text
+from ...recording.from_messages import points_text
 from ..interface.health import Health, driving
 from ..node_parameters import PlannerSettings
 from ..runtime.goal_queue import GoalQueue
@@ -59,8 +59,8 @@ class PlannerHealth:
         values = {
             "method": path_planner.params.label,
             "goal": points_text([goal_queue.goal] if goal_queue.goal else []),
-            "leg": goal_queue.leg,
-            "errand": str(goal_queue.number),
+            "goal_index": goal_queue.leg,
+            "goal_id": str(goal_queue.number),
             "last refused": self._refusals.last,
         }
         statuses = [

@@ -10,7 +10,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from ...core.geometry import Point
 from ...core.types import Decision, Mode
 from ...planning.odometry_jump import is_jump_reason
-from ..interface import conversions, markers, topics
+from ..interface import markers, to_messages, topics
 from ..node_parameters import PlannerSettings
 from ..runtime.node_runtime import GraphNode
 
@@ -42,8 +42,8 @@ class PlannerPublishers:
         if decision.mode is Mode.STOPPED or is_jump_reason(decision.reason):
             self._log.warning(decision.reason, throttle_duration_sec=1.0)
         frame = self._settings.odom_frame
-        self._plan.publish(conversions.plan_msg(decision, frame))
-        reason = conversions.decision_msg(decision, algorithm, refused, self._who, more)
+        self._plan.publish(to_messages.plan_msg(decision, frame))
+        reason = to_messages.decision_msg(decision, algorithm, refused, self._who, more)
         self._decision.publish(reason)
         if self._view.due(decision.stamp_ns):
             self._markers.publish(markers.decision_markers(decision, frame, self.reach_m))
@@ -52,21 +52,21 @@ class PlannerPublishers:
         """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
         s, stamp, tick_ns = self._settings, decision.stamp_ns, self._tick_ns()
         self._goal_step.publish(
-            conversions.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame)
+            to_messages.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame)
         )
         if s.enable_stamped_cmd_vel:
-            twist = conversions.twist_stamped_msg(decision, s.base_frame, s, tick_ns)
+            twist = to_messages.twist_stamped_msg(decision, s.base_frame, s, tick_ns)
             self._cmd_vel.publish(twist)
         else:
-            self._cmd_vel.publish(conversions.twist_msg(decision, s, tick_ns))
+            self._cmd_vel.publish(to_messages.twist_msg(decision, s, tick_ns))
 
     def halt(self, place: Point, stamp_ns: int) -> None:
         """Command rest, here, without having decided anything."""
         s = self._settings
-        self._goal_step.publish(conversions.pose_stamped_msg(place, stamp_ns, s.odom_frame))
+        self._goal_step.publish(to_messages.pose_stamped_msg(place, stamp_ns, s.odom_frame))
         if s.enable_stamped_cmd_vel:
             rest = TwistStamped()
-            conversions.set_header(rest.header, stamp_ns, s.base_frame)
+            to_messages.set_header(rest.header, stamp_ns, s.base_frame)
             self._cmd_vel.publish(rest)
         else:
             self._cmd_vel.publish(Twist())

@@ -11,7 +11,7 @@ from ...core.errors import InputError
 from ...core.types import Observation, Scan
 from ...perception.scan_to_sectors import aligned
 from ...planning.planner_params import PlannerParams
-from ...recording.messages import laser_scan, stamp_ns
+from ...recording.from_messages import laser_scan, stamp_ns
 from ..interface import topics
 from ..runtime.node_runtime import GraphNode, Refusals
 from ..runtime.stamp_pairing import StampPairs

@@ -10,7 +10,7 @@ from ...core.geometry import Point, towards
 from ...simulation.episode import Outcome
 from ...simulation.robot_model import Robot
 from ...simulation.world import World
-from ..interface import conversions, markers, topics
+from ..interface import markers, to_messages, topics
 from ..node_parameters import WorldSimSettings
 from ..runtime.node_runtime import GraphNode
 from .robot_namespace import NamespacedNode
@@ -50,12 +50,12 @@ class WorldPublishers:
     def begin(self, goal: Point, stamp_ns: int) -> None:
         """A run begins: where it leads to, and that it is under way."""
         self._path.clear()
-        self._goal.publish(conversions.pose_stamped_msg(goal, stamp_ns, self._frame))
-        self._outcome.publish(conversions.outcome_msg(None, 0))
+        self._goal.publish(to_messages.pose_stamped_msg(goal, stamp_ns, self._frame))
+        self._outcome.publish(to_messages.outcome_msg(None, 0))
 
     def end(self, outcome: Outcome, ticks: int) -> None:
         """A run has ended."""
-        self._outcome.publish(conversions.outcome_msg(outcome, ticks))
+        self._outcome.publish(to_messages.outcome_msg(outcome, ticks))
 
     def tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
         """One tick under one stamp; odom completes the sensor's pair, views can wait."""
@@ -67,22 +67,22 @@ class WorldPublishers:
                 towards((0.0, 0.0), reading.pose.yaw, world.speeds.v),
                 world.speeds.omega,
             )
-        odom = conversions.odometry_msg(
+        odom = to_messages.odometry_msg(
             reading.pose, velocity, stamp_ns, frame, self._base_frame, turn
         )
-        self._obstacles.publish(conversions.obstacles_msg(centers, stamp_ns, frame))
+        self._obstacles.publish(to_messages.obstacles_msg(centers, stamp_ns, frame))
         if self._tf:
             self._tf.publish(markers.tf_msg(odom))
         if self._truth:
             self._truth.publish(
-                conversions.odometry_msg(
+                to_messages.odometry_msg(
                     world.pose, velocity, stamp_ns, frame, self._base_frame, turn
                 )
             )
         if self._scan and reading.scan:
-            self._scan.publish(conversions.scan_msg(reading.scan, stamp_ns, self._scan_frame))
+            self._scan.publish(to_messages.scan_msg(reading.scan, stamp_ns, self._scan_frame))
         self._odom.publish(odom)
         if self._view.due(stamp_ns):
             self._path.append(world.pose.position)
-            self._trail.publish(conversions.path_msg(list(self._path), stamp_ns, frame))
+            self._trail.publish(to_messages.path_msg(list(self._path), stamp_ns, frame))
             self._markers.publish(markers.world_markers(world, stamp_ns, frame))

@@ -16,7 +16,7 @@ from ...recording.configuration import attach_configuration
 from ...scenarios.plain_data import scenario_to_json
 from ...scenarios.run_config import Driver, RunConfig, node_parameters, run_facts
 from ...simulation.episode import Episode, Outcome
-from . import conversions, topics
+from . import to_messages, topics
 from .qos_conversion import offered
 from .serialized_message import type_name
 
@@ -65,16 +65,16 @@ def _messages(episode: Episode) -> Iterator[tuple[int, topics.Topic, Any]]:
     if not episode.ticks:
         return
     first, last = episode.ticks[0].stamp_ns, episode.ticks[-1].stamp_ns
-    goal = conversions.pose_stamped_msg(episode.scenario.goal_m, first, _FRAME)
+    goal = to_messages.pose_stamped_msg(episode.scenario.goal_m, first, _FRAME)
     yield first, topics.GOAL_POSE, goal
-    yield first, topics.OUTCOME, conversions.outcome_msg(None, 0)
+    yield first, topics.OUTCOME, to_messages.outcome_msg(None, 0)
     velocity = (0.0, 0.0)
     for tick in episode.ticks:
         for topic, message in _tick_messages(episode, tick, velocity):
             yield tick.stamp_ns, topic, message
         velocity = tick.velocity
     if episode.outcome is not Outcome.INTERRUPTED:
-        yield last, topics.OUTCOME, conversions.outcome_msg(episode.outcome, len(episode.ticks))
+        yield last, topics.OUTCOME, to_messages.outcome_msg(episode.outcome, len(episode.ticks))
 
 
 def _tick_messages(
@@ -84,16 +84,16 @@ def _tick_messages(
     scenario, stamp, time_s = episode.scenario, tick.stamp_ns, episode.time_s(tick.stamp_ns)
     circles = scenario.enlarged(time_s)
     ranges = tick.ranges_m or sense_circles(tick.pose.position, circles, episode.sensor)
-    yield topics.CLOCK, conversions.clock_msg(stamp)
-    yield topics.OBSTACLES, conversions.obstacles_msg([c for c, _ in circles], stamp, _FRAME)
-    yield topics.ODOM, conversions.odometry_msg(tick.pose, velocity, stamp, _FRAME, _BASE)
+    yield topics.CLOCK, to_messages.clock_msg(stamp)
+    yield topics.OBSTACLES, to_messages.obstacles_msg([c for c, _ in circles], stamp, _FRAME)
+    yield topics.ODOM, to_messages.odometry_msg(tick.pose, velocity, stamp, _FRAME, _BASE)
     yield (
         topics.SECTORS,
-        conversions.sectors_msg(ranges, episode.sensor, scenario.robot_radius_m, stamp, _FRAME),
+        to_messages.sectors_msg(ranges, episode.sensor, scenario.robot_radius_m, stamp, _FRAME),
     )
-    yield topics.SENSORY_VECTOR, conversions.sensory_vector_msg(sensory_vector(ranges))
-    yield topics.PLAN, conversions.plan_msg(tick, _FRAME)
+    yield topics.SENSORY_VECTOR, to_messages.sensory_vector_msg(sensory_vector(ranges))
+    yield topics.PLAN, to_messages.plan_msg(tick, _FRAME)
     law = episode.label
-    yield topics.DECISION, conversions.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
-    yield topics.GOAL_STEP, conversions.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
-    yield topics.CMD_VEL, conversions.twist_msg(tick, scenario.robot, episode.planner.tick_ns)
+    yield topics.DECISION, to_messages.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
+    yield topics.GOAL_STEP, to_messages.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
+    yield topics.CMD_VEL, to_messages.twist_msg(tick, scenario.robot, episode.planner.tick_ns)

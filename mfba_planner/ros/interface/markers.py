@@ -16,7 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ...core.geometry import Point, bearing, towards
 from ...core.types import NANO, Decision, Mode, Ranges
 from ...simulation.world import World
-from .conversions import pose_msg, set_header
+from .to_messages import pose_msg, set_header
 
 Rgba = tuple[float, float, float, float]
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from ...recording.messages import SECOND_NS
+from ...recording.from_messages import SECOND_NS
 
 _STAMP = {0: struct.Struct(">iI"), 1: struct.Struct("<iI")}
 _ENCAPSULATION_BYTES = 4  # of which the second says the byte order

@@ -12,7 +12,7 @@ from ...core.types import NANO, Decision, Mode, observe
 from ...planning.planner_factory import make_planner
 from ...planning.planner_params import PlannerParams
 from ...planning.recovery import Phase
-from ...recording.messages import robot_pose, sector_ranges, stamp_ns
+from ...recording.from_messages import robot_pose, sector_ranges, stamp_ns
 from ..endpoints.goal_subscriptions import GoalSubscriptions
 from ..endpoints.planner_diagnostics import PlannerHealth
 from ..endpoints.planner_publishers import PlannerPublishers
@@ -143,7 +143,10 @@ class PlannerNode(ManagedNode):
         seen = observe(stamp, pose, ranges, goal, self._pose, round(age_s / NANO))
         self._pose = seen.pose
         self._last = decision = self.path_planner.plan(self._scan_sync.seen(seen))
-        more = {"errand": str(self.goals.goal_queue.number), "leg": self.goals.goal_queue.leg}
+        more = {
+            "goal_id": str(self.goals.goal_queue.number),
+            "goal_index": self.goals.goal_queue.leg,
+        }
         self._say.decided(decision, self.path_planner.params.label, self._refusals.count, more)
         self._health.decided(decision, self.path_planner, self.goals.goal_queue, self.state)
 

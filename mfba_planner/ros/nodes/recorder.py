@@ -18,8 +18,8 @@ from ...core.errors import ConfigError
 from ...core.outputs import new_run_directory
 from ...recording.bag_writer import BagWriter
 from ...recording.configuration import attach_configuration
+from ...recording.from_messages import stamp_ns
 from ...recording.message_definitions import definition_of
-from ...recording.messages import stamp_ns
 from ...recording.qos_profiles import OfferedQos
 from ..endpoints.robot_namespace import everywhere
 from ..interface import parameters, topics

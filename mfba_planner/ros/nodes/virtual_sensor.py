@@ -12,10 +12,10 @@ from ...core.geometry import Point, Pose2D
 from ...core.types import Ranges, Scan
 from ...perception.scan_to_sectors import sense_scan
 from ...perception.sensory_vector import SensorParams, sense_circles, sensory_vector
-from ...recording.messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
+from ...recording.from_messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
 from ..endpoints.sensor_diagnostics import SensorHealth
 from ..interface import parameters, topics
-from ..interface.conversions import sectors_msg, sensory_vector_msg
+from ..interface.to_messages import sectors_msg, sensory_vector_msg
 from ..node_parameters import Source, VirtualSensorSettings, names
 from ..runtime.node_runtime import GraphNode, Refusals, spin_node
 from ..runtime.stamp_pairing import StampPairs

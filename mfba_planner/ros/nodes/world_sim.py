@@ -14,7 +14,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from ...core.errors import ConfigError, InputError
 from ...core.types import NANO
-from ...recording.messages import pose2d
+from ...recording.from_messages import pose2d
 from ...simulation.episode import stamp_of
 from ..endpoints.fleet_interface import FleetInterface
 from ..endpoints.scenario_parameter import declare_scenario

@@ -14,7 +14,7 @@ from ...core.errors import ConfigError, GraphError
 from ...recording.bag_reader import BagReader
 from ...recording.replay_schedule import UNKNOWN_DEPTH, Due, Schedule, begin_ns, due_messages
 from ..interface import topics
-from ..interface.conversions import clock_msg
+from ..interface.to_messages import clock_msg
 from ..runtime.node_runtime import SPIN_S, GraphNode
 from .flow_control import FlowControl, all_acknowledged, windowed
 from .reader_readiness import Readiness

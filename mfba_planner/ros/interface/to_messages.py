@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core's values as messages; mfba_planner/recording/messages.py holds the other direction."""
+"""Core values as messages; recording/from_messages.py holds the other direction."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ...core.geometry import Point, Pose2D, half_turn
 from ...core.types import Bits, Decision, Mode, Ranges, Scan
 from ...perception.sensory_vector import SensorParams, bits_text, longest_range_m
 from ...planning.odometry_jump import is_jump_reason
-from ...recording.messages import SECOND_NS, body_velocity, points_text, rotated
+from ...recording.from_messages import SECOND_NS, body_velocity, points_text, rotated
 from ...simulation.episode import Outcome
 from ...simulation.robot_model import Base
 from .health import Status

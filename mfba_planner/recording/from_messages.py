@@ -2,7 +2,7 @@
 """What a message says, in the core's terms: for live messages and for those decoded from a bag.
 
 Only attributes are read, so no ROS is needed. Everything is checked: InputError names what
-is wrong. ros/interface/conversions.py holds the other direction.
+is wrong. ros/interface/to_messages.py holds the other direction.
 """
 
 from __future__ import annotations
