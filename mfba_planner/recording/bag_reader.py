@@ -20,7 +20,7 @@ from .bag_files import find_bag_files
 from .bag_metadata import BagTopic
 from .mcap_file import McapFile, Piece
 from .mcap_index import open_file
-from .merge_by_time import RawMessage, Source, in_time_order
+from .merge_by_time import RawMessage, Source, merge_by_log_time
 from .message_definitions import Definition
 
 
@@ -187,7 +187,7 @@ class BagReader:
             if piece.end_ns >= start_ns
         ]
         if not in_file_order:
-            return in_time_order(sources)
+            return merge_by_log_time(sources)
         return (message for source in sources for message in source.load())
 
     def decoded(

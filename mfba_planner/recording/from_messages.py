@@ -127,7 +127,7 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
 def laser_scan(message: Any, frame: str = "") -> Scan:
     """sensor_msgs/LaserScan to a Scan; FrameError for another frame.
 
-    The ranges are not checked here but in perception.scan_to_sectors.sense_scan.
+    perception.scan_to_sectors.sense_scan checks the ranges.
     """
     require_frame(message, frame, "scan", "scan_frame")
     return Scan(

@@ -26,7 +26,7 @@ class Source(NamedTuple):
     load: Callable[[], list[RawMessage]]
 
 
-def in_time_order(sources: Iterable[Source]) -> Iterator[RawMessage]:
+def merge_by_log_time(sources: Iterable[Source]) -> Iterator[RawMessage]:
     """All messages sorted by log time; at equal times in the sequence of `sources`, stable."""
     unread = sorted(enumerate(sources), key=lambda item: item[1].start_ns, reverse=True)
     heap: list[tuple[int, int, RawMessage, Iterator[RawMessage]]] = []

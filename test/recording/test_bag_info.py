@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Describe bags: complete, foreign, unclosed, damaged and empty ones."""
+
 from dataclasses import replace
 from pathlib import Path
 

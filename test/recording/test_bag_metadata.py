@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""metadata.yaml and the rosbag2 record: every field, older versions, refused content."""
+
 from pathlib import Path
 from typing import Any
 

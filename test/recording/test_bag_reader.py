@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Read bags of rosbag2 and mfba: any index, several files, odd content, merge by time."""
+
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -26,7 +28,7 @@ from sensor_msgs.msg import LaserScan
 from mfba_planner.recording import mcap_walk
 from mfba_planner.recording.bag_metadata import BagFile, BagMetadata, dump_file
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.merge_by_time import RawMessage, Source, in_time_order
+from mfba_planner.recording.merge_by_time import RawMessage, Source, merge_by_log_time
 from mfba_planner.recording.qos_profiles import INFINITE_NS, OfferedQos
 
 FOREIGN_COUNTS = {"/scan": 133, "/odom": 133, "/chatter": 13, "/goal_pose": 1, "/tf_static": 1}
@@ -256,7 +258,7 @@ def test_merge_is_a_stable_sort_that_holds_only_overlapping_chunks(
         ((time, number, i) for number, times in enumerate(chunks) for i, time in enumerate(times))
     )
     found = []
-    for message in in_time_order([source(n, times) for n, times in enumerate(chunks)]):
+    for message in merge_by_log_time([source(n, times) for n, times in enumerate(chunks)]):
         found.append((message.log_time_ns, message.data[0], message.sequence))
         later = [n for n, t in enumerate(chunks) if min(t, default=0) > message.log_time_ns]
         assert not set(loaded) & set(later)

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Write bags: format, chunk size and age, refused writes, failures, close and discard."""
+
 import resource
 import sys
 from itertools import pairwise

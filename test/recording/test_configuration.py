@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""The configuration attachment of a bag: stored, read back, refused."""
+
 import math
 from pathlib import Path
 from typing import Any

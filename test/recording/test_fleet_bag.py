@@ -38,7 +38,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def single_robot_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return record(tmp_path_factory.mktemp("alone") / "bag", "empty", 1)
+    return record(tmp_path_factory.mktemp("single") / "bag", "empty", 1)
 
 
 @pytest.fixture(scope="module")

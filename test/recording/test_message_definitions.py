@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Message definitions and type hashes of installed types and sourced workspaces."""
+
 import json
 import sys
 from pathlib import Path
@@ -17,7 +19,7 @@ INSTALLED = sorted(
 )
 
 
-def test_there_are_installed_types() -> None:
+def test_types_are_installed() -> None:
     assert len(INSTALLED) > 100
 
 

@@ -280,7 +280,7 @@ def failed_run(out: Path, scenario: str) -> Run:
 def test_a_failed_run_prints_the_note_and_stores_it_in_its_result(
     bag: Path, fleet: Path, tmp_path: Path, capsys: Capture
 ) -> None:
-    single = failed_run(tmp_path / "alone", "empty")
+    single = failed_run(tmp_path / "single", "empty")
     rewrite(bag, single.directory.bag, without(SENSOR, -1))
     finish_run(single, None, "virtual_sensor ended")
     whole = read_episode(bag)

@@ -84,7 +84,7 @@ def test_a_decision_without_its_sectors_is_named(bag: Path, tmp_path: Path) -> N
 )
 def test_a_malformed_decision_is_refused(bag: Path, tmp_path: Path, key: str, value: str) -> None:
     with pytest.raises(BagError, match=r"garble|not a list of points"):
-        read_episode(edited(bag, tmp_path / "garbled", with_value(key, value)))
+        read_episode(edited(bag, tmp_path / "malformed", with_value(key, value)))
 
 
 def test_a_bag_older_than_an_option_was_made_with_its_default(bag: Path, tmp_path: Path) -> None:

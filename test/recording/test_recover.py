@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Recover truncated and damaged bags, and bags that were never closed."""
+
 import random
 import shutil
 from collections import Counter
@@ -208,7 +210,7 @@ def test_several_files_become_one(tmp_path: Path) -> None:
     assert times == [0, 1, 10, 11, 20, 21, 100, 101]  # 10 after 2
 
 
-def test_a_bag_that_uses_types_not_installed_here(tmp_path: Path) -> None:
+def test_a_bag_with_types_that_are_not_installed(tmp_path: Path) -> None:
     # Of a type with one string, data; rosbags computes it from the schema and compares.
     type_hash = "RIHS01_134dbc5b563ba6a8f3539b907dd992d0eeee76157fb90e4dfc28b104a458bf62"
     path = foreign_mcap(

@@ -147,7 +147,7 @@ def test_broken_metadata_yaml(tmp_path: Path) -> None:
     assert "cannot be read (Is a directory)" in refusal(bag)
 
 
-def test_truncated_part_of_a_directory(tmp_path: Path) -> None:
+def test_truncated_file_of_a_directory(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "run1", 5)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(BagError, match=f"^{path}: truncated"):
