@@ -107,7 +107,7 @@ class _StampMatching:
 def rising_decisions(
     reader: BagReader, robots: Sequence[str], missed: dict[str, str]
 ) -> Iterator[RecordedDecision]:
-    """As stream_decisions; also raises BagError if a robot's stamps are not rising."""
+    """As stream_decisions; also raises BagError if a robot's stamp decreases."""
     last_ns = dict.fromkeys(robots, -1)
     for recorded in stream_decisions(reader, robots, missed):
         stamp, before_ns = recorded.decision.stamp_ns, last_ns[recorded.robot]

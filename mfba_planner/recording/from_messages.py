@@ -168,7 +168,7 @@ def told(twist: Any, base: Base, yaw_rad: float) -> Point:
 
 
 def points_text(values: Iterable[Point]) -> str:
-    """Points as text 'x,y x,y', exact: points() returns the same floats."""
+    """Points as text 'x,y x,y', which parses back to the same floats."""
     return " ".join(f"{x!r},{y!r}" for x, y in values)
 
 

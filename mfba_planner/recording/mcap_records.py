@@ -91,7 +91,7 @@ def messages(data: bytes) -> list[Message]:
 
 
 def chunk_data(body: bytes) -> bytes:
-    """The records in a chunk, uncompressed. Checks size and CRC; raises ValueError."""
+    """The records in a chunk, uncompressed. Checks size and CRC."""
     chunk = Chunk.read(body_stream(body))
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     if length != chunk.uncompressed_size:

@@ -53,7 +53,7 @@ class _RecordWalk:
         self._drop_undefined()
 
     def _frame(self, offset: int) -> tuple[int, int]:
-        """Opcode (0 for none) and end of the record at `position`."""
+        """Opcode (0 for none) and end of the record at `offset`."""
         if offset + FRAME.size > self.end:
             return 0, self.end
         opcode, length = FRAME.unpack(self.file.bytes_at(offset, FRAME.size))

@@ -90,7 +90,7 @@ class Summary(NamedTuple):
 def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
     """The Summary of a bag of one robot, of any length: the bag is streamed.
 
-    Raises as read_episode(), and BagError if the stamps of the decisions are not rising.
+    Raises as read_episode(), and BagError if the stamp of a decision decreases.
     """
     with BagReader(path, salvage=salvage) as reader:
         setup, truth = read_setup(reader), _read_truth(reader, [NO_NAMESPACE])[NO_NAMESPACE]

@@ -125,7 +125,7 @@ class Schedule:
 
     @property
     def by_steps(self) -> bool:
-        """Whether only `step_to` advances log time: while stopped, and as fast as possible."""
+        """Whether log time advances only with the messages: stopped, or as fast as possible."""
         return self._steady_ns is None or self.rate is None
 
     def time_ns(self, now_ns: int) -> int:

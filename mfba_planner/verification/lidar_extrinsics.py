@@ -75,7 +75,7 @@ class StaticFrames:
                 f"frame {frame!r}: no /tf_static gives its pose in {base!r}; give --scan-yaw"
             )
         (x, y, z, w), position = frame_poses[common].relative_to(base_poses[common])
-        if not 1.0 - 2.0 * (x * x + y * y) >= MIN_UPRIGHT_COS:  # true for NaN
+        if not 1.0 - 2.0 * (x * x + y * y) >= MIN_UPRIGHT_COS:  # also true for NaN
             raise FrameError(
                 f"frame {frame!r}: tilted against {base!r}, so its beams leave the robot's plane "
                 "of motion; give --scan-yaw if they do not"

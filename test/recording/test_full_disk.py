@@ -31,7 +31,7 @@ def file_size_limit(size: int) -> Iterator[None]:
 
 
 def test_a_full_disk_at_any_moment(tmp_path: Path) -> None:
-    """The error counts the stored messages, and recover finds at least these."""
+    """The error counts the stored messages, recover finds at least these."""
     whole = write_bag(tmp_path / "whole", 60, chunk_bytes=9000, beams=40).stat().st_size
     directory, out = tmp_path / "run1", tmp_path / "out"
     outcomes = {"at once": 0, "nothing": 0, "some": 0, "at close": 0}
