@@ -22,7 +22,7 @@ class BagFiles:
 
 
 def find_bag_files(path: Path, *, salvage: bool) -> BagFiles:
-    """Find a bag's files; with `salvage`, metadata.yaml may be missing or broken. Raises BagError."""
+    """Find a bag's files; `salvage` allows a missing or broken metadata.yaml. Raises BagError."""
     try:
         if path.is_file():
             return BagFiles([path])

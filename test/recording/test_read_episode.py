@@ -83,8 +83,9 @@ def test_a_decision_without_its_sectors_is_named(bag: Path, tmp_path: Path) -> N
     [("mode", "flying"), ("gap", "x"), ("waypoint", "1,2,3"), ("pose", "1,2"), ("vs", "0a0")],
 )
 def test_a_malformed_decision_is_refused(bag: Path, tmp_path: Path, key: str, value: str) -> None:
-    with pytest.raises(BagError, match=r"garble|not a list of points"):
-        read_episode(edited(bag, tmp_path / "malformed", with_value(key, value)))
+    text = r": planner/decision: missing or malformed .*; was it edited|not a list of points"
+    with pytest.raises(BagError, match=text):
+        read_episode(edited(bag, tmp_path / "edited", with_value(key, value)))
 
 
 def test_a_bag_older_than_an_option_was_made_with_its_default(bag: Path, tmp_path: Path) -> None:
