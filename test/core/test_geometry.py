@@ -126,10 +126,10 @@ def test_on_or_inside_a_circle_every_ray_hits_at_once() -> None:
 
 @given(st.floats(0.1, 20.0), st.floats(0.01, 1.0), st.floats(-1.0, 1.0))
 def test_the_point_a_ray_meets_lies_on_the_near_side_of_the_circle(
-    d: float, part: float, offset_part: float
+    d: float, share: float, offset_share: float
 ) -> None:
-    radius = 0.99 * part * d
-    offset = 0.999 * offset_part * tangent_half_angle(d, radius)
+    radius = 0.99 * share * d
+    offset = 0.999 * offset_share * tangent_half_angle(d, radius)
     r = ray_circle_distance(d, radius, offset)
     hit = towards((0.0, 0.0), offset, r)
     assert distance(hit, (d, 0.0)) == pytest.approx(radius, rel=1e-6, abs=1e-6)
@@ -167,5 +167,5 @@ def test_closest_approach_is_below_every_sample_and_reached_by_one(
     smallest = closest_approach(a0, a1, b0, b1)
     assume(max(samples) < 1e3)
     assert smallest <= min(samples) + 1e-9
-    way = distance(a0, a1) + distance(b0, b1)
-    assert smallest >= min(samples) - way / 400 - 1e-9
+    path_length = distance(a0, a1) + distance(b0, b1)
+    assert smallest >= min(samples) - path_length / 400 - 1e-9

@@ -11,7 +11,7 @@ from mfba_planner.perception.obstacle_memory import ObstacleMemory, ObstacleMemo
 
 SECOND = 10**9
 RANGE_M = 0.8
-HERE = (0.0, 0.0)
+ORIGIN = (0.0, 0.0)
 
 
 def circle(x: float, y: float = 0.0, velocity: Point = (0.0, 0.0)) -> Circle:
@@ -19,9 +19,9 @@ def circle(x: float, y: float = 0.0, velocity: Point = (0.0, 0.0)) -> Circle:
 
 
 def observe_sectors(
-    memory: ObstacleMemory, at_s: float, *seen: Circle, position: Point = HERE
+    memory: ObstacleMemory, at_s: float, *observed: Circle, position: Point = ORIGIN
 ) -> list[Circle]:
-    return memory.update(round(at_s * SECOND), position, RANGE_M, seen)
+    return memory.update(round(at_s * SECOND), position, RANGE_M, observed)
 
 
 def test_who_has_left_is_followed_on() -> None:
@@ -50,8 +50,8 @@ def test_who_is_seen_is_not_remembered_beside_itself() -> None:
 def test_who_is_seen_beyond_the_range_is_not_doubled() -> None:
     memory = ObstacleMemory()
     for tick in range(10):
-        seen = [circle(5.0 + 0.02 * tick, velocity=(0.2, 0.0)), circle(3.0)]
-        assert observe_sectors(memory, 0.1 * tick, *seen) == seen
+        observed = [circle(5.0 + 0.02 * tick, velocity=(0.2, 0.0)), circle(3.0)]
+        assert observe_sectors(memory, 0.1 * tick, *observed) == observed
 
 
 @pytest.mark.parametrize(("speed_mps", "until_s"), [(0.3, 2.0), (0.1, 6.0), (0.0, 10.0)])
@@ -86,10 +86,10 @@ def test_a_straight_mover_is_held_once_and_where_it_is(
     for dt in (0.0, *ticks):
         t += dt
         true = circle(x + vx * t, vy * t, (vx, vy))
-        in_sight = true.center_m[0] ** 2 + true.center_m[1] ** 2 <= 1.4**2
-        held = observe_sectors(memory, t, *([true] if in_sight else []))
-        assert len(held) <= 1
-        if in_sight:
-            assert held == [true]
-        elif held:
-            assert held[0].center_m == pytest.approx(true.center_m, abs=1e-6)
+        in_range = true.center_m[0] ** 2 + true.center_m[1] ** 2 <= 1.4**2
+        kept = observe_sectors(memory, t, *([true] if in_range else []))
+        assert len(kept) <= 1
+        if in_range:
+            assert kept == [true]
+        elif kept:
+            assert kept[0].center_m == pytest.approx(true.center_m, abs=1e-6)

@@ -19,11 +19,14 @@ LONGEST_M = 1.1
 
 
 def scan_of(
-    here: Point, circles: list[tuple[float, float, float]], beams: int, noise: np.ndarray | float
+    robot_position: Point,
+    circles: list[tuple[float, float, float]],
+    beams: int,
+    noise: np.ndarray | float,
 ) -> Scan:
     increment = 2.0 * math.pi / beams
     return Scan(
-        ranges_m=cast_rays(here, circles, beams, LONGEST_M) + noise,
+        ranges_m=cast_rays(robot_position, circles, beams, LONGEST_M) + noise,
         angle_min_rad=0.5 * increment,
         angle_increment_rad=increment,
         range_min_m=0.0,
@@ -31,7 +34,7 @@ def scan_of(
     )
 
 
-def follow(
+def track_circle(
     start: Point,
     velocity: Point,
     beams: int,
@@ -44,16 +47,16 @@ def follow(
     """What is tracked of one circle of 0.3 m, tick by tick; it turns back at one of them."""
     tracker, rng = Tracker(), np.random.default_rng(7)
     (x, y), (vx, vy) = start, velocity
-    seen = []
+    tracked = []
     for k in range(ticks):
         t = k * TICK_NS * 1e-9
         along = t if k <= turns_at else (2 * turns_at - k) * TICK_NS * 1e-9
-        here = (robot[0] * t, robot[1] * t)
+        robot_position = (robot[0] * t, robot[1] * t)
         noise = rng.normal(0.0, noise_m, beams) if noise_m else 0.0
-        scan = scan_of(here, [(x + vx * along, y + vy * along, 0.3)], beams, noise)
-        tracker.update((k + 1) * TICK_NS, Pose2D(*here), scan)
-        seen.append(tracker.circles((k + 1) * TICK_NS, 0.3))
-    return seen
+        scan = scan_of(robot_position, [(x + vx * along, y + vy * along, 0.3)], beams, noise)
+        tracker.update((k + 1) * TICK_NS, Pose2D(*robot_position), scan)
+        tracked.append(tracker.circles((k + 1) * TICK_NS, 0.3))
+    return tracked
 
 
 @given(
@@ -67,7 +70,7 @@ def test_noiseless_scans_give_place_and_velocity(
 ) -> None:
     start = (0.9 * math.cos(bearing_rad), 0.9 * math.sin(bearing_rad))
     velocity = (speed * math.cos(heading_rad), speed * math.sin(heading_rad))
-    (circle,) = follow(start, velocity, 360, 8)[-1]
+    (circle,) = track_circle(start, velocity, 360, 8)[-1]
     truth = (start[0] + 0.7 * velocity[0], start[1] + 0.7 * velocity[1])
     assert math.dist(circle.center_m, truth) < 0.02
     assert math.dist(circle.velocity_mps, velocity) < 0.04
@@ -76,21 +79,21 @@ def test_noiseless_scans_give_place_and_velocity(
 
 @pytest.mark.parametrize(("beams", "within"), [(360, 0.06), (12, 0.12)])
 def test_two_centimetres_of_noise_and_few_beams_still_tell_where_it_goes(
-    beams: int, within: float
+    beams: int, tolerance: float
 ) -> None:
-    (circle,) = follow((0.9, -0.4), (-0.05, 0.25), beams, 25, noise_m=0.02)[-1]
-    assert math.dist(circle.velocity_mps, (-0.05, 0.25)) < within
-    assert math.dist(circle.center_m, (0.9 - 0.12, -0.4 + 0.6)) < within
+    (circle,) = track_circle((0.9, -0.4), (-0.05, 0.25), beams, 25, noise_m=0.02)[-1]
+    assert math.dist(circle.velocity_mps, (-0.05, 0.25)) < tolerance
+    assert math.dist(circle.center_m, (0.9 - 0.12, -0.4 + 0.6)) < tolerance
 
 
 def test_a_robot_on_the_move_sees_the_obstacle_s_velocity_not_its_own() -> None:
-    (circle,) = follow((1.0, 0.9), (0.1, -0.2), 360, 12, robot=(0.5, 0.0))[-1]
+    (circle,) = track_circle((1.0, 0.9), (0.1, -0.2), 360, 12, robot=(0.5, 0.0))[-1]
     assert math.dist(circle.velocity_mps, (0.1, -0.2)) < 0.03
 
 
 def test_an_obstacle_that_turns_back_is_understood_within_half_a_second() -> None:
-    seen = follow((0.9, -0.4), (0.0, 0.3), 360, 16, turns_at=10)
-    (before,), (after,) = seen[10], seen[15]
+    tracked = track_circle((0.9, -0.4), (0.0, 0.3), 360, 16, turns_at=10)
+    (before,), (after,) = tracked[10], tracked[15]
     assert before.velocity_mps[1] == pytest.approx(0.3, abs=0.03)
     assert after.velocity_mps[1] == pytest.approx(-0.3, abs=0.1)
 

@@ -115,9 +115,9 @@ def test_inside_a_circle_half_of_any_ring_is_set(sectors: int) -> None:
 
 def test_sensing_range_is_measured_to_the_enlarged_edge_and_includes_it() -> None:
     params = SensorParams(sensing_range_m=0.75)
-    for d, seen in ((1.25, True), (math.nextafter(1.25, 2.0), False), (1.3, False)):
+    for d, visible in ((1.25, True), (math.nextafter(1.25, 2.0), False), (1.3, False)):
         ring = sense_circles(ORIGIN, [((d, 0.0), 0.5)], params)
-        assert any(sensory_vector(ring)) is seen
+        assert any(sensory_vector(ring)) is visible
 
 
 def test_ranges_by_hand() -> None:
@@ -206,23 +206,26 @@ def test_ring_against_many_rays(position: Point, around: Circle, n: int) -> None
     ring = sense_circles(position, circles, SensorParams(sectors=n))
     rays = 500
     angles = (np.arange(n * rays) + 0.5) * (2.0 * math.pi / (n * rays))
-    seen = cast_rays(position, circles, 0.8, angles)
+    visible = cast_rays(position, circles, 0.8, angles)
     for sector, r in enumerate(ring):
-        within = seen[sector * rays : (sector + 1) * rays]
+        within = visible[sector * rays : (sector + 1) * rays]
         nearest = within.min()
         assert r <= nearest + 1e-6, "no ray sees anything nearer"
         if nearest < math.inf:
             assert nearest == pytest.approx(r, abs=2e-3) or grazing(within)
             assert nearest <= r + 0.2
         elif r < math.inf:  # a sliver between the sector's bound and its first ray
-            assert min(seen[sector * rays - 1], seen[(sector + 1) * rays % len(seen)]) < math.inf
+            assert (
+                min(visible[sector * rays - 1], visible[(sector + 1) * rays % len(visible)])
+                < math.inf
+            )
 
 
-def grazing(seen: np.ndarray) -> bool:
+def grazing(visible: np.ndarray) -> bool:
     """Tell whether the nearest ray is next to one that misses: there the range is steep."""
-    index = int(seen.argmin())
-    nearby = seen[max(0, index - 2) : index + 3]
-    return bool(np.isinf(nearby).any() or index in (0, len(seen) - 1))
+    index = int(visible.argmin())
+    nearby = visible[max(0, index - 2) : index + 3]
+    return bool(np.isinf(nearby).any() or index in (0, len(visible) - 1))
 
 
 @given(CIRCLES, SECTORS, st.integers(1, 40))
@@ -324,9 +327,9 @@ def test_yaw_turns_the_scan_into_the_frame_of_the_sectors() -> None:
 
 def test_the_range_of_a_scan_is_measured_to_the_enlarged_point_and_includes_it() -> None:
     params = SensorParams(sensing_range_m=0.75)
-    for d, seen in ((1.0, True), (1.0 + 1e-9, False)):
+    for d, visible in ((1.0, True), (1.0 + 1e-9, False)):
         ring = sense_scan(scan([d]), 0.0, 0.25, params)
-        assert any(sensory_vector(ring)) is seen
+        assert any(sensory_vector(ring)) is visible
 
 
 def test_rep_117() -> None:
@@ -340,9 +343,9 @@ def test_rep_117() -> None:
 
 def test_the_limits_of_a_scan_are_valid_ranges() -> None:
     wide = SensorParams(sensing_range_m=9.0)
-    for r, seen in ((0.1, True), (0.0999, False), (5.0, True), (5.001, False)):
+    for r, visible in ((0.1, True), (0.0999, False), (5.0, True), (5.001, False)):
         ring = sense_scan(scan([r, math.inf]), 0.0, 0.01, wide)
-        assert any(sensory_vector(ring)) is seen
+        assert any(sensory_vector(ring)) is visible
 
 
 @pytest.mark.parametrize(
@@ -410,9 +413,9 @@ def test_scan_and_obstacles_give_the_same_picture(
     enlarged = [(c, r + robot) for c, r in circles]
     truth = sense_circles(position, enlarged, PAPER)
     wider = sense_circles(position, [(c, r + 0.01) for c, r in enlarged], PAPER)
-    for seen, true, most in zip(from_scan, truth, wider):
-        assert seen == math.inf or most < math.inf, "the scan invents no obstacle"
-        assert seen >= min(true, most) - 0.01, "nor brings one nearer"
+    for visible, true, most in zip(from_scan, truth, wider):
+        assert visible == math.inf or most < math.inf, "the scan invents no obstacle"
+        assert visible >= min(true, most) - 0.01, "nor brings one nearer"
 
     def whole(circle: Circle) -> bool:  # all that is seen of it lies within SR, to the tangents
         (x, y), r = circle
@@ -421,6 +424,6 @@ def test_scan_and_obstacles_give_the_same_picture(
     # a lone obstacle hides nothing of another: then the scan must find all of it
     if len(around) == 1 and whole(around[0]):
         narrower = sense_circles(position, [(c, r - 0.02) for c, r in enlarged], PAPER)
-        for seen, least in zip(from_scan, narrower):
-            assert seen < math.inf or least == math.inf
-            assert seen <= least + 0.1
+        for visible, least in zip(from_scan, narrower):
+            assert visible < math.inf or least == math.inf
+            assert visible <= least + 0.1

@@ -31,9 +31,9 @@ NAMES = (
 
 def drive(name: str, suite: str = "random-30", world: int = 0) -> Episode:
     planner = name if name == "predictive" else f"{ablation.__name__}:{name}"
-    played = run_one(Run(suite, world, planner, 0), SETTING)
-    assert played.fault == ""
-    return played.episode
+    outcome = run_one(Run(suite, world, planner, 0), SETTING)
+    assert outcome.fault == ""
+    return outcome.episode
 
 
 def decide(name: str, *circles: Circle) -> Any:
@@ -89,9 +89,9 @@ def test_bits_only_takes_the_nearest_free_heading_and_stands_among_none() -> Non
         Circle(center_m=(0.7 * math.cos(a), 0.7 * math.sin(a)), radius_m=0.6)
         for a in (k * math.pi / 6 for k in range(12))
     ]
-    among = decide("BitsOnly", *ring)
-    assert among.velocity == (0.0, 0.0)
-    assert among.mode is Mode.BLOCKED
+    enclosed = decide("BitsOnly", *ring)
+    assert enclosed.velocity == (0.0, 0.0)
+    assert enclosed.mode is Mode.BLOCKED
 
 
 def test_without_velocities_whoever_comes_across_is_not_seen_coming() -> None:
@@ -108,7 +108,7 @@ def test_without_margins_a_close_pass_is_as_good_as_any() -> None:
 
 def test_without_memory_who_is_out_of_sight_is_out_of_mind() -> None:
     ahead = Circle(center_m=(1.35, 0.0), radius_m=0.6)
-    goes = {}
+    velocities = {}
     for make in (Predictive, ablation.no_memory):
         planner = make(SETTING.params, SensorParams(), 0)
         for stamp, x, circles in ((1, 0.0, (ahead,)), (2, -0.1, ())):
@@ -119,6 +119,6 @@ def test_without_memory_who_is_out_of_sight_is_out_of_mind() -> None:
                     goal=(10.0, 0.0), circles=circles,
                 )
             )  # fmt: skip
-        goes[make] = decision.velocity
-    assert goes[ablation.no_memory] == pytest.approx((0.8, 0.0))
-    assert goes[Predictive] != pytest.approx((0.8, 0.0), abs=0.01)
+        velocities[make] = decision.velocity
+    assert velocities[ablation.no_memory] == pytest.approx((0.8, 0.0))
+    assert velocities[Predictive] != pytest.approx((0.8, 0.0), abs=0.01)

@@ -48,18 +48,20 @@ def observe(**changes: Any) -> Observation:
     return Observation(**{**plain, **changes})
 
 
-def never(position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
+def no_bats_expected(position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
     raise AssertionError("the bats were asked")
 
 
-def answer(mode: Mode = Mode.IDLE, params: PlannerParams = PARAMS, **changes: Any) -> Decision:
+def decide_without_bats(
+    mode: Mode = Mode.IDLE, params: PlannerParams = PARAMS, **changes: Any
+) -> Decision:
     """The decision on an observation that needs no bats."""
-    return decide(observe(**changes), mode, params, never)
+    return decide(observe(**changes), mode, params, no_bats_expected)
 
 
 # --- the table ------------------------------------------------------------------------------
 
-RESTLESS = {
+NOT_ARRIVED = {
     Event.NO_GOAL: Mode.IDLE,
     Event.NEW_GOAL: Mode.IDLE,
     Event.INVALID: Mode.STOPPED,
@@ -69,11 +71,11 @@ RESTLESS = {
     Event.OBSTACLE: Mode.OBSTACLE_AVOIDANCE,
     Event.NO_GAP: Mode.BLOCKED,
 }
-AT_REST = dict.fromkeys(Event, Mode.ARRIVED) | {
+ARRIVED = dict.fromkeys(Event, Mode.ARRIVED) | {
     Event.NO_GOAL: Mode.IDLE,
     Event.NEW_GOAL: Mode.IDLE,
 }
-TABLE = {mode: AT_REST if mode is Mode.ARRIVED else RESTLESS for mode in Mode}
+TABLE = {mode: ARRIVED if mode is Mode.ARRIVED else NOT_ARRIVED for mode in Mode}
 
 
 @pytest.mark.parametrize("event", Event)
@@ -113,7 +115,7 @@ def test_transition(mode: Mode, event: Event) -> None:
 def test_whoever_does_not_plan_stands_still(
     changes: dict[str, Any], mode: Mode, reason: str
 ) -> None:
-    decision = answer(**changes)
+    decision = decide_without_bats(**changes)
     assert (decision.mode, decision.reason) == (mode, reason)
     assert decision.velocity == (0.0, 0.0)
     assert decision.gap == 0
@@ -131,7 +133,7 @@ ALL_AT_ONCE = {
 
 
 @pytest.mark.parametrize(
-    ("mended", "reason"),
+    ("changes", "reason"),
     [
         ({}, "refused input: x"),
         ({"refused": ""}, "input is 995.000 s old"),
@@ -141,28 +143,33 @@ ALL_AT_ONCE = {
          "refused input: stamp -5 ns is negative"),
     ],
 )  # fmt: skip
-def test_of_several_events_the_gravest_counts(mended: dict[str, Any], reason: str) -> None:
-    assert answer(**{**ALL_AT_ONCE, **mended}).reason == reason
+def test_of_several_events_the_gravest_counts(changes: dict[str, Any], reason: str) -> None:
+    assert decide_without_bats(**{**ALL_AT_ONCE, **changes}).reason == reason
 
 
 def test_input_as_old_as_the_timeout_is_not_stale() -> None:
     gap: dict[str, Any] = {"ranges_m": ranges("110000000000")}
-    assert answer(now_ns=6_000_000_000, **gap).mode is Mode.OBSTACLE_AVOIDANCE
+    assert decide_without_bats(now_ns=6_000_000_000, **gap).mode is Mode.OBSTACLE_AVOIDANCE
     slow = replace(PARAMS, input_timeout_s=3.0)
-    assert answer(params=slow, now_ns=8_000_000_000, **gap).mode is Mode.OBSTACLE_AVOIDANCE
-    assert answer(params=slow, now_ns=8_000_000_001, **gap).mode is Mode.STOPPED
+    assert (
+        decide_without_bats(params=slow, now_ns=8_000_000_000, **gap).mode
+        is Mode.OBSTACLE_AVOIDANCE
+    )
+    assert decide_without_bats(params=slow, now_ns=8_000_000_001, **gap).mode is Mode.STOPPED
 
 
 def test_the_goal_tolerance_includes_its_edge() -> None:
     near: dict[str, Any] = {"pose": Pose2D(0.0, 0.0), "ranges_m": ranges("1" * 12)}
     params = replace(PARAMS, goal_tolerance_m=0.25)
-    assert answer(params=params, goal=(0.0, -0.25), **near).mode is Mode.ARRIVED
-    assert answer(params=params, goal=(0.0, -0.2500001), **near).mode is Mode.BLOCKED
+    assert decide_without_bats(params=params, goal=(0.0, -0.25), **near).mode is Mode.ARRIVED
+    assert decide_without_bats(params=params, goal=(0.0, -0.2500001), **near).mode is Mode.BLOCKED
 
 
 def test_obstacle_avoidance_takes_the_gap_nearest_to_the_goal() -> None:
     # Fig. 5, goal at 45 degrees
-    decision = answer(pose=Pose2D(1.0, 2.0, 0.5), goal=(5.0, 6.0), ranges_m=ranges("110000111000"))
+    decision = decide_without_bats(
+        pose=Pose2D(1.0, 2.0, 0.5), goal=(5.0, 6.0), ranges_m=ranges("110000111000")
+    )
     assert decision.mode is Mode.OBSTACLE_AVOIDANCE
     assert decision.reason == "sectors 1+2+7+8+9 set: gap 3 is nearest to the goal"
     assert "".join(map(str, decision.vs)) == "110000111000"
@@ -176,13 +183,13 @@ def test_obstacle_avoidance_takes_the_gap_nearest_to_the_goal() -> None:
 
 
 def test_obstacle_avoidance_never_steps_further_than_the_goal_is() -> None:
-    decision = answer(goal=(1.0, 2.125), ranges_m=ranges("110000111000"))
+    decision = decide_without_bats(goal=(1.0, 2.125), ranges_m=ranges("110000111000"))
     assert decision.waypoint == pytest.approx((1.0, 2.125))
 
 
 def test_a_decision_carries_what_it_was_made_from() -> None:
     obs = observe(ranges_m=ranges("010000000000"))
-    decision = decide(obs, Mode.IDLE, PARAMS, never)
+    decision = decide(obs, Mode.IDLE, PARAMS, no_bats_expected)
     for name in ("stamp_ns", "pose", "goal", "ranges_m"):
         assert getattr(decision, name) == getattr(obs, name)
 
@@ -215,7 +222,7 @@ def test_path_generation_asks_the_bats() -> None:
     ],
 )  # fmt: skip
 def test_after_arrival_the_loop_is_over(changes: dict[str, Any], reason: str) -> None:
-    decision = answer(Mode.ARRIVED, **changes)
+    decision = decide_without_bats(Mode.ARRIVED, **changes)
     assert (decision.mode, decision.reason) == (Mode.ARRIVED, reason)
     assert (decision.velocity, decision.gap) == ((0.0, 0.0), 0)
 
@@ -342,12 +349,12 @@ def test_a_planner_that_is_restarted_decides_as_the_first_one_did(name: str) -> 
 
 
 def test_decisions_depend_on_the_seed_and_on_the_stamp() -> None:
-    ways = {
+    waypoints = {
         Algorithm1(PARAMS, seed).plan(observe(stamp_ns=stamp, now_ns=stamp)).waypoint
         for seed in range(5)
         for stamp in (1, 2, 10**18)
     }
-    assert len(ways) == 15
+    assert len(waypoints) == 15
 
 
 def test_a_planner_remembers_its_mode_until_the_goal_changes() -> None:
@@ -398,8 +405,8 @@ def test_fig_1_steps_one_bat_iteration_at_a_time_to_the_best_point_seen() -> Non
         assert len(decision.candidates) == 5
         reach = [math.dist(decision.pose.position, c) for c in decision.candidates]
         assert max(reach) <= 0.1 + 1e-9
-        here = math.dist(decision.pose.position, GOAL)
-        best = min([here, *(math.dist(c, GOAL) for c in decision.candidates)])
+        distance_m = math.dist(decision.pose.position, GOAL)
+        best = min([distance_m, *(math.dist(c, GOAL) for c in decision.candidates)])
         assert math.dist(decision.waypoint, GOAL) <= best + 1e-9
 
 

@@ -15,7 +15,7 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Circle, Mode, Observation, Scan
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.observed_circles import discs
+from mfba_planner.planning.observed_circles import circle_rows
 from mfba_planner.planning.peers import apf
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
@@ -153,9 +153,9 @@ def test_a_scan_will_do(name: str) -> None:
 
 
 def test_discs_are_relative_to_the_robot() -> None:
-    found = discs(replace(HERE, circles=(circle(0.5, -0.5, 0.1, 0.2),)))
+    found = circle_rows(replace(HERE, circles=(circle(0.5, -0.5, 0.1, 0.2),)))
     assert found.tolist() == [[0.5, -0.5, 0.1, 0.2, 0.6]]
-    assert discs(HERE).shape == (0, 5)
+    assert circle_rows(HERE).shape == (0, 5)
 
 
 def test_orca_without_pyrvo_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

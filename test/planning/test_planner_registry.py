@@ -131,13 +131,13 @@ def test_the_last_step_ends_at_the_goal(name: str) -> None:
 def test_known_circles_are_those_within_sr_and_move_as_they_do_now() -> None:
     near = Obstacle(center_m=(6.3, 5.0), radius_m=0.3, speed_mps=0.2, heading_rad=math.pi)
     far = Obstacle(center_m=(6.5, 5.0), radius_m=0.3)
-    seen = Perception("known")(world_with(near, far), SENSOR)
-    assert seen.circles is not None
-    (circle,) = seen.circles
+    visible = Perception("known")(world_with(near, far), SENSOR)
+    assert visible.circles is not None
+    (circle,) = visible.circles
     assert circle.center_m == pytest.approx((6.3, 5.0))
     assert circle.radius_m == pytest.approx(0.6)
     assert circle.velocity_mps == pytest.approx((-0.2, 0.0))
-    assert seen.sensed is None
+    assert visible.sensed is None
 
 
 @given(
@@ -179,15 +179,15 @@ def test_beams_end_on_surfaces_and_miss_nothing_wide(
 
 def test_a_scan_reaches_as_far_as_the_sensing_region() -> None:
     edge = 5.0 + SENSOR.sensing_range_m + 0.6
-    for centre, seen in ((edge - 1e-3, True), (edge + 1e-3, False)):
+    for centre, visible in ((edge - 1e-3, True), (edge + 1e-3, False)):
         world = world_with(Obstacle(center_m=(centre, 5.0), radius_m=0.3))
         scan = Perception("scan-360")(world, SENSOR).scan
         assert scan is not None
         # The nearest beams look half a degree past the circle's nearest point.
-        assert bool(np.isfinite(scan.ranges_m).any()) is seen
+        assert bool(np.isfinite(scan.ranges_m).any()) is visible
         circles = Perception("known")(world, SENSOR).circles
         assert circles is not None
-        assert bool(circles) is seen
+        assert bool(circles) is visible
 
 
 @pytest.mark.parametrize("name", ["known", "scan-12", "scan-360"])
@@ -195,21 +195,21 @@ def test_latency_shows_what_was_and_says_so(name: str) -> None:
     obstacle = Obstacle(center_m=(6.0, 5.0), radius_m=0.3, speed_mps=0.3, heading_rad=1.0)
     late, prompt = Perception(name, latency_ticks=2), Perception(name)
     world = world_with(obstacle)
-    was, now = [], []
+    prompt_obs, late_obs = [], []
     for _ in range(4):
-        was.append(prompt(world, SENSOR))
-        now.append(late(world, SENSOR))
+        prompt_obs.append(prompt(world, SENSOR))
+        late_obs.append(late(world, SENSOR))
         world.step((0.1, 0.0))
     for k, n in enumerate([0, 0, 0, 1]):
-        assert now[k].pose == was[k].pose
-        assert now[k].stamp_ns == was[k].stamp_ns
-        assert now[k].circles == was[n].circles
-        assert (now[k].sensed is None) is (k == 0)
+        assert late_obs[k].pose == prompt_obs[k].pose
+        assert late_obs[k].stamp_ns == prompt_obs[k].stamp_ns
+        assert late_obs[k].circles == prompt_obs[n].circles
+        assert (late_obs[k].sensed is None) is (k == 0)
         if k:
-            assert now[k].sensed == (was[n].stamp_ns, was[n].pose)
-        then, sees = was[n].scan, now[k].scan
-        if then is not None and sees is not None:
-            assert np.array_equal(then.ranges_m, sees.ranges_m)
+            assert late_obs[k].sensed == (prompt_obs[n].stamp_ns, prompt_obs[n].pose)
+        then, now_scan = prompt_obs[n].scan, late_obs[k].scan
+        if then is not None and now_scan is not None:
+            assert np.array_equal(then.ranges_m, now_scan.ranges_m)
     anew = late(world_with(obstacle), SENSOR)
     assert anew.sensed is None
 

@@ -42,7 +42,7 @@ def drive(scenario: Scenario, seed: int = 0, name: str = "known", **kw: float) -
     return run(scenario, planner=PARAMS, path_planner=planner(seed), seed=seed, observe=observer)
 
 
-def seeing(*circles: Circle, stamp_ns: int = 10**9, goal: Point = GOAL) -> Observation:
+def observation(*circles: Circle, stamp_ns: int = 10**9, goal: Point = GOAL) -> Observation:
     return Observation(
         stamp_ns=stamp_ns, now_ns=stamp_ns, pose=HERE, ranges_m=(), goal=goal, circles=circles
     )
@@ -95,30 +95,30 @@ circles = st.builds(
 )
 
 
-@given(seen=st.lists(circles, max_size=12), seed=st.integers(0, 2**32))
+@given(observed=st.lists(circles, max_size=12), seed=st.integers(0, 2**32))
 @settings(max_examples=60)
 def test_whatever_it_sees_it_keeps_to_the_speed_and_to_numbers(
-    seen: list[Circle], seed: int
+    observed: list[Circle], seed: int
 ) -> None:
-    decision = planner(seed).plan(seeing(*seen))
+    decision = planner(seed).plan(observation(*observed))
     assert math.hypot(*decision.velocity) <= PARAMS.speed_mps * (1.0 + 1e-9)
     assert all(map(math.isfinite, (*decision.velocity, *decision.waypoint)))
-    assert decision == planner(seed).plan(seeing(*seen))
+    assert decision == planner(seed).plan(observation(*observed))
 
 
-@given(seen=st.lists(circles, min_size=1, max_size=5))
+@given(observed=st.lists(circles, min_size=1, max_size=5))
 @settings(max_examples=60)
-def test_a_straight_way_that_is_free_is_taken(seen: list[Circle]) -> None:
+def test_a_straight_way_that_is_free_is_taken(observed: list[Circle]) -> None:
     off = math.pi / 2.0
     toward = math.atan2(GOAL[1] - HERE.y, GOAL[0] - HERE.x)
     behind = [
         c
-        for c in seen
+        for c in observed
         if math.cos(math.atan2(c.center_m[1] - HERE.y, c.center_m[0] - HERE.x) - toward) < -0.1
         and math.hypot(*c.velocity_mps) < 0.3
         and distance(c.center_m, HERE.position) > 0.8
     ]
-    decision = planner().plan(seeing(*behind))
+    decision = planner().plan(observation(*behind))
     assert math.remainder(math.atan2(*decision.velocity[::-1]) - toward, 4.0 * off) == (
         pytest.approx(0.0, abs=1e-9)
     )
@@ -147,7 +147,7 @@ def test_who_stands_still_is_run_into_by_nobody_when_closed_in() -> None:
         Circle(center_m=(HERE.x + 0.75 * math.cos(k), HERE.y + 0.75 * math.sin(k)), radius_m=0.6)
         for k in np.arange(0.0, 2.0 * math.pi, math.pi / 6.0)
     ]
-    decision = planner().plan(seeing(*ring))
+    decision = planner().plan(observation(*ring))
     assert all(decision.vs)
     assert decision.reason.startswith("every heading closes; the least risk")
     dt = PARAMS.tick_ns * 1e-9
@@ -158,7 +158,7 @@ def test_who_stands_still_is_run_into_by_nobody_when_closed_in() -> None:
 def test_closed_in_by_movers_it_flees_where_contact_is_latest() -> None:
     left = Circle(center_m=(HERE.x - 0.7, HERE.y), radius_m=0.6, velocity_mps=(0.3, 0.0))
     right = Circle(center_m=(HERE.x + 0.9, HERE.y), radius_m=0.6, velocity_mps=(-0.3, 0.0))
-    velocity = planner().plan(seeing(left, right)).velocity
+    velocity = planner().plan(observation(left, right)).velocity
     assert abs(velocity[1]) > 0.5 * PARAMS.speed_mps
 
 
@@ -194,10 +194,10 @@ def test_the_same_seed_decides_the_same_and_another_one_differs() -> None:
 def test_a_reset_forgets() -> None:
     blocking = Circle(center_m=(2.0, 2.8), radius_m=0.6)
     path_planner = planner()
-    first = path_planner.plan(seeing(blocking))
-    path_planner.plan(seeing(blocking, stamp_ns=2 * 10**9))
+    first = path_planner.plan(observation(blocking))
+    path_planner.plan(observation(blocking, stamp_ns=2 * 10**9))
     path_planner.reset()
-    assert path_planner.plan(seeing(blocking)) == first
+    assert path_planner.plan(observation(blocking)) == first
 
 
 def test_without_circles_and_scan_the_sectors_must_do() -> None:
@@ -235,19 +235,22 @@ def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
     margin = risk.margin_m + risk.margin_ticks * 0.1 * math.hypot(vx, vy)
     if math.hypot(x, y) < 0.61 + margin:  # who is within it already may leave it for nothing
         return
-    way = (0.8 * t1 * math.cos(heading), 0.8 * t1 * math.sin(heading))
+    waypoint = (0.8 * t1 * math.cos(heading), 0.8 * t1 * math.sin(heading))
     goal = (9.0, 1.0)
-    cost = TrajectoryCost((0.0, 0.0), [circle], risk, 0.1).cost(way, t1, goal, 0.8)
-    rest = distance(way, goal)
+    cost = TrajectoryCost((0.0, 0.0), [circle], risk, 0.1).cost(waypoint, t1, goal, 0.8)
+    rest = distance(waypoint, goal)
     length = 0.8 * t1 + rest
     smallest = surely = math.inf  # within tau, and so early within it that risk has not faded
     moment = 0.0
     for t in np.linspace(0.0, risk.horizon_s, 3001).tolist():
         if t <= t1:
-            here = (way[0] * t / t1, way[1] * t / t1)
+            here = (waypoint[0] * t / t1, waypoint[1] * t / t1)
         else:
             share = min(1.0, 0.8 * (t - t1) / rest)
-            here = (way[0] + share * (goal[0] - way[0]), way[1] + share * (goal[1] - way[1]))
+            here = (
+                waypoint[0] + share * (goal[0] - waypoint[0]),
+                waypoint[1] + share * (goal[1] - waypoint[1]),
+            )
         apart = distance(here, (x + vx * t, y + vy * t)) - 0.6
         if apart < smallest:
             smallest, moment = apart, t
@@ -339,29 +342,32 @@ def test_the_cheapest_of_many_ways_is_found_without_weighing_all(
         Circle(center_m=(r * math.cos(b), r * math.sin(b)), radius_m=0.6, velocity_mps=(vx, vy))
         for r, b, vx, vy in crowd
     ]
-    goal, speed, ways = (5.0, 1.0), 0.8, []
+    goal, speed, candidates = (5.0, 1.0), 0.8, []
     for k in range(12):
         for length in (0.4, 1.0, 2.0):
             q = (length * math.cos(k * math.pi / 6.0), length * math.sin(k * math.pi / 6.0))
-            ways.append((length + distance(q, goal), q, length / speed, k))
-    ways = [(-math.inf, *ways[first][1:3], -1), *sorted(ways[:first] + ways[first + 1 :])]
+            candidates.append((length + distance(q, goal), q, length / speed, k))
+    candidates = [
+        (-math.inf, *candidates[first][1:3], -1),
+        *sorted(candidates[:first] + candidates[first + 1 :]),
+    ]
     world = TrajectoryCost((0.0, 0.0), circles, RiskParams(), 0.1, speed)
-    costs = [world.cost(q, t1, goal, speed) for _, q, t1, _ in ways]
-    found = world.cheapest(ways, goal, speed, bound)
+    costs = [world.cost(q, t1, goal, speed) for _, q, t1, _ in candidates]
+    found = world.cheapest(candidates, goal, speed, bound)
     if found is None:
         assert min(costs) >= bound
     else:
-        way, t1, cost = found
+        waypoint, t1, cost = found
         assert cost == min(costs) < bound
-        assert costs[[(q, t) for _, q, t, _ in ways].index((way, t1))] == cost
+        assert costs[[(q, t) for _, q, t, _ in candidates].index((waypoint, t1))] == cost
 
 
 def test_a_longer_way_in_the_same_direction_may_be_the_better_one() -> None:
     """Who comes nearer slowly is a lesser risk, the later the leg that it is near ends."""
     beside = Circle(center_m=(0.0, 0.74), radius_m=0.6, velocity_mps=(0.8, -0.05))
     world = TrajectoryCost((0.0, 0.0), [beside], RiskParams(), 0.1, 0.8)
-    ways = [(5.0, (1.0, 0.0), 1.25, 0), (5.0, (2.0, 0.0), 2.5, 0)]
-    found = world.cheapest(ways, (5.0, 0.0), 0.8, 5.06)
+    candidates = [(5.0, (1.0, 0.0), 1.25, 0), (5.0, (2.0, 0.0), 2.5, 0)]
+    found = world.cheapest(candidates, (5.0, 0.0), 0.8, 5.06)
     assert found is not None
     assert found[0] == (2.0, 0.0)
 
@@ -370,8 +376,8 @@ def test_who_is_met_at_the_far_end_of_a_way_is_not_left_out() -> None:
     """A way beyond the goal and back, as near its bound as may be, and who stands behind it."""
     behind = Circle(center_m=(2.05, 0.0), radius_m=0.6)
     world = TrajectoryCost((0.0, 0.0), [behind], RiskParams(), 0.1, 0.8)
-    ways = [(-math.inf, (0.0, 2.0), 2.5, -1), (2.0, (1.5, 0.0), 1.875, 0)]
-    assert world.cheapest(ways, (1.0, 0.0), 0.8, 2.1) is None
+    candidates = [(-math.inf, (0.0, 2.0), 2.5, -1), (2.0, (1.5, 0.0), 1.875, 0)]
+    assert world.cheapest(candidates, (1.0, 0.0), 0.8, 2.1) is None
 
 
 @pytest.mark.parametrize(
@@ -387,5 +393,5 @@ def test_who_is_grazed_to_the_last_bit_is_weighed_like_any_other(
 ) -> None:
     """Rounded one way the closest approach is a contact, rounded the other way it is none."""
     world = TrajectoryCost((0.0, 0.0), [Circle(center_m=center, radius_m=0.6)], RiskParams(), 0.1)
-    way = (2.5 * velocity[0], 2.5 * velocity[1])
-    assert 2.0 < world.cost(way, 2.5, way, 0.8) < math.inf
+    waypoint = (2.5 * velocity[0], 2.5 * velocity[1])
+    assert 2.0 < world.cost(waypoint, 2.5, waypoint, 0.8) < math.inf

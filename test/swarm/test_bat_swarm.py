@@ -36,7 +36,7 @@ from mfba_planner.swarm.bat_swarm import (
     Walk,
     minimize,
 )
-from mfba_planner.swarm.swarm_iteration import Law
+from mfba_planner.swarm.swarm_iteration import BatMotion
 
 Values = list[float]
 BOX = Box((-1.0, 10.0), (3.0, 12.0))
@@ -135,8 +135,8 @@ def test_eq_7_with_one_epsilon_for_all_coordinates() -> None:
 def test_eq_7_from_the_bat_itself() -> None:
     swarm, x, rng = start(params(walk=Walk.SELF, **WALKING), [3.0, 1.0])
     u = rng.random((2, 5))
-    flown = x + (x[1] - x) * 10.0 * u[:, :1]
-    assert np.array(swarm.ask()) == pytest.approx(flown + 0.3 * (2.0 * u[:, 3:] - 1.0), rel=1e-12)
+    moved = x + (x[1] - x) * 10.0 * u[:, :1]
+    assert np.array(swarm.ask()) == pytest.approx(moved + 0.3 * (2.0 * u[:, 3:] - 1.0), rel=1e-12)
 
 
 def test_eq_7_scales_with_the_mean_loudness_and_eq_8_lowers_it() -> None:
@@ -237,8 +237,8 @@ def test_a_bat_moves_to_what_is_not_worse_and_to_nothing_else(value: float, move
     v = (x[1] - x[0]) / 2.0
     assert swarm.ask()[0] == pytest.approx((x[0] + v).tolist())
     swarm.tell([value, 9.0])
-    at = x[0] + v if moves else x[0]
-    assert swarm.ask()[0] == pytest.approx((at + v + (x[1] - at) / 2.0).tolist())
+    position = x[0] + v if moves else x[0]
+    assert swarm.ask()[0] == pytest.approx((position + v + (x[1] - position) / 2.0).tolist())
     assert swarm.best_x == x[1].tolist()
 
 
@@ -287,13 +287,13 @@ def reference(
         rows = rng.random((n, 3 + d + 2 * paired))
         loudness = sum(a) / n
         tried = []
-        for i, (draw, gate, _, *rest) in enumerate(rows):
+        for i, (draw, walk_draw, _, *rest) in enumerate(rows):
             epsilon = rest[:d]
             if p.algorithm is Algorithm.BA:
                 beta = draw
             else:
-                when = t / p.iterations if p.schedule is Schedule.NORMALIZED else t
-                beta = when * math.exp(-p.rho * draw)
+                scaled_t = t / p.iterations if p.schedule is Schedule.NORMALIZED else t
+                beta = scaled_t * math.exp(-p.rho * draw)
             f = p.f_min + (p.f_max - p.f_min) * beta
             v[i] = v[i] * p.inertia
             if p.velocity is Velocity.TOWARDS_BEST:
@@ -301,7 +301,7 @@ def reference(
             else:
                 v[i] = v[i] + f * (x[i] - best_x)
             new: Any = x[i] + v[i]
-            if gate > r[i]:
+            if walk_draw > r[i]:
                 e = np.array(epsilon if p.epsilon is Epsilon.PER_COORDINATE else epsilon[:1] * d)
                 old = best_x if p.walk is Walk.BEST else new
                 length: Any = 1.0
@@ -390,7 +390,7 @@ def test_the_unrolled_plane_is_the_general_flight_to_the_last_bit(
 ) -> None:
     fast = minimize(sphere, region, p, generator(seed))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Law, "_fly_in_the_plane", Law._iterate_in_d_dimensions)
+        patch.setattr(BatMotion, "_iterate_in_the_plane", BatMotion._iterate_in_d_dimensions)
         slow = minimize(sphere, region, p, generator(seed))
     assert (fast.best_x, fast.best_value) == (slow.best_x, slow.best_value)
     assert fast.candidates == slow.candidates
@@ -485,12 +485,12 @@ def test_asking_twice_returns_the_same_candidates() -> None:
 
 def test_candidates_once_handed_out_do_not_change() -> None:
     swarm = BatSwarm(BatParams(bounds=Bounds.NONE), Disc(0.3), generator())
-    kept = []
+    handed_out = []
     for _ in range(6):
         handed = swarm.ask()
-        kept.append((handed, [list(x) for x in handed]))
+        handed_out.append((handed, [list(x) for x in handed]))
         swarm.tell([sphere(x) for x in handed])
-    for handed, copy in kept:
+    for handed, copy in handed_out:
         assert handed == copy
 
 
@@ -539,10 +539,12 @@ def test_a_swarm_that_has_seen_nothing_but_nan_goes_on() -> None:
 
 def test_a_bat_whose_first_value_was_nan_takes_any_number() -> None:
     swarm, _, _ = start(params(a0=100.0, f_max=0.0, walk=Walk.SELF, **WALKING), [math.nan, 5.0])
-    moved = swarm.ask()[0]
+    accepted = swarm.ask()[0]
     swarm.tell([1e9, 9.0])
-    flown = swarm.ask()[0]
-    assert np.hypot(flown[0] - moved[0], flown[1] - moved[1]) <= 0.3 * 100.0 * math.sqrt(2.0)
+    walked = swarm.ask()[0]
+    assert np.hypot(walked[0] - accepted[0], walked[1] - accepted[1]) <= 0.3 * 100.0 * math.sqrt(
+        2.0
+    )
 
 
 def test_each_iteration_uses_the_same_number_of_draws_whatever_happens() -> None:
@@ -561,16 +563,16 @@ def test_the_best_is_the_least_value_told_and_never_worsens(
     p: BatParams, region: Region, seed: int
 ) -> None:
     swarm = BatSwarm(p, region, generator(seed))
-    told: list[tuple[float, Vector]] = []
+    values_so_far: list[tuple[float, Vector]] = []
     for _ in range(p.iterations + 1):
         before = swarm.best_value
         candidates = swarm.ask()
         values = [sphere(x) for x in candidates]
-        told += zip(values, candidates)
+        values_so_far += zip(values, candidates)
         swarm.tell(values)
         assert swarm.best_value <= before
-        least = min(value for value, _ in told)
-        assert (swarm.best_value, swarm.best_x) in told
+        least = min(value for value, _ in values_so_far)
+        assert (swarm.best_value, swarm.best_x) in values_so_far
         assert swarm.best_value == least
 
 
@@ -627,14 +629,14 @@ def test_minimize_runs_t_iterations_and_finds_more_than_luck(algorithm: Algorith
 
 
 def test_minimize_evaluates_each_candidate_once() -> None:
-    seen: list[Vector] = []
+    points: list[Vector] = []
 
     def count(x: Vector) -> float:
-        seen.append(x)
+        points.append(x)
         return sphere(x)
 
     minimize(count, BOX, BatParams(population=3, iterations=4), generator())
-    assert len(seen) == 3 * (4 + 1)
+    assert len(points) == 3 * (4 + 1)
 
 
 # --- moving the region ----------------------------------------------------------------------
