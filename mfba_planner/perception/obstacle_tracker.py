@@ -278,8 +278,8 @@ class Tracker:
         if not len(points):
             return
         p = self.params
-        step = np.roll(points, -1, axis=0) - points
-        cuts = np.flatnonzero(np.hypot(step[:, 0], step[:, 1]) > p.join_m) + 1
+        difference = np.roll(points, -1, axis=0) - points
+        cuts = np.flatnonzero(np.hypot(difference[:, 0], difference[:, 1]) > p.join_m) + 1
         if len(cuts):
             points = np.roll(points, -cuts[0], axis=0)
             groups = np.split(points, cuts[1:] - cuts[0])

@@ -105,13 +105,13 @@ class Algorithm1:
         self._generated_step: tuple[tuple[StepInput, PlannerParams], GoalStep] | None = None
 
     def reset(self) -> None:
-        """Drop all state but parameters and seed (after a time jump, before a new trip)."""
+        """Drop all state but parameters and seed (after a clock reset, before a new trip)."""
         self.mode, self._goal, self._swarm = Mode.IDLE, None, None
 
     def plan(self, obs: Observation) -> Decision:
         """Decide on one observation and update the mode; after an odometry jump, reset first."""
-        jump_reason = self._odometry_jump.detect(obs, self.params, self.mode)
-        if jump_reason:
+        odometry_jump_reason = self._odometry_jump.detect(obs, self.params, self.mode)
+        if odometry_jump_reason:
             self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
@@ -119,7 +119,7 @@ class Algorithm1:
         self._stamp_ns = obs.stamp_ns
         decision = decide(obs, self.mode, self.params, self._generate)
         self.mode = decision.mode
-        return with_odometry_jump(decision, jump_reason)
+        return with_odometry_jump(decision, odometry_jump_reason)
 
     def _generate(self, position: Point, goal: Point) -> GoalStep:
         params = self.params

@@ -56,7 +56,7 @@ class BasePlanner:
         self.reset()
 
     def reset(self) -> None:
-        """Drop all state but parameters and seed (after a time jump, before a new trip)."""
+        """Drop all state but parameters and seed (after a clock reset, before a new trip)."""
         self.mode = Mode.IDLE
         self._goal: Point | None = None
         self.forget()
@@ -70,8 +70,8 @@ class BasePlanner:
 
     def plan(self, obs: Observation) -> Decision:
         """Decide on one observation and update the mode; after an odometry jump, reset first."""
-        jump_reason = self._odometry_jump.detect(obs, self.params, self.mode)
-        if jump_reason:
+        odometry_jump_reason = self._odometry_jump.detect(obs, self.params, self.mode)
+        if odometry_jump_reason:
             self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
@@ -86,7 +86,7 @@ class BasePlanner:
                 reason = f"goal was reached before; {reason}"
             move = Move(velocity=(0.0, 0.0), reason=reason, event=event)
         self.mode = transition(self.mode, move.event)
-        return with_odometry_jump(self._decision(obs, move), jump_reason)
+        return with_odometry_jump(self._decision(obs, move), odometry_jump_reason)
 
     def straight(self, position: Point, target: Point, speed_mps: float) -> Point:
         """Velocity towards the target, at most speed_mps, and not beyond the target in a tick."""

@@ -39,10 +39,12 @@ class OdometryJump:
         return f"{CARRIED_OFF} {moved_m:.3g} m in {took_s:.3g} s, beginning anew"
 
 
-def with_odometry_jump(decision: Decision, jump_reason: str) -> Decision:
+def with_odometry_jump(decision: Decision, odometry_jump_reason: str) -> Decision:
     """The decision with the jump's reason in front of its own; unchanged for ""."""
     return (
-        replace(decision, reason=f"{jump_reason}; {decision.reason}") if jump_reason else decision
+        replace(decision, reason=f"{odometry_jump_reason}; {decision.reason}")
+        if odometry_jump_reason
+        else decision
     )
 
 

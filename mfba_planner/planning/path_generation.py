@@ -26,12 +26,12 @@ class StepInput(NamedTuple):
     stamp_ns: int
 
 
-def generate_step(start: StepInput, step_length_m: float, bat: BatParams) -> GoalStep:
+def generate_step(step_input: StepInput, step_length_m: float, bat: BatParams) -> GoalStep:
     """Next point by a fresh swarm in the disc of one goal step; the last step ends at the goal.
 
     Objective: distance of the candidate to GP (eq. 1; eq. 2 is its reciprocal).
     """
-    position, goal = start.position, start.goal
+    position, goal = step_input.position, step_input.goal
     if distance(position, goal) <= step_length_m:
         return goal, ()
     px, py = position
@@ -42,7 +42,7 @@ def generate_step(start: StepInput, step_length_m: float, bat: BatParams) -> Goa
         return math.sqrt(dx * dx + dy * dy)
 
     reach = Disc(step_length_m)
-    swarm = minimize(cost, reach, bat, stream(start.seed, start.stamp_ns))
+    swarm = minimize(cost, reach, bat, stream(step_input.seed, step_input.stamp_ns))
     best = swarm.best_x
     if bat.bounds is Bounds.NONE:
         best = reach.clamp(best)  # the bats may leave the disc, the robot must not
@@ -51,15 +51,17 @@ def generate_step(start: StepInput, step_length_m: float, bat: BatParams) -> Goa
 
 
 def generate_steps(
-    starts: Sequence[StepInput], step_length_m: float, bat: BatParams
+    step_inputs: Sequence[StepInput], step_length_m: float, bat: BatParams
 ) -> list[GoalStep]:
-    """generate_step() of each start, bit by bit, with all swarms computed at once."""
-    steps: list[GoalStep] = [(start.goal, ()) for start in starts]
-    searched = {i: s for i, s in enumerate(starts) if distance(s.position, s.goal) > step_length_m}
+    """generate_step() of each input, bit by bit, with all swarms computed at once."""
+    steps: list[GoalStep] = [(step_input.goal, ()) for step_input in step_inputs]
+    searched = {
+        i: s for i, s in enumerate(step_inputs) if distance(s.position, s.goal) > step_length_m
+    }
     if not searched:
         return steps
-    positions = np.array([start.position for start in searched.values()]).T
-    to_goal = np.array([start.goal for start in searched.values()]).T - positions
+    positions = np.array([step_input.position for step_input in searched.values()]).T
+    to_goal = np.array([step_input.goal for step_input in searched.values()]).T - positions
 
     def cost(x: Array) -> Array:
         dx, dy = x[..., 0] - to_goal[0, :, None], x[..., 1] - to_goal[1, :, None]
@@ -76,7 +78,7 @@ def generate_steps(
     if bat.bounds is Bounds.NONE:
         best = [reach.clamp(x) for x in best]
     xs, ys = (swarms.candidates + positions[:, :, None]).tolist()
-    for (i, start), (bx, by), x, y in zip(searched.items(), best, xs, ys):
-        px, py = start.position
+    for (i, step_input), (bx, by), x, y in zip(searched.items(), best, xs, ys):
+        px, py = step_input.position
         steps[i] = (px + bx, py + by), tuple(zip(x, y))
     return steps

@@ -92,8 +92,8 @@ def advance(state: Recovery, blocked: bool, now_ns: int, params: RecoveryParams)
 def _while_free(state: Recovery, blocked: bool, now_ns: int, params: RecoveryParams) -> Recovery:
     over = _passed(state.free_ns, now_ns, params.wait_s)
     if blocked:
-        fresh = over or not state.since_ns
-        since_ns, attempt = (now_ns, 0) if fresh else (state.since_ns, state.attempt)
+        restarted = over or not state.since_ns
+        since_ns, attempt = (now_ns, 0) if restarted else (state.since_ns, state.attempt)
         waiting = _changed(state, Phase.WAIT, since_ns, attempt=attempt)
         return advance(waiting, True, now_ns, params)  # the wait may be over already
     return Recovery() if over else state

@@ -57,7 +57,7 @@ class SupervisedPlanner:
         return self._recovery.phase
 
     def reset(self) -> None:
-        """Drop all state but parameters and seed (after a time jump, before a new trip)."""
+        """Drop all state but parameters and seed (after a clock reset, before a new trip)."""
         self.inner.reset()
         self._forget()
 

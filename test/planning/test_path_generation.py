@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One step of path generation: in the disc of one step, and the same alone or among many."""
+"""Goal steps of path generation, computed one by one and for many planners at once."""
 
 import math
 from collections.abc import Sequence
@@ -49,7 +49,7 @@ def test_a_fresh_swarm_searches_the_disc_of_one_step() -> None:
     assert len(candidates) == 7
     for candidate, x in zip(candidates, swarm.candidates):
         assert candidate == pytest.approx((1.0 + x[0], 2.0 + x[1]))
-    assert math.dist(waypoint, (4.0, 6.0)) < 4.8, "nearly the whole step is gained"
+    assert math.dist(waypoint, (4.0, 6.0)) < 4.8, "nearly a whole step nearer to the goal"
 
 
 def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
@@ -68,18 +68,20 @@ def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
 def test_many_steps_at_once_are_the_same_steps(
     starts: list[StepInput], bat: BatParams, step_m: float
 ) -> None:
-    starts.append(StepInput((1.0, 2.0), (1.0 + 0.9 * step_m, 2.0), 0, 1))  # the last of its trip
+    starts.append(
+        StepInput((1.0, 2.0), (1.0 + 0.9 * step_m, 2.0), 0, 1)
+    )  # the last step to its goal
     assert generate_steps(starts, step_m, bat) == [generate_step(s, step_m, bat) for s in starts]
 
 
-def test_a_start_among_others_of_its_seed_is_the_same() -> None:
+def test_many_steps_of_one_seed_are_the_same_steps() -> None:
     starts = [StepInput((0.1 * k, 2.0), GOAL, 5, 2**33) for k in range(20)]
     assert generate_steps(starts, STEP_M, BatParams()) == [
         generate_step(s, STEP_M, BatParams()) for s in starts
     ]
 
 
-# --- planners that let their bats fly together ------------------------------------------------
+# --- steps of many planners at once ---------------------------------------------------------
 
 
 def observed(k: int, ranges_m: tuple[float, ...] = FREE, goal: Point | None = GOAL) -> Observation:
@@ -91,7 +93,7 @@ def observed(k: int, ranges_m: tuple[float, ...] = FREE, goal: Point | None = GO
 
 @pytest.fixture
 def single(monkeypatch: pytest.MonkeyPatch) -> list[StepInput]:
-    """The steps that were made alone."""
+    """The inputs of the steps that were computed one by one."""
     made: list[StepInput] = []
 
     def recorded(start: StepInput, step_length_m: float, bat: BatParams) -> GoalStep:
@@ -106,7 +108,7 @@ def planners(seeds: Sequence[int], params: PlannerParams | None = None) -> list[
     return [Algorithm1(params or PlannerParams(), seed) for seed in seeds]
 
 
-def test_planners_find_their_bats_flown_and_decide_the_same(single: list[StepInput]) -> None:
+def test_planners_use_their_batched_steps_and_decide_the_same(single: list[StepInput]) -> None:
     seeds = [k % 3 for k in range(MIN_BATCH + 3)]
     observations = [observed(k) for k in range(len(seeds))]
     blocked = (0.5, *FREE[1:])
@@ -121,10 +123,10 @@ def test_planners_find_their_bats_flown_and_decide_the_same(single: list[StepInp
         replace(obs, stamp_ns=2 * obs.stamp_ns, now_ns=2 * obs.now_ns) for obs in observations
     ]
     for planner, other, obs in zip(ours, theirs, later):
-        assert planner.plan(obs) == other.plan(obs), "bats that flew once do not come again"
+        assert planner.plan(obs) == other.plan(obs), "a batched step is used only once"
 
 
-def test_few_fly_alone(single: list[StepInput]) -> None:
+def test_few_planners_are_not_batched(single: list[StepInput]) -> None:
     ours = planners(range(MIN_BATCH - 1))
     observations = [observed(k) for k in range(MIN_BATCH - 1)]
     generate_paths_together(ours, observations)
@@ -133,7 +135,9 @@ def test_few_fly_alone(single: list[StepInput]) -> None:
     assert len(single) == MIN_BATCH - 1
 
 
-def test_whoever_is_elsewhere_or_has_other_options_flies_alone(single: list[StepInput]) -> None:
+def test_a_batched_step_of_another_input_or_other_options_is_not_used(
+    single: list[StepInput],
+) -> None:
     ours = planners(range(MIN_BATCH))
     observations = [observed(k) for k in range(MIN_BATCH)]
     generate_paths_together(ours, observations)
@@ -149,7 +153,7 @@ def test_whoever_is_elsewhere_or_has_other_options_flies_alone(single: list[Step
         assert mine == Algorithm1(planner.params, planner.seed).plan(obs)
 
 
-def test_a_swarm_that_lives_on_is_not_flown_for_its_planner(single: list[StepInput]) -> None:
+def test_persistent_swarms_are_not_batched(single: list[StepInput]) -> None:
     params = PlannerParams(swarm=Swarm.PERSISTENT)
     ours, theirs = planners(range(MIN_BATCH), params), planners(range(MIN_BATCH), params)
     observations = [observed(k) for k in range(MIN_BATCH)]
