@@ -21,7 +21,13 @@ from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
 from .mode_transitions import Event
 from .planner_params import PlannerParams
-from .trajectory_cost import Candidate, RiskParams, TrajectoryCost, from_sectors, moved
+from .trajectory_cost import (
+    Candidate,
+    RiskParams,
+    TrajectoryCost,
+    circles_from_sectors,
+    predicted_circles,
+)
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
@@ -178,12 +184,12 @@ class Predictive(BasePlanner):
         if obs.circles is not None:
             reach_m = self.sensor.sensing_range_m
             known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
-            return moved(known, (obs.stamp_ns - stamp_ns) * NANO)
+            return predicted_circles(known, (obs.stamp_ns - stamp_ns) * NANO)
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
             radius_m = self.params.scan_radius_m or self.options.robot_radius_m
             return self._tracker.circles(obs.stamp_ns, radius_m)
-        return from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
+        return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
     def _nearest_free(self, closed: Bits, to_goal: Point) -> list[int]:
         """The free headings nearest to the goal's on both sides; every sixth if none is free."""

@@ -243,7 +243,7 @@ class TrajectoryCost:
         return worst
 
 
-def moved(circles: Sequence[Circle], dt: float) -> Sequence[Circle]:
+def predicted_circles(circles: Sequence[Circle], dt: float) -> Sequence[Circle]:
     """The circles dt seconds later, at constant velocity."""
     if dt == 0.0:
         return circles
@@ -254,7 +254,7 @@ def moved(circles: Sequence[Circle], dt: float) -> Sequence[Circle]:
     ]
 
 
-def from_sectors(position: Point, ranges_m: Ranges, radius_m: float) -> list[Circle]:
+def circles_from_sectors(position: Point, ranges_m: Ranges, radius_m: float) -> list[Circle]:
     """A circle at rest for every set sector, its edge at the range along the sector's middle."""
     width = 2.0 * math.pi / max(len(ranges_m), 1)
     return [

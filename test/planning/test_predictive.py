@@ -17,7 +17,12 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
 from mfba_planner.planning.predictive import Predictive, PredictiveParams, preset
-from mfba_planner.planning.trajectory_cost import RiskParams, TrajectoryCost, from_sectors, moved
+from mfba_planner.planning.trajectory_cost import (
+    RiskParams,
+    TrajectoryCost,
+    circles_from_sectors,
+    predicted_circles,
+)
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
@@ -211,13 +216,15 @@ def test_without_circles_and_scan_the_sectors_are_used() -> None:
         run(scenario, planner=PARAMS, path_planner=planner(), observe=Perception("sectors"))
     )
     assert result.success
-    (circle,) = from_sectors((1.0, 1.0), (math.inf, 0.5, math.inf, math.inf), 0.3)
+    (circle,) = circles_from_sectors((1.0, 1.0), (math.inf, 0.5, math.inf, math.inf), 0.3)
     s = 0.8 / math.sqrt(2.0)
     assert circle.center_m == pytest.approx((1.0 - s, 1.0 + s))
 
 
 def test_late_circles_are_predicted() -> None:
-    (circle,) = moved([Circle(center_m=(1.0, 1.0), radius_m=0.6, velocity_mps=(0.2, -0.1))], 0.5)
+    (circle,) = predicted_circles(
+        [Circle(center_m=(1.0, 1.0), radius_m=0.6, velocity_mps=(0.2, -0.1))], 0.5
+    )
     assert circle.center_m == pytest.approx((1.1, 0.95))
 
 
