@@ -24,7 +24,7 @@ from mfba_planner.paper.study.run import Sample
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report import style
-from mfba_planner.report.figure_canvas import to_bytes
+from mfba_planner.report.figure_sheet import to_bytes
 from mfba_planner.report.figures.sensitivity import draw
 from mfba_planner.report.sensitivity_table import to_csv, to_markdown, to_table
 from mfba_planner.scenarios.scenario_files import load_scenario
@@ -84,11 +84,11 @@ def test_section6_runs_as_without_the_study() -> None:
 @pytest.mark.parametrize("angle", [math.pi / 12.0, -1.0])
 def test_turning_the_world_turns_the_sectors_back(angle: float) -> None:
     world = replace(SCENARIOS["case2"], start_m=(0.5, -1.0))
-    there = turned(world, angle)
+    turned_world = turned(world, angle)
     for t in (0.0, 7.0):
-        for a, b in zip(world.centers(t), there.centers(t)):
-            assert distance(world.start_m, a) == pytest.approx(distance(there.start_m, b))
-    assert distance(there.start_m, there.goal_m) == pytest.approx(
+        for a, b in zip(world.centers(t), turned_world.centers(t)):
+            assert distance(world.start_m, a) == pytest.approx(distance(turned_world.start_m, b))
+    assert distance(turned_world.start_m, turned_world.goal_m) == pytest.approx(
         distance(world.start_m, world.goal_m)
     )
     width = math.pi / 6.0
@@ -112,7 +112,7 @@ def test_a_robot_unaware_of_its_size_touches_what_it_does_not_see() -> None:
 # --- what is judged -------------------------------------------------------------------------
 
 
-def samples(length: Mapping[str, float], told: float = 1.0, hit: float = 0.0) -> dict[str, Sample]:
+def samples(length: Mapping[str, float], text: float = 1.0, hit: float = 0.0) -> dict[str, Sample]:
     """Made-up samples: every run of a case as long as that, give or take 5 mm."""
     found: dict[str, Sample] = {}
     for r in sensitivity.all_readings(quick=True):
@@ -122,7 +122,7 @@ def samples(length: Mapping[str, float], told: float = 1.0, hit: float = 0.0) ->
                 "length_m": length[case] + spread,
                 "collisions": np.full(41, hit),
                 "reached": np.ones(41),
-                "told": np.full(41, told),
+                "told": np.full(41, text),
             }
     return found
 
@@ -146,7 +146,7 @@ def row(
         intervals=tuple(Interval(m, m - 0.01, m + 0.01) for m in middles),
         contacts=contacts,
         reached=reached,
-        told=0.4,
+        as_figure=0.4,
     )
 
 
@@ -162,7 +162,7 @@ def test_a_row_is_reproduced_when_all_of_it_lies_within() -> None:
 
 
 def test_shares_and_intervals_come_from_the_samples() -> None:
-    rows = sensitivity.rows(samples({"case1": 17.0, "case2": 18.0}, told=1.0, hit=2.0), True)
+    rows = sensitivity.rows(samples({"case1": 17.0, "case2": 18.0}, text=1.0, hit=2.0), True)
     assert [r.case for r in rows[:2]] == list(CASES)
     for r in rows:
         length = 17.0 if r.case == "case1" else 18.0
@@ -170,7 +170,7 @@ def test_shares_and_intervals_come_from_the_samples() -> None:
         assert length - 0.005 <= best.low <= best.middle < mean.middle < worst.middle
         assert worst.high <= length + 0.005
         assert mean.middle == pytest.approx(length, abs=0.001)
-        assert (r.contacts, r.reached, r.told, r.as_told) == (1.0, 1.0, 1.0, True)
+        assert (r.contacts, r.reached, r.as_figure, r.mostly_as_figure) == (1.0, 1.0, 1.0, True)
 
 
 def test_csv_table_and_picture_tell_the_same_rows() -> None:
@@ -223,8 +223,8 @@ def test_the_command_goes_on_where_it_was(
     out = tmp_path / "s"
     args = ["sensitivity", "--quick", "--workers", "1", "--out", str(out)]
     assert cli.main(args) == 0
-    told = capsys.readouterr().out
-    assert "turned by half a sector" in told
+    text = capsys.readouterr().out
+    assert "turned by half a sector" in text
     names = {"sensitivity.csv", "sensitivity.md", "sensitivity.png", "sensitivity.svg"}
     before = {name: (out / name).read_bytes() for name in names}
     (out / "sensitivity.csv").unlink()

@@ -49,9 +49,9 @@ def test_a_run_of_the_study_is_a_run_of_the_single_engine() -> None:
         params = replace(SWARM, algorithm=algorithm)
         key = (BENCHMARK_STREAM, 4, int.from_bytes(algorithm.value.encode(), "big"))
         rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(17, spawn_key=key)))
-        alone = minimize(FUNCTIONS["F4"], FUNCTIONS["F4"].box(2), params, rng).best_value
+        single = minimize(FUNCTIONS["F4"], FUNCTIONS["F4"].box(2), params, rng).best_value
         work = Benchmark(function="F4", bat=params)
-        assert work.run([16, 17])["best"][1] == alone
+        assert work.run([16, 17])["best"][1] == single
 
 
 def test_laws_functions_and_seeds_have_streams_of_their_own() -> None:
@@ -119,11 +119,11 @@ def test_an_interrupted_study_goes_on_and_gives_the_same(
     plan = a_plan()
     whole = plain(run_plan(plan))
     computed = counted(monkeypatch)
-    seen: list[SampleChunk] = []
+    finished: list[SampleChunk] = []
 
     def interrupt(chunk: SampleChunk) -> None:
-        seen.append(chunk)
-        if len(seen) == 2:
+        finished.append(chunk)
+        if len(finished) == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -139,10 +139,10 @@ def test_every_tick_shows_what_the_bag_holds(
 ) -> None:
     browser.open(single)
     gaps = clearances(episode)
-    seen = set()
+    modes = set()
     for k, decision in enumerate(episode.ticks):
         scrub(browser, k)
-        seen.add(decision.mode)
+        modes.add(decision.mode)
         assert field(browser, "tick") == f"{k} of {len(episode.ticks) - 1}"
         assert field(browser, "mode") == format_values.MODES[decision.mode]
         assert field(browser, "reason") == decision.reason
@@ -153,7 +153,7 @@ def test_every_tick_shows_what_the_bag_holds(
         assert field(browser, "time") == f"{episode.time_s(decision.stamp_ns):.3f} s"
         last = k == len(episode.ticks) - 1
         assert field(browser, "clearance") == ("–" if last else f"{gaps[k]:.3f} m")
-    assert {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE, Mode.ARRIVED} <= seen
+    assert {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE, Mode.ARRIVED} <= modes
     assert min(gaps) == evaluate(episode).min_clearance_m
 
 
@@ -268,7 +268,7 @@ def test_it_plays_and_pauses(browser: Browser, single: Path) -> None:
     assert field(browser, "mode") == "arrived"
 
 
-PLACES = """
+POSITIONS = """
 const done = arguments[0];
 const places = [];
 const robot = document.querySelector(".scene .robot");
@@ -288,10 +288,10 @@ def test_between_ticks_things_move_unless_unwanted(
 ) -> None:
     browser.open(single, calm=calm)
     scrub(browser, len(episode.ticks) - 4)
-    places = {(x, y) for x, y in browser.driver.execute_async_script(PLACES)}
+    positions = {(x, y) for x, y in browser.driver.execute_async_script(POSITIONS)}
     at_ticks = {(t.pose.x, -t.pose.y) for t in episode.ticks}
-    assert (places <= at_ticks) == calm
-    assert len(places) >= 4
+    assert (positions <= at_ticks) == calm
+    assert len(positions) >= 4
 
 
 def test_it_is_driven_by_keyboard(browser: Browser, single: Path, episode: Episode) -> None:
@@ -319,8 +319,10 @@ def test_it_is_driven_by_keyboard(browser: Browser, single: Path, episode: Episo
     browser.run("document.getElementById('time').focus()")
     press(browser, Keys.ARROW_LEFT)
     assert tick(browser) == held
-    heard = browser.run("return document.getElementById('time').getAttribute('aria-valuetext')")
-    assert heard.endswith(episode.ticks[held].reason)
+    announced = browser.run(
+        "return document.getElementById('time').getAttribute('aria-valuetext')"
+    )
+    assert announced.endswith(episode.ticks[held].reason)
 
 
 def test_every_control_has_a_name_and_can_be_focused(browser: Browser, single: Path) -> None:
@@ -494,7 +496,7 @@ def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
     assert browser.said() == []
     heading = browser.run("return document.querySelector('h1').textContent")
     assert heading == "swap"
-    assert in_sight(browser) == ["1"]
+    assert shown_cards(browser) == ["1"]
     assert browser.run("return document.getElementById('robot').value") == "0"
     first = min(range(8), key=lambda number: len(runs[number][1].ticks))
     longest = max((episode for _, episode in runs), key=lambda episode: len(episode.ticks))
@@ -504,17 +506,17 @@ def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
         "list.dispatchEvent(new Event('change'))",
         first,
     )
-    assert in_sight(browser) == [str(first + 1)]
+    assert shown_cards(browser) == [str(first + 1)]
     assert lit_lines(browser) == {f"line-{first + 1}"}
     # It has arrived, and the last of the others has not: each is where it is at that time.
     scrub(browser, len(longest.ticks) - 2)
     assert tick(browser, first + 1) == len(runs[first][1].ticks) - 1
-    place = f'.card[data-run="{first + 1}"] .other[data-name="{{}}"]'
+    selector = f'.card[data-run="{first + 1}"] .other[data-name="{{}}"]'
     for name, episode in runs:
         if name != names[first]:
             moved = browser.run(
                 "return document.querySelector(arguments[0]).getAttribute('transform')",
-                place.format(name),
+                selector.format(name),
             )
             x, y = map(float, re.findall(r"-?[\d.]+(?:e-?\d+)?", moved))
             at = episode.ticks[min(len(longest.ticks) - 2, len(episode.ticks) - 1)].pose
@@ -524,9 +526,9 @@ def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
     browser.run(
         "document.querySelector(arguments[0]).querySelector('.body').dispatchEvent("
         "new MouseEvent('click', {bubbles: true}))",
-        place.format(names[other]),
+        selector.format(names[other]),
     )
-    assert in_sight(browser) == [str(other + 1)]
+    assert shown_cards(browser) == [str(other + 1)]
     assert browser.run("return document.getElementById('robot').value") == str(other)
     last = runs[other][1].ticks[min(len(longest.ticks) - 2, len(runs[other][1].ticks) - 1)]
     assert field(browser, "reason", other + 1) == last.reason
@@ -540,7 +542,7 @@ def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
     assert browser.said() == []
 
 
-def in_sight(browser: Browser) -> list[str]:
+def shown_cards(browser: Browser) -> list[str]:
     """The numbers of the cards that are shown."""
     return list(
         browser.run(

@@ -21,7 +21,7 @@ from mfba_planner.paper import convergence, published
 from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.planning.gap_vector import gap_vector
 from mfba_planner.report import style
-from mfba_planner.report.figure_canvas import Sheet, to_bytes
+from mfba_planner.report.figure_sheet import Sheet, to_bytes
 from mfba_planner.report.figures import (
     beta,
     enlargement,
@@ -104,9 +104,9 @@ def test_fig_5_and_6_are_the_papers_example() -> None:
     assert " ".join(map(str, gap_vector(bits))) == published.EXAMPLE_VG
     centers = [obstacle.center_m for obstacle in sketch.EXAMPLE.obstacles]
     assert all(distance(a, b) >= 0.6 for i, a in enumerate(centers) for b in centers[:i])
-    told = [text.get_text() for text in figure_of("fig5").texts]
+    texts = [text.get_text() for text in figure_of("fig5").texts]
     for words in ("S1, S2", "none: out of range", "S7, S8", "S8, S9"):
-        assert words in told
+        assert words in texts
 
 
 def test_fig_6_takes_the_gap_nearest_to_the_goal() -> None:
@@ -125,7 +125,8 @@ def test_the_runs_of_fig_7_and_8_have_the_printed_lengths(name: str) -> None:
 
 def test_the_moments_are_those_of_the_papers_captions() -> None:
     words = {
-        name: [s.caption for s in trips.scenes(paper_figures.figure_run(name))] for name in TRIPS
+        name: [s.caption for s in trips.snapshots(paper_figures.figure_run(name))]
+        for name in TRIPS
     }
     assert words == {
         "fig7": [
@@ -147,7 +148,7 @@ def test_the_moments_are_those_of_the_papers_captions() -> None:
 @pytest.mark.parametrize("name", TRIPS)
 def test_the_moments_are_what_they_are_called(name: str) -> None:
     episode = paper_figures.figure_run(name)
-    for scene in trips.scenes(episode):
+    for scene in trips.snapshots(episode):
         tick = episode.ticks[scene.index]
         near = within_range(episode, tick)
         named = tuple(int(word) for word in scene.caption.split() if word.isdigit())
@@ -159,7 +160,7 @@ def test_a_run_that_avoids_nothing_has_no_such_figure() -> None:
     episode = paper_figures.figure_run("fig7")
     free = replace(episode, ticks=episode.ticks[:3])
     with pytest.raises(InputError, match="avoids no obstacle"):
-        trips.scenes(free)
+        trips.snapshots(free)
 
 
 def test_convergence_is_quantiles_that_only_fall() -> None:

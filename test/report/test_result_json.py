@@ -143,11 +143,11 @@ def test_a_file_that_appears_while_writing_is_not_overwritten(
     ],
 )
 def test_where_nothing_can_be_written_one_line_says_why(
-    place: str, reason: str, tmp_path: Path
+    path: str, reason: str, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match=reason) as caught:
-        write_new(tmp_path / place, b"data")
+        write_new(tmp_path / path, b"data")
     assert len(str(caught.value).splitlines()) == 1
     assert os.listdir(tmp_path) == ["file"]
 

@@ -288,9 +288,9 @@ def test_a_long_run_between_walls_shows_a_part_of_the_tracks_and_says_so() -> No
         walls=Walls(lower_m=(-1.0, -1.0), upper_m=(13.0, 13.0)),
     )
     figure = draw(replace(episode_of("one_tick"), scenario=scenario, ticks=(ticks[0], late)))
-    (part,) = artists(figure, "part")
+    (track,) = artists(figure, "part")
     assert not artists(figure, "track")
-    assert len(part.get_xydata()) < 10
+    assert len(track.get_xydata()) < 10
     assert "obstacle's track near closest pass" in legend_labels(figure)
 
 
