@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from project import ROOT
 
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
 from mfba_planner.core.geometry import Pose2D
@@ -19,7 +20,7 @@ from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.readings import PLANNERS
 from mfba_planner.paper.study.chunk import BENCHMARK_STREAM, Benchmark, SampleChunk, Trips, chunks
 from mfba_planner.paper.study.plan import FULL, QUICK, benchmark_plan, trip_plan
-from mfba_planner.paper.study.run import open_store, run_plan
+from mfba_planner.paper.study.run import PACKAGES, open_store, run_plan
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
@@ -189,6 +190,11 @@ def test_results_of_anything_else_are_refused(
     assert "cut short or not JSON; give another --out" in refusal(out, plan, {"seed": 3})
     (out / storing.MANIFEST).write_text("[]")
     assert "cut short or not JSON" in refusal(out, plan, {"seed": 3})
+
+
+def test_the_code_that_decides_the_numbers_is_in_folders_that_exist() -> None:
+    for name in PACKAGES:
+        assert list((ROOT / "mfba_planner" / name).rglob("*.py")), name
 
 
 def test_directories_of_other_files_are_left_unchanged(tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from ...evaluation.study.chunk_store import Store
 from ...evaluation.study.compute_chunks import compute
 from .chunk import SampleChunk
 
-PACKAGES = ("core", "paper")  # their code decides the numbers
+# The numbers depend on the code in these folders of mfba_planner.
+PACKAGES = ("core", "swarm", "perception", "planning", "simulation", "evaluation", "paper")
 Sample = Mapping[str, NDArray[np.float64]]
 
 
