@@ -28,22 +28,22 @@ VERSUS_HEAD = (
 VERSUS_NOTE = "the same worlds with the same seeds; gaps where both succeeded, negative: shorter"
 
 
-def tables(standings: Sequence[Standing], versus: Sequence[Versus], title: str) -> list[Table]:
+def tables(summaries: Sequence[Standing], versus: Sequence[Versus], title: str) -> list[Table]:
     """Tables for a terminal."""
-    found = [_table(title, HEAD, _standing_lines(standings), NOTE)]
+    found = [_table(title, HEAD, _summary_lines(summaries), NOTE)]
     if versus:
         found.append(_table("In pairs", VERSUS_HEAD, _versus_lines(versus), VERSUS_NOTE))
     return found
 
 
 def to_markdown(
-    standings: Sequence[Standing], versus: Sequence[Versus], title: str, facts: Sequence[str]
+    summaries: Sequence[Standing], versus: Sequence[Versus], title: str, facts: Sequence[str]
 ) -> str:
     """The same as a Markdown page; facts: lines about how the sweep was made."""
     blocks = [f"# {title}", "\n".join(f"- {fact}" for fact in facts)]
-    blocks += [standing_table(standings), NOTE + "."]
+    blocks += [standing_table(summaries), NOTE + "."]
     failures = [
-        f"- {s.planner}: {count} x {reason}" for s in standings for reason, count in s.failures
+        f"- {s.planner}: {count} x {reason}" for s in summaries for reason, count in s.failures
     ]
     if failures:
         blocks += ["## Failures of planners", "\n".join(failures)]
@@ -52,9 +52,9 @@ def to_markdown(
     return "\n\n".join(blocks) + "\n"
 
 
-def standing_table(standings: Sequence[Standing]) -> str:
+def standing_table(summaries: Sequence[Standing]) -> str:
     """One line per planner, as Markdown."""
-    return markdown(HEAD, _standing_lines(standings))
+    return markdown(HEAD, _summary_lines(summaries))
 
 
 def versus_table(versus: Sequence[Versus]) -> str:
@@ -62,8 +62,8 @@ def versus_table(versus: Sequence[Versus]) -> str:
     return markdown(VERSUS_HEAD, _versus_lines(versus))
 
 
-def _standing_lines(standings: Sequence[Standing]) -> Iterator[list[str]]:
-    for s in standings:
+def _summary_lines(summaries: Sequence[Standing]) -> Iterator[list[str]]:
+    for s in summaries:
         yield [
             s.planner,
             str(s.runs),

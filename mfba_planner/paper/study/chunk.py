@@ -20,9 +20,7 @@ from ..functions import FUNCTIONS
 
 Columns = dict[str, list[float]]
 
-BENCHMARK_STREAM = (
-    2  # spawn key of these runs' SeedSequence children, different from the planner's
-)
+BENCHMARK_STREAM = 2  # spawn key of these runs' SeedSequence children; the planner has others
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,7 +35,7 @@ def run_plan(
 ) -> dict[str, Sample]:
     """Compute (or read back) every chunk; {sample: {column: values by seed}}.
 
-    done, say and the errors raised are those of evaluation.study.compute_chunks.compute.
+    The callbacks and the errors raised are those of evaluation.study.compute_chunks.compute.
     """
     return samples(plan, compute(plan, workers=workers, store=store, done=done, say=say))
 
