@@ -20,7 +20,7 @@ from mfba_planner.evaluation.sweep.explain_run import contact_index, explain
 from mfba_planner.evaluation.sweep.single_run import run_one
 from mfba_planner.evaluation.sweep.sweep_spec import Run
 from mfba_planner.report import style
-from mfba_planner.report.figure_canvas import EDGE, Sheet, to_bytes
+from mfba_planner.report.figure_sheet import EDGE, Sheet, to_bytes
 from mfba_planner.report.run_figure import run_figure
 from mfba_planner.report.tick_figure import moment_png
 

@@ -43,7 +43,7 @@ def main(args: list[str]) -> int:
 def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
     """CSV, Markdown and heat-map; what is there already must be the same."""
     from ..report import style
-    from ..report.figure_canvas import to_bytes
+    from ..report.figure_sheet import to_bytes
     from ..report.figures.sensitivity import draw
     from ..report.sensitivity_table import to_csv, to_markdown
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far from the minimum the best bat still is after each iteration, over many runs."""
+"""Convergence on F1-F6: best value minus minimum after each iteration, over many runs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ QUANTILES = (0.1, 0.5, 0.9)
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Quantiles of best value - minimum, (3, T + 1); row by row those of QUANTILES."""
+    """Best value minus minimum, shape (3, T + 1): one row for each of QUANTILES."""
 
     function: str
     algorithm: Algorithm
@@ -28,7 +28,7 @@ class Curve:
 
 
 def curves(function: str, seeds: Sequence[int] = range(RUNS)) -> list[Curve]:
-    """One curve per frequency law; the runs are those of Table 3 with the same seeds."""
+    """One curve per frequency law; the runs equal those of Table 3 with the same seeds."""
     found = []
     for algorithm in Algorithm:
         bat = replace(SWARM_READINGS[READING], algorithm=algorithm)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which printed numbers cannot be, each with the reason computed from the printed numbers."""
+"""Printed numbers that are impossible, with the reason computed from other printed numbers."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ SMALLEST_FIGURE = 1e-4  # a best of F6 below the minimum by less than this may b
 
 
 def largest_sd(n: int, low: float, high: float, mean: float) -> float:
-    """Largest sample SD of n values in [low, high] with that mean.
+    """Largest sample SD of n values in [low, high] with this mean.
 
-    The sum of squares is convex, so all values but one lie at an end of the interval.
+    The sum of squares is convex, so all values but one are at an end of the interval.
     """
     at_high, rest = divmod((mean - low) * n, high - low)
     squares = at_high * (high - mean) ** 2 + (low + rest - mean) ** 2
@@ -23,9 +23,9 @@ def largest_sd(n: int, low: float, high: float, mean: float) -> float:
 
 
 def smallest_sd(n: int, low: float, high: float, mean: float) -> float:
-    """Smallest population SD of n values with that minimum, maximum and mean.
+    """Smallest population SD of n values with this minimum, maximum and mean.
 
-    Two values are the ends; the other n - 2 are equal.
+    Two values are minimum and maximum; the other n - 2 are equal.
     """
     rest = (n * mean - low - high) / (n - 2)
     squares = (low - mean) ** 2 + (high - mean) ** 2 + (n - 2) * (rest - mean) ** 2
@@ -33,7 +33,7 @@ def smallest_sd(n: int, low: float, high: float, mean: float) -> float:
 
 
 def _spread(n: int, low: float, high: float, mean: float, sd: float) -> str:
-    """Why that SD cannot be, "" when it can, whichever of n and n - 1 it was divided by."""
+    """Why this SD is impossible, whether divided by n or n - 1; "" if it is possible."""
     largest, smallest = largest_sd(n, low, high, mean), smallest_sd(n, low, high, mean)
     if sd > largest:
         return (
@@ -67,9 +67,9 @@ def _benchmark() -> dict[str, str]:
 
 def _trips() -> dict[str, str]:
     found = {}
-    for place in published.TRIPS:
+    for table in published.TRIPS:
         for row in ("BA", "MFBA"):
-            v = published.values(place, row)
+            v = published.values(table, row)
             doubt = _spread(
                 published.TRIP_RUNS,
                 v["minimum"],
@@ -78,12 +78,12 @@ def _trips() -> dict[str, str]:
                 v["standard deviation"],
             )
             if doubt:
-                found[f"{place}/{row}/standard deviation"] = doubt
+                found[f"{table}/{row}/standard deviation"] = doubt
     return found
 
 
 def _text() -> dict[str, str]:
-    """The text's best lengths against the reciprocals of the tables' largest fitness."""
+    """Compare the best lengths in the text with 1 / the largest fitness in the tables."""
     found = {}
     for case, table in (("case 1", "Table 5"), ("case 2", "Table 7")):
         for row in ("BA", "MFBA"):
@@ -102,6 +102,6 @@ def _text() -> dict[str, str]:
     return found
 
 
-# What cannot be, whatever was run; and what merely contradicts another printed number.
+# {key of a printed number: reason}: impossible for any run; contradicts another printed number.
 IMPOSSIBLE: dict[str, str] = {**_benchmark(), **_trips()}
 CONTRADICTED: dict[str, str] = _text()

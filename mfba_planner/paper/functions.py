@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""F1-F6 of Table 2: formulas, search ranges, minima and where they lie."""
+"""The benchmark functions F1-F6 of Table 2: formulas, search ranges, minima and minimizers."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ STEEPNESS = 10  # m of Table 2
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A row of Table 2; kind is U (unimodal) or M (multimodal), dimension None is any d >= 1.
+    """A row of Table 2; kind: U (unimodal) or M (multimodal); dimension None: any d >= 1.
 
-    One formula serves floats (module math) and arrays (module numpy); it multiplies instead of
-    calling pow, so that only sin, cos and exp can differ between the two, in the last bit.
+    terms(x, m) is the formula for floats (m = math) and for arrays (m = numpy). It multiplies
+    instead of calling pow, so the two differ only in the last bit of sin, cos and exp.
     """
 
     key: str
@@ -53,7 +53,7 @@ class Function:
         return Box((self.lower,) * d, (self.upper,) * d)
 
     def minimizers(self, d: int = 2) -> tuple[Point, ...]:
-        """Every point of the search range where the minimum is reached."""
+        """All points of the search range with the minimum value."""
         self._check(d)
         return self.positions(d)
 
@@ -69,7 +69,7 @@ class Function:
 
 
 def _total(terms: Iterable[Any]) -> Any:
-    """Plain left-to-right sum: since Python 3.12 sum() compensates floats, but not arrays."""
+    """Sum from left to right: since Python 3.12 sum() compensates floats, but not arrays."""
     total: Any = 0.0
     for term in terms:
         total = total + term
@@ -105,7 +105,7 @@ def _michalewicz(x: Coordinates, m: Any) -> Any:
 
 
 def _ridge(i: int, v: Any, m: Any) -> Any:
-    """Term i of F6, sin(v) sin^(2 m)(i v^2 / pi), by repeated squares."""
+    """Term i of F6, sin(v) sin^(2 m)(i v^2 / pi), by repeated squaring."""
     power, factor, left = 1.0, m.sin(i * (v * v) / math.pi), 2 * STEEPNESS
     while left:
         if left % 2:
@@ -115,25 +115,25 @@ def _ridge(i: int, v: Any, m: Any) -> Any:
 
 
 @cache
-def _crest(i: int) -> float:
-    """Where term i of F6 is greatest in [0, pi]: one crest near each sin(i v^2 / pi) = 1 or -1."""
+def _maximizer(i: int) -> float:
+    """Maximizer of term i of F6 in [0, pi]; a local one is near each sin(i v^2 / pi) = 1 or -1."""
     return max(
-        (_climb(i, math.pi * math.sqrt((k + 0.5) / i)) for k in range(i)),
+        (_refine(i, math.pi * math.sqrt((k + 0.5) / i)) for k in range(i)),
         key=lambda v: _ridge(i, v, math),
     )
 
 
-def _climb(i: int, v: float) -> float:
-    """Newton's method on the slope of log(sin v) + 2 m log |sin(i v^2 / pi)|."""
+def _refine(i: int, v: float) -> float:
+    """Newton's method on the slope of log(sin v) + 2 m log |sin(i v^2 / pi)|, starting from v."""
     for _ in range(50):
-        w, turn = i * v * v / math.pi, 2.0 * i * v / math.pi
-        slope = 1.0 / math.tan(v) + 2 * STEEPNESS * turn / math.tan(w)
-        bend = (
+        w, dw = i * v * v / math.pi, 2.0 * i * v / math.pi
+        slope = 1.0 / math.tan(v) + 2 * STEEPNESS * dw / math.tan(w)
+        curvature = (
             -1.0 / math.sin(v) ** 2
             + 2 * STEEPNESS * (2.0 * i / math.pi) / math.tan(w)
-            - 2 * STEEPNESS * (turn / math.sin(w)) ** 2
+            - 2 * STEEPNESS * (dw / math.sin(w)) ** 2
         )
-        v -= slope / bend
+        v -= slope / curvature
     return v
 
 
@@ -141,8 +141,8 @@ def _origin(d: int) -> tuple[Point, ...]:
     return ((0.0,) * d,)
 
 
-def _crests(d: int) -> tuple[Point, ...]:
-    return (tuple(_crest(i) for i in range(1, d + 1)),)
+def _maximizers(d: int) -> tuple[Point, ...]:
+    return (tuple(_maximizer(i) for i in range(1, d + 1)),)
 
 
 _ROWS = (
@@ -191,7 +191,7 @@ _ROWS = (
         0.0,
         math.pi,
         _michalewicz,
-        _crests,
+        _maximizers,
     ),
 )
 FUNCTIONS: dict[str, Function] = {row.key: row for row in _ROWS}

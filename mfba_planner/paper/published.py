@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every number that the paper prints, verbatim: data to be judged, not targets to be hit."""
+"""All numbers that the paper prints, verbatim: data to compare with, not targets to fit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Printed:
-    """A number as printed: where it stands, its text, and the float that it means (or None)."""
+    """A printed number: place (table or section), row, column, text, and its value (or None)."""
 
     place: str
     row: str
@@ -20,7 +20,7 @@ class Printed:
 
     @property
     def key(self) -> str:
-        """Name of the number, unique in the paper: `Table 5/MFBA/mean`."""
+        """Unique name of the number: `Table 5/MFBA/mean`."""
         return f"{self.place}/{self.row}/{self.column}"
 
 
@@ -90,7 +90,7 @@ _OBSTACLES = {
 """,
 }
 
-# What the text says of the best of ten runs, and of the straight line.
+# The text on the best of ten runs, and on the straight line.
 _TEXT = """
 Section 6.2         | optimum     | length     | 16.9705
 Section 6.2, case 1 | MFBA        | length     | 17.0925
@@ -107,7 +107,7 @@ Section 6.2, case 2 | BA          | run time   | 9.10554
 Section 6.2, case 2 | BA          | experiment | 8
 """
 
-# The constants that the paper does give; `ours` of each is a field of the presets.
+# The constants that the paper states.
 _CONSTANTS = """
 Section 2   | eq. 2             | epsilon       | 0.001
 Section 3.2 | eq. 10            | rho           | 0.01

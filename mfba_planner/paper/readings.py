@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Named readings of what the paper leaves open: of the swarm, and of the path planning."""
+"""Presets for what the paper leaves open (named readings): of the swarm and of the planner."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ T = TypeVar("T")
 
 DEFAULT_METHOD = "section6"  # of the path planning
 
-# The paper says what the swarm does in words; `robust` is the core's default.
+# Readings of eq. 3-10; `robust` is the default of BatParams.
 SWARMS: dict[str, BatParams] = {
     "robust": BatParams(),
-    # Comes nearest to the printed Table 3: bats may leave the box, raw t tamed by rho = 3.
+    # Nearest to the printed Table 3: bats may leave the box, and rho = 3 limits the raw t.
     "table3": BatParams(
         population=50,
         iterations=200,
@@ -27,16 +27,16 @@ SWARMS: dict[str, BatParams] = {
         bounds=Bounds.NONE,
         epsilon=Epsilon.SCALAR,
     ),
-    # Every equation as printed, slips included.
+    # Every equation as printed, misprints included.
     "literal": BatParams(
         schedule=Schedule.RAW,
         bounds=Bounds.NONE,
         velocity=Velocity.AS_PRINTED,
         initial=Initial.AS_PRINTED,
     ),
-    # Not the paper's: found by bench/find_best.py on functions other than F1-F6. A bat flies a
-    # little towards the best, keeps some of its velocity, and nearly always steps as far as two
-    # other bats are apart: long while the swarm is spread, short when it has gathered.
+    # Not from the paper: found by bench/find_best.py on functions other than F1-F6. A bat keeps
+    # part of its velocity, moves a little towards the best, and nearly always makes a local step
+    # as long as the distance of two other bats: long in a wide swarm, short in a narrow one.
     "best": BatParams(
         population=40,
         iterations=200,
@@ -52,19 +52,19 @@ SWARMS: dict[str, BatParams] = {
     ),
 }
 
-# Speed (0.785 m/s), step (0.3 or 0.1 m) and iterations per step (5 or 1) are not in the paper:
-# they were fitted. Over 1000 seeds without a collision, the 95 % interval of ten-run best, mean
-# and worst length then holds Tables 5 and 7: their MFBA columns with `section6`, their BA
-# columns with `fig1`; no reading found gives both columns.
+# Speed (0.785 m/s), step (0.3 or 0.1 m) and iterations per step (5 or 1) are not in the paper but
+# fitted. With them 1000 seeds have no collision, and the 95 % intervals of best, mean and worst
+# length of ten runs contain Tables 5 and 7: the MFBA columns with `section6`, the BA columns with
+# `fig1`. No reading was found that gives both columns.
 PLANNERS: dict[str, PlannerParams] = {
     "section6": PlannerParams(),
-    # Fig. 1 literally: one swarm for the trip, one bat iteration per robot step.
+    # Fig. 1 as drawn: one swarm for the whole trip, one bat iteration per robot step.
     "fig1": PlannerParams(step_length_m=0.1, swarm=Swarm.PERSISTENT, bat=BatParams(iterations=1)),
 }
 
-# (scenario, seed): runs of `section6` that show what Fig. 7 and 8 tell, found among 1000 seeds.
-# Obstacle 1 alone comes within SR (334 seeds): this run's length, 17.0925 m, is the printed one.
-# Obstacles 1, 1 and 2 together, 2, later 5 (221 seeds): 18.3522 m, printed 18.3533 m.
+# (scenario, seed): runs of `section6` with the encounters of Fig. 7 and 8, among 1000 seeds.
+# Fig. 7: only obstacle 1 comes within SR (334 seeds); this run's length, 17.0925 m, is printed.
+# Fig. 8: obstacles 1, 1 and 2, 2, later 5 (221 seeds); this run has 18.3522 m, printed 18.3533 m.
 FIGURE_RUNS = {"fig7": ("case1", 21), "fig8": ("case2", 891)}
 
 

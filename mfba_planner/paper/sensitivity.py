@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How path lengths depend on what section 6.2 does not say: readings, one change at a time."""
+"""Sensitivity study: path lengths for readings of section 6.2 that change one thing at a time."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ GROUPS = (
     "preset", "robot speed", "step", "iterations", "all three", "SR measured", "sectors",
     "gap heading", "frequency",
 )  # fmt: skip
-TOLD = {"case1": "only obstacle 1", "case2": "obstacles 1, then 2"}  # Fig. 7 and 8
+ENCOUNTERS = {"case1": "only obstacle 1", "case2": "obstacles 1, then 2"}  # Fig. 7 and 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """One way to read section 6.2; its difference to `section6` has a group and a label.
+    """A reading of section 6.2; group and label name its difference to `section6`.
 
-    sectors_rad turns sector 1's beginning away from +x; a robot that is unaware of its own
-    radius does not enlarge the obstacles (contacts are counted with the radius all the same).
+    sectors_rad: angle from +x to the start of sector 1. enlarged False: the obstacles are not
+    enlarged by the robot's radius; contacts are counted with the radius all the same.
     """
 
     group: str
@@ -53,17 +53,17 @@ class Reading:
 
     @property
     def name(self) -> str:
-        """Unique, and fit for a file."""
+        """Unique name, usable as a file name."""
         text = f"{self.group} {self.label}"
         return "".join(c if c.isalnum() or c in ".-" else "_" for c in text)
 
 
 def all_readings(quick: bool = False) -> list[Reading]:
-    """`section6`, what differs from it in one thing, other sets that fit, `fig1`."""
+    """`section6`, readings with one difference to it, other sets that fit, and `fig1`."""
     base = readings.planner("section6")
     found = [Reading(group="preset", label="section6", planner=base)]
-    for group, label, changes, brief in _changes():
-        if brief or not quick:
+    for group, label, changes, in_quick in _changes():
+        if in_quick or not quick:
             planner = override(base, changes)
             found.append(Reading(group=group, label=label, planner=planner))
     found += [reading for reading in _sensing() if reading.sectors_rad or not quick]
@@ -75,10 +75,10 @@ def all_readings(quick: bool = False) -> list[Reading]:
 
 
 def _changes() -> Iterator[tuple[str, str, dict[str, Scalar], bool]]:
-    """(group, label, options, whether the quick form has it too)."""
+    """Yield (group, label, options, whether the quick form includes it)."""
     for speed in (0.5, 0.6, 0.7, 0.75, 0.77, 0.78, 0.79, 0.8, 0.82, 0.85, 0.9, 1.0):
-        brief = speed in (0.6, 0.7, 0.82, 0.9)
-        yield "robot speed", f"{speed:g} m/s", {"speed_mps": speed}, brief
+        in_quick = speed in (0.6, 0.7, 0.82, 0.9)
+        yield "robot speed", f"{speed:g} m/s", {"speed_mps": speed}, in_quick
     for step in (0.05, 0.1, 0.2, 0.25, 0.35, 0.4, 0.5):
         yield "step", f"{step:g} m", {"step_length_m": step}, step in (0.2, 0.5)
     for iterations in (1, 2, 3, 4, 6, 10, 20):
@@ -113,7 +113,7 @@ class Variation(Trips):
     reading: Reading
 
     def facts(self) -> dict[str, Scalar]:
-        """What decides the numbers, as plain values."""
+        """Everything that the numbers depend on, as plain values."""
         return {
             "scenario": repr(self.scenario),
             **flatten(self.planner),
@@ -123,21 +123,22 @@ class Variation(Trips):
         }
 
     def _row(self, seed: int) -> dict[str, float]:
-        """Length, contacts, whether the goal was reached, whether it met whom the paper tells."""
-        seen = turned(self.scenario, -self.reading.sectors_rad)
+        """Length, contacts, whether it reached the goal and met the obstacles of the figure."""
+        perceived = turned(self.scenario, -self.reading.sectors_rad)
         if not self.reading.enlarged:
-            seen = replace(seen, robot_radius_m=0.0)
-        episode = run(seen, planner=self.planner, sensor=self.reading.sensor, seed=seed)
+            perceived = replace(perceived, robot_radius_m=0.0)
+        episode = run(perceived, planner=self.planner, sensor=self.reading.sensor, seed=seed)
         result = evaluate(episode)
-        met = result.encounters
+        encounters = result.encounters
         if not self.reading.enlarged:
             result = evaluate(_with_radius(episode, self.scenario.robot_radius_m))
-        told = met == (1,) if self.scenario.name == "case1" else met[:2] == (1, 2)
+        case1 = self.scenario.name == "case1"
+        as_figure = encounters == (1,) if case1 else encounters[:2] == (1, 2)
         return {
             "length_m": result.length_m,
             "collisions": result.collisions,
             "reached": int(result.outcome.value == "goal_reached"),
-            "told": int(told),
+            "told": int(as_figure),
         }
 
 
@@ -146,7 +147,7 @@ def _with_radius(episode: Episode, radius_m: float) -> Episode:
 
 
 def turned(scenario: Scenario, angle_rad: float) -> Scenario:
-    """The scenario turned about its start; to the robot it is the sectors that turn back."""
+    """The scenario turned about its start: for the robot the sectors turn by -angle_rad."""
     if angle_rad == 0.0:
         return scenario
     start = scenario.start_m
@@ -162,7 +163,7 @@ def turned(scenario: Scenario, angle_rad: float) -> Scenario:
 
 
 def plan(scenarios: Mapping[str, Scenario], quick: bool, first: int = 0) -> list[SampleChunk]:
-    """What is to be run from seed first on; scenarios are those of CASES."""
+    """The runs of the study from seed `first` on, as chunks; scenarios: those of CASES."""
     found = []
     seeds = QUICK_SEEDS if quick else SEEDS
     for reading in all_readings(quick):
@@ -174,14 +175,17 @@ def plan(scenarios: Mapping[str, Scenario], quick: bool, first: int = 0) -> list
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """What came of a reading in one case; lengths (m) as intervals of ten runs, best first."""
+    """Result of a reading in one case; intervals: of best, mean and worst length (m) of ten runs.
+
+    contacts, reached, as_figure: shares of the runs; as_figure: with the encounters of the figure.
+    """
 
     reading: Reading
     case: str
     intervals: tuple[statistics.Interval, ...]
     contacts: float
     reached: float
-    told: float
+    as_figure: float
 
     def off_m(self, law: str) -> tuple[float, ...]:
         """Our median minus the printed length, for each of STATISTICS."""
@@ -195,14 +199,14 @@ class Row:
 
     @property
     def reproduces(self) -> tuple[str, ...]:
-        """The laws whose printed row lies within the intervals altogether, without a contact."""
+        """The laws whose whole printed row lies within the intervals, if no run has a contact."""
         fit = self.contacts == 0.0 and self.reached == 1.0
         return tuple(law for law in LAWS if fit and all(self.holds(law)))
 
     @property
-    def as_told(self) -> bool:
-        """Whether most runs meet whom the paper's figure tells of."""
-        return self.told > 0.5
+    def mostly_as_figure(self) -> bool:
+        """Whether most runs meet the obstacles of the paper's figure."""
+        return self.as_figure > 0.5
 
 
 def printed_m(case: str, law: str) -> tuple[float, ...]:
@@ -212,7 +216,7 @@ def printed_m(case: str, law: str) -> tuple[float, ...]:
 
 
 def rows(samples: Mapping[str, Sample], quick: bool) -> list[Row]:
-    """Judge the samples of plan(), in its order."""
+    """The results of the samples of plan(): a row per reading and case, in the same sequence."""
     return [
         _row(reading, case, samples[f"{reading.name}/{case}"])
         for reading in all_readings(quick)
@@ -230,5 +234,5 @@ def _row(reading: Reading, case: str, sample: Sample) -> Row:
         intervals=tuple(map(statistics.interval, intervals)),
         contacts=float(np.mean(sample["collisions"] > 0)),
         reached=float(np.mean(sample["reached"])),
-        told=float(np.mean(sample["told"])),
+        as_figure=float(np.mean(sample["told"])),
     )

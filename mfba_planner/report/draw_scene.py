@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The world of a run drawn to scale: path, obstacles and tracks, sensing rings, walls.
+"""Draw the world of a run to scale: path, obstacles and tracks, sensing rings, walls.
 
-Every artist carries a gid that says what it is: `path:blocked`, `track:3`, `ring:0`, `goal`.
+The gid of every artist names its kind: `path:blocked`, `track:3`, `ring:0`, `goal`.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from .sector_ring import Ring, ring_of
 from .view_bounds import View
 
 Z_SECTOR, Z_TRACK, Z_OBSTACLE, Z_RING, Z_PATH, Z_MARK = (2.0 + 0.1 * i for i in range(6))
-_LONG = 0.75  # widths + heights of the view; longer tracks would cover it with lines
-_ARROW_M = 1e-3  # of track before an arrow's tip: enough to have a direction
-_ARROW_TRIES = 400  # from the end of the track back to where an arrow can be seen
+_LONG = 0.75  # times (width + height of the view): longer tracks would cover the picture
+_ARROW_M = 1e-3  # length of track before an arrow's tip that gives its direction
+_ARROW_TRIES = 400  # positions tried for an arrow, from the end of the track backwards
 
 
 def draw_scene(
-    ax: Axes, episode: Episode, view: View, passes: Sequence[Pass], met: Collection[int]
+    ax: Axes, episode: Episode, view: View, passes: Sequence[Pass], encountered: Collection[int]
 ) -> None:
-    """Draw a run into axes; met holds the numbers of the obstacles that came within SR."""
+    """Draw a run into axes; encountered: numbers of the obstacles that came within SR."""
     draw_walls(ax, episode)
     for moment in passes:
         obstacle = episode.scenario.obstacles[moment.number - 1]
         _track(ax, episode, view, obstacle, moment)
         _obstacle(ax, episode, obstacle, moment)
-        if moment.number in met:
+        if moment.number in encountered:
             _connect(ax, moment)
     for index, tick in enumerate(encounter_ticks(episode)):
         if is_finite(tick.pose.position):
@@ -53,13 +53,13 @@ def draw_scene(
 
 
 def patch(ax: Axes, shape: Circle | Wedge | Rectangle | FancyArrowPatch, gid: str) -> None:
-    """Add a shape that says what it is."""
+    """Add a shape with a gid."""
     shape.set_gid(gid)
     ax.add_patch(shape)
 
 
 def line(ax: Axes, points: Sequence[Point], gid: str, **looks: object) -> None:
-    """Add a line that says what it is."""
+    """Add a line with a gid."""
     xs, ys = zip(*points)
     drawn = Line2D(xs, ys, **looks)  # type: ignore[arg-type]
     drawn.set_gid(gid)
@@ -67,7 +67,7 @@ def line(ax: Axes, points: Sequence[Point], gid: str, **looks: object) -> None:
 
 
 def draw_walls(ax: Axes, episode: Episode) -> None:
-    """Draw the room, where there is one."""
+    """Draw the walls, if the scenario has any."""
     walls = episode.scenario.walls
     if walls:
         (left, bottom), (right, top) = walls.lower_m, walls.upper_m
@@ -76,14 +76,14 @@ def draw_walls(ax: Axes, episode: Episode) -> None:
 
 
 def _track(ax: Axes, episode: Episode, view: View, obstacle: Obstacle, moment: Pass) -> None:
-    """The obstacle's way over the run; between walls of a long run, its part around a pass."""
+    """The obstacle's track over the run; if that is long, only the track around its pass."""
     walls = episode.scenario.walls
     t0, t1 = span_s(episode)
     kind, longest = "track", _LONG * (view.width + view.height)
     if walls and obstacle.top_speed_mps * (t1 - t0) > longest:
         reach = 0.5 * longest / obstacle.top_speed_mps
         t0, t1 = max(t0, moment.time_s - reach), min(t1, moment.time_s + reach)
-        kind = "part"
+        kind = "track_near_pass"
     if obstacle.top_speed_mps * (t1 - t0) <= 0.0:
         return
     points = track(obstacle, walls, t0, t1)
@@ -92,7 +92,7 @@ def _track(ax: Axes, episode: Episode, view: View, obstacle: Obstacle, moment: P
         tip = center_at(obstacle, t, walls)
         if view.holds(tip) and distance(tip, moment.center_m) > obstacle.radius_m:
             tail = center_at(obstacle, t - _ARROW_M / obstacle.top_speed_mps, walls)
-            if tail == tip:  # it stands still for a while
+            if tail == tip:  # the obstacle stands still at that time
                 continue
             arrow = FancyArrowPatch(tail, tip, zorder=Z_TRACK, **style.ARROW)
             patch(ax, arrow, f"arrow:{moment.number}")
@@ -108,14 +108,14 @@ def _obstacle(ax: Axes, episode: Episode, obstacle: Obstacle, moment: Pass) -> N
 
 
 def _connect(ax: Axes, moment: Pass) -> None:
-    """The gap: from the robot's centre to the enlarged edge, a mere point in contact."""
+    """A line from the robot's centre to the enlarged edge; a point if they touch."""
     heading = bearing(moment.robot_m, moment.center_m)
     ends = [moment.robot_m, towards(moment.robot_m, heading, max(0.0, moment.gap_m))]
     line(ax, ends, f"pass:{moment.number}", zorder=Z_MARK, markevery=[0], **style.PASS)
 
 
 def _ring(ax: Axes, episode: Episode, index: int, tick: Decision) -> None:
-    """SR around the robot, the sectors that are set, and what set them (enlarged)."""
+    """SR around the robot, the sectors that are set, and the enlarged obstacles within SR."""
     position, reach = tick.pose.position, episode.sensor.sensing_range_m
     bits = ring_of(episode, tick.vs)
     kind = "heading" if bits.of_headings else "sector"
@@ -146,18 +146,18 @@ def _runs(bits: Bits) -> Iterator[tuple[int, int]]:
         first += count
 
 
-def draw_way(ax: Axes, episode: Episode) -> None:
-    """The way of another run, for comparison."""
+def draw_recorded_path(ax: Axes, episode: Episode) -> None:
+    """Draw the path of another run, for comparison."""
     points = [tick.pose.position for tick in episode.ticks if is_finite(tick.pose.position)]
-    line(ax, points, "way", zorder=Z_TRACK, **style.WAY)
+    line(ax, points, "recorded", zorder=Z_TRACK, **style.RECORDED)
 
 
 def draw_path(ax: Axes, episode: Episode) -> None:
-    """One line per stretch of a mode, and a mark where the robot stands in it."""
-    parts = stretches(episode)
+    """Draw one line per stretch of a mode, and a mark where the robot stands still."""
+    runs_of_modes = stretches(episode)
     for mode in Mode:
-        # a single point makes a line of no length, which is drawn as nothing
-        lines = [[*s.points_m, s.points_m[-1]] for s in parts if s.mode is mode]
+        # A single point would draw nothing: the last point is repeated.
+        lines = [[*s.points_m, s.points_m[-1]] for s in runs_of_modes if s.mode is mode]
         if not lines:
             continue
         collection = LineCollection(
@@ -172,13 +172,13 @@ def draw_path(ax: Axes, episode: Episode) -> None:
         ax.add_collection(collection, autolim=False)
         if mode in style.STANDING:
             looks = {"color": style.MODE_COLOURS[mode], "linestyle": "none", "zorder": Z_MARK}
-            places = [line[0] for line in lines]
-            line(ax, places, f"standing:{mode.value}", **looks, **style.STANDING[mode])
+            positions = [line[0] for line in lines]
+            line(ax, positions, f"standing:{mode.value}", **looks, **style.STANDING[mode])
 
 
 def draw_ends(ax: Axes, episode: Episode, start: style.Looks = style.START) -> None:
-    """Mark start, goal, and where the run ended if that is elsewhere."""
-    # A start that is another robot's goal, too, lies on it and leaves the star's tips to be seen.
+    """Mark start, goal, and the end of a run that did not reach the goal."""
+    # Above the goal: where a start is another robot's goal too, the star's tips stay visible.
     line(ax, [episode.scenario.start_m], "start", zorder=Z_MARK + 0.05, **start)
     line(ax, [episode.scenario.goal_m], "goal", zorder=Z_MARK, **style.GOAL)
     if episode.outcome is not Outcome.GOAL_REACHED:
@@ -187,7 +187,7 @@ def draw_ends(ax: Axes, episode: Episode, start: style.Looks = style.START) -> N
 
 
 def label_numbers(ax: Axes, episode: Episode, view: View, passes: Sequence[Pass]) -> None:
-    """Write each visible obstacle's number into its circle, or beside it, where it is free."""
+    """Write each visible obstacle's number into its circle, or at a free position beside it."""
     points_per_m = ax.bbox.width / ax.figure.dpi * 72.0 / view.width
     size = 1.35 * style.SMALL / points_per_m  # of a number, in metres
     bodies = [(p.center_m, episode.scenario.obstacles[p.number - 1].radius_m) for p in passes]
@@ -217,6 +217,6 @@ def label_numbers(ax: Axes, episode: Episode, view: View, passes: Sequence[Pass]
 
 
 def kinds(artists: Collection[Artist]) -> set[str]:
-    """What there is to explain: the gids without the numbers of single obstacles."""
+    """The kinds of artists: their gids without obstacle numbers."""
     gids = {artist.get_gid() or "" for artist in artists}
     return {gid if gid.startswith(("path", "standing")) else gid.split(":")[0] for gid in gids}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One moment of a run drawn to scale: the robot, what it has done, what its sensors see."""
+"""Draw one tick of a run to scale: robot, path so far, obstacles, sectors that are set."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from .draw_scene import (
 from .run_events import span_s, track
 from .sector_ring import ring_of
 
-AHEAD_S = 4.0  # an arrow is this long: it shows direction and speed
+AHEAD_S = 4.0  # an arrow shows the motion over this time
 
-Z_ROBOT = 0.5 * (Z_PATH + Z_MARK)  # the goal stays to be seen
+Z_ROBOT = 0.5 * (Z_PATH + Z_MARK)  # below the goal, which stays visible
 
 
 def draw_snapshot(ax: Axes, episode: Episode, index: int) -> None:
-    """Draw tick number index (from 0) of a run, obstacles where they are at that time."""
+    """Draw tick number index (from 0) of a run, with the obstacles at that time."""
     tick = episode.ticks[index]
     draw_walls(ax, episode)
     for number in range(1, len(episode.scenario.obstacles) + 1):
@@ -51,7 +51,7 @@ def draw_snapshot(ax: Axes, episode: Episode, index: int) -> None:
 
 
 def _obstacle(ax: Axes, episode: Episode, index: int, number: int) -> None:
-    """Body, enlarged edge, track so far and an arrow of the next seconds' motion."""
+    """Body, enlarged edge, track so far, and an arrow for the next seconds' motion."""
     scenario, tick = episode.scenario, episode.ticks[index]
     obstacle = scenario.obstacles[number - 1]
     time_s = episode.time_s(tick.stamp_ns)
@@ -61,15 +61,15 @@ def _obstacle(ax: Axes, episode: Episode, index: int, number: int) -> None:
     enlarged = Circle(
         center, scenario.enlarged_radius(obstacle), fill=False, zorder=Z_OBSTACLE, **edge
     )
-    patch(ax, enlarged, f"{'seen' if sensed else 'enlarged'}:{number}")
+    patch(ax, enlarged, f"{'in_range' if sensed else 'enlarged'}:{number}")
     if obstacle.top_speed_mps > 0.0:
-        begin = span_s(episode)[0]
-        if time_s > begin:
-            points = track(obstacle, scenario.walls, begin, time_s)
+        start_s = span_s(episode)[0]
+        if time_s > start_s:
+            points = track(obstacle, scenario.walls, start_s, time_s)
             line(ax, points, f"past:{number}", zorder=Z_TRACK, **style.TRACK)
         bounces = bounce_times(obstacle, time_s, time_s + AHEAD_S, scenario.walls)
         tip = center_at(obstacle, min([time_s + AHEAD_S, *bounces]), scenario.walls)
-        if tip != center:  # it may stand still for a while
+        if tip != center:  # not if the obstacle stands still for now
             arrow = FancyArrowPatch(center, tip, zorder=Z_OBSTACLE, **style.MOTION)
             patch(ax, arrow, f"motion:{number}")
     body = Circle(center, obstacle.radius_m, zorder=Z_OBSTACLE, **style.OBSTACLE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fleet's run as one picture: all ways, and how close each came to anything."""
+"""A fleet's run as one picture: all paths, and the smallest clearance of each robot."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from mfba_planner.simulation.scenario import Scenario
 
 from . import format_values, legend, style
 from .draw_scene import draw_ends, draw_path
-from .figure_canvas import to_bytes
+from .figure_sheet import to_bytes
 from .run_events import is_finite
-from .scene_layout import Page
+from .scene_layout import SceneLayout
 from .view_bounds import View, fitted
 
 
 def draw_fleet(scenario: Scenario, seed: int, runs: Mapping[str, Episode], path: Path) -> None:
     """Write the picture of a fleet's run as PNG; OutputError when path exists already.
 
-    runs are the Episodes of its robots, or some of them, by name.
+    runs: {robot name: Episode}, for all robots of the fleet or some of them.
     """
     with style.context():
         write_new(path, to_bytes(_fleet_figure(scenario, seed, runs), "png"))
 
 
 def _fleet_figure(scenario: Scenario, seed: int, runs: Mapping[str, Episode]) -> Figure:
-    """Compose head, ways, panel and strip; to be called and saved within style.context()."""
+    """Compose head, paths, panel and strip; call and save within style.context()."""
     names, episodes = list(runs), list(runs.values())
     results = [evaluate(episode) for episode in episodes]
     first = episodes[0].scenario
@@ -42,16 +42,16 @@ def _fleet_figure(scenario: Scenario, seed: int, runs: Mapping[str, Episode]) ->
         for tick in episode.ticks:
             if is_finite(tick.pose.position):
                 view = view.around(tick.pose.position, first.robot_radius_m)
-    page = Page(*fitted(view.grown(first.robot_radius_m, first.robot_radius_m)))
+    layout = SceneLayout(*fitted(view.grown(first.robot_radius_m, first.robot_radius_m)))
     for name, episode in zip(names, episodes):
-        draw_path(page.ax, episode)
-        draw_ends(page.ax, episode, style.SMALL_START)
+        draw_path(layout.ax, episode)
+        draw_ends(layout.ax, episode, style.SMALL_START)
         x, y = episode.scenario.start_m
-        page.ax.text(x, y + 1.2 * first.robot_radius_m, name, **style.NUMBER)
+        layout.ax.text(x, y + 1.2 * first.robot_radius_m, name, **style.NUMBER)
     good = sum(result.success for result in results)
-    page.head(scenario.description or scenario.name, f"{len(episodes)} robots in one world")
-    page.legend(legend.entries(page.ax))
-    page.rows(
+    layout.head(scenario.description or scenario.name, f"{len(episodes)} robots in one world")
+    layout.legend(legend.entries(layout.ax))
+    layout.rows(
         "Closest pass, edge to edge",
         [
             (
@@ -62,7 +62,7 @@ def _fleet_figure(scenario: Scenario, seed: int, runs: Mapping[str, Episode]) ->
             for name, result in zip(names, results)
         ],
     )
-    page.strip(
+    layout.strip(
         [
             (
                 "at the goal, untouched",
@@ -77,4 +77,4 @@ def _fleet_figure(scenario: Scenario, seed: int, runs: Mapping[str, Episode]) ->
             ("seed", str(seed), style.INK),
         ]
     )
-    return page.figure
+    return layout.figure

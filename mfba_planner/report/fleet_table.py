@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fleet's run as text: a row for each robot, and what kept all of them from success."""
+"""A fleet's result as text: a row per robot, and the reason why the run is no success."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _ROW = "{:<12}  {:<12}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}  {:>10}\n"
 
 
 def fleet_text(names: Sequence[str], results: Sequence[Result]) -> str:
-    """A row for each robot, and how many were at the goal without collision."""
+    """A row per robot, and the number of robots at the goal without collision."""
     rows = [
         _ROW.format(
             name, r.outcome.value, r.length_m, r.time_s, r.min_clearance_m, r.collisions,
@@ -27,7 +27,7 @@ def fleet_text(names: Sequence[str], results: Sequence[Result]) -> str:
 
 
 def why_no_success(results: Sequence[Result]) -> str:
-    """What kept a fleet from success, in words; empty where nothing did."""
+    """Why a fleet's run is no success, as text; empty for a success."""
     hits = sum(r.collisions for r in results)
     late = sum(r.outcome is not Outcome.GOAL_REACHED for r in results)
     faults = [f"{hits} collisions"] if hits else []

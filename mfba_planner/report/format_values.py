@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of a run in words: the same in tables and pictures."""
+"""Format the values of a run as text: the same in tables, pictures and pages."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ _OUTCOMES = {
 
 
 def bits(of_headings: bool) -> tuple[str, str]:
-    """What it means that a bit of Vs is set, and one of Vg."""
+    """The meaning of a set bit of Vs, and of Vg."""
     if of_headings:
         return "headings that lead to a contact", "the same: every heading is its own gap"
-    return "sectors in which something is", "gaps that are closed"
+    return "sectors with an obstacle", "closed gaps"
 
 
 def outcome(result: Result) -> str:
-    """How the run ended."""
+    """The outcome of the run."""
     return _OUTCOMES[result.outcome]
 
 
 def number(value: float, digits: int, unit: str = "", absent: str = "none") -> str:
-    """A figure with its unit, or the word for one that does not exist (inf, NaN)."""
+    """A number with its unit, or the text `absent` for inf and NaN."""
     if not math.isfinite(value):
         return absent
     size = f"{value:.{digits}f}" if abs(value) < 1e7 else f"{value:.6g}"
@@ -61,12 +61,12 @@ def clearance(result: Result) -> str:
 
 
 def fitness(result: Result) -> str:
-    """The reciprocal of the length, as Tables 5 and 7 print it."""
+    """1 / length, as printed in Tables 5 and 7."""
     return number(result.fitness, 6, "1/m", absent="never moved")
 
 
 def straight_m(episode: Episode) -> float:
-    """Distance from start to goal (m): no path is shorter."""
+    """Distance from start to goal (m)."""
     return distance(episode.scenario.start_m, episode.scenario.goal_m)
 
 
@@ -77,7 +77,7 @@ def one_line(text: str, limit: int) -> str:
 
 
 def run_title(episode: Episode) -> str:
-    """One line that names the run: scenario, algorithm, seed, driver."""
+    """Scenario, algorithm, seed and driver of the run, as one line."""
     return (
         f"{one_line(episode.scenario.name, 40)}, {episode.label},"
         f" seed {one_line(str(episode.seed), 24)}, {episode.driver} driver"

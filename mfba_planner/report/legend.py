@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the marks in a scene mean; only what is drawn is explained."""
+"""The legend of a scene: an entry for each kind of mark that is drawn."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def _all() -> dict[str, Entry]:
         "goal": (Line2D([], [], **style.GOAL), "goal"),
         "end": (Line2D([], [], **style.END), "end of the run"),
         **{f"path:{mode.value}": (_path(mode), format_values.MODES[mode]) for mode in _MODES},
-        "way": (Line2D([], [], **style.WAY), "way of the recorded run"),
+        "recorded": (Line2D([], [], **style.RECORDED), "path of the recorded run"),
         "obstacle": (_disc(style.OBSTACLE), "obstacle, at closest pass"),
         "enlarged": (Line2D([], [], **_edge(style.ENLARGED)), "enlarged by the robot's radius"),
         "pass": (Line2D([], [], **style.PASS), "clearance at closest pass"),
         "track": (_track(), "obstacle's track"),
-        "part": (_track(), "obstacle's track near closest pass"),
+        "track_near_pass": (_track(), "obstacle's track near closest pass"),
         "ring": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR at the switch"),
         "sector": (Patch(**style.SECTOR), "sectors set at the switch"),
         "heading": (Patch(**style.SECTOR), "headings to a contact, at the switch"),
@@ -41,11 +41,11 @@ def _all() -> dict[str, Entry]:
         "outline": (_disc(style.OBSTACLE), "obstacle"),
         "robot": (_disc(style.ROBOT), "robot"),
         "body": (_disc(style.OBSTACLE), "obstacle; the arrow: its next 4 s"),
-        "past": (Line2D([], [], **style.TRACK), "obstacle's way so far"),
+        "past": (Line2D([], [], **style.TRACK), "obstacle's track so far"),
         "reach": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR"),
         "set": (Patch(**style.SECTOR), "sectors set"),
         "closing": (Patch(**style.SECTOR), "headings to a contact"),
-        "seen": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle within SR"),
+        "in_range": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle within SR"),
         "wall": (Line2D([], [], **_edge(style.WALL)), "wall"),
     }
 

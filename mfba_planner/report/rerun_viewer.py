@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run for Rerun's viewer: the world in motion, what the planner decided, and two curves.
+"""A run for the Rerun viewer: world, decisions, and curves of clearance and speed.
 
-Everything stands on the timelines `sim_time` (s) and `tick`; lengths are metres, z points up.
+Timelines are `sim_time` (s) and `tick`; lengths are in metres, z points up.
 """
 
 from __future__ import annotations
@@ -26,35 +26,35 @@ from .html.data import clearances, in_one_scene, obstacle_names, speeds
 from .sector_ring import ring_of
 
 _GREY, _DARK = style.FAINT, style.QUIET
-_AHEAD_S = 2.0  # arrows lead to where obstacles will be
+_AHEAD_S = 2.0  # arrows show the obstacles' motion over this time
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, 49)
 
 
 def save(runs: Sequence[tuple[str, Episode]], path: Path, roster: Sequence[str] = ()) -> None:
     """Write a recording that `rerun FILE` opens. Raises OutputError where path exists.
 
-    roster names the robots of the fleet that the runs are of, if they are: all are one scene.
+    roster: the names of all robots of the fleet, if the runs are of one; they share a scene.
     """
     refuse_existing(path)
     rerun, stream = _stream()
     stream.save(str(path), default_blueprint=_layout(rerun, runs, roster))
-    _log_all(rerun, stream, runs, roster)
+    _log_runs(rerun, stream, runs, roster)
 
 
 def show(runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = ()) -> None:
-    """Open the viewer's window on what save() would write; raises as require_viewer does."""
+    """Open the viewer's window on what save() would write; raises like require_viewer."""
     require_viewer()
     rerun, stream = _stream()
     stream.spawn(default_blueprint=_layout(rerun, runs, roster))
-    _log_all(rerun, stream, runs, roster)
+    _log_runs(rerun, stream, runs, roster)
 
 
 def require_viewer() -> None:
-    """Raise ConfigError where there is no screen, or no viewer is installed."""
+    """Raise ConfigError where there is no display, or no viewer is installed."""
     _stream()
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise ConfigError(
-            "no screen (neither DISPLAY nor WAYLAND_DISPLAY is set); give --save FILE.rrd, or "
+            "no display (neither DISPLAY nor WAYLAND_DISPLAY is set); give --save FILE.rrd, or "
             "see `mfba report` for a page"
         )
 
@@ -72,19 +72,19 @@ def _stream() -> tuple[Any, Any]:
 
 
 def _layout(rerun: Any, runs: Sequence[tuple[str, Episode]], roster: Sequence[str]) -> Any:
-    """A column for each run; of a whole fleet one, in which all robots are."""
+    """One column per run; a single column for a whole fleet."""
     view = rerun.blueprint
     groups = [runs] if in_one_scene(runs, roster) else [[run] for run in runs]
     columns = [
         view.Vertical(
             view.Spatial3DView(
-                **_below(group, "world"),
+                **_contents(group, "world"),
                 name=", ".join(name for name, _ in group),
                 overrides={f"{name}/world/trail": _since_the_start(view) for name, _ in group},
                 eye_controls=_from_above(view, [episode for _, episode in group]),
             ),
-            view.TextLogView(**_below(group, "decision"), name="decisions"),
-            view.TimeSeriesView(**_below(group, "curves"), name="clearance (m), speed (m/s)"),
+            view.TextLogView(**_contents(group, "decision"), name="decisions"),
+            view.TimeSeriesView(**_contents(group, "curves"), name="clearance (m), speed (m/s)"),
             row_shares=[6, 2, 2],
         )
         for group in groups
@@ -92,9 +92,9 @@ def _layout(rerun: Any, runs: Sequence[tuple[str, Episode]], roster: Sequence[st
     return view.Blueprint(view.Horizontal(*columns), view.TimePanel(timeline="sim_time"))
 
 
-def _below(runs: Sequence[tuple[str, Episode]], part: str) -> dict[str, Any]:
-    """What a view of some runs shows."""
-    paths = [f"/{name}/{part}" for name, _ in runs]
+def _contents(runs: Sequence[tuple[str, Episode]], entity: str) -> dict[str, Any]:
+    """The entity paths that a view of some runs shows."""
+    paths = [f"/{name}/{entity}" for name, _ in runs]
     return {"origin": paths[0]} if len(paths) == 1 else {"contents": [f"{p}/**" for p in paths]}
 
 
@@ -111,7 +111,7 @@ def _since_the_start(view: Any) -> Any:
 
 
 def _from_above(view: Any, episodes: Sequence[Episode]) -> Any:
-    """All ways in sight, +y away from who looks on."""
+    """A camera above the runs that has all paths in view, +y pointing away from it."""
     corners = [end for e in episodes for end in (e.scenario.start_m, e.scenario.goal_m)]
     corners += [tick.pose.position for episode in episodes for tick in episode.ticks]
     xs, ys = zip(*corners)
@@ -122,21 +122,21 @@ def _from_above(view: Any, episodes: Sequence[Episode]) -> Any:
     )
 
 
-def _log_all(
+def _log_runs(
     rerun: Any, stream: Any, runs: Sequence[tuple[str, Episode]], roster: Sequence[str]
 ) -> None:
     is_fleet = in_one_scene(runs, roster)
     last, _ = max(runs, key=lambda run: len(run[1].ticks))
     for name, episode in runs:
         names = obstacle_names(name, episode, roster)
-        if is_fleet:  # the others are there themselves, and what is common is there once
+        if is_fleet:  # other robots are logged by their own run, common obstacles once
             names = [own for own in names if own not in roster and name == last]
-        _Log(rerun, stream, name, episode, names, [name] if is_fleet else None).all()
+        _RunLogger(rerun, stream, name, episode, names, [name] if is_fleet else None).log_all()
     stream.flush()
 
 
-class _Log:
-    """One run below an entity path of its name."""
+class _RunLogger:
+    """Log one run below the entity path of its name."""
 
     def __init__(
         self,
@@ -147,14 +147,14 @@ class _Log:
         names: Sequence[str],
         label: list[str] | None,
     ) -> None:
-        """Draw the first obstacles, which have these names, and the robot with this label."""
+        """Log the first len(names) obstacles with these names, and the robot with this label."""
         self.rr, self.stream, self.name, self.episode = rerun, stream, name, episode
         self.names, self.label = names, label
         self.scenario = episode.scenario
 
-    def all(self) -> None:
-        """What never changes, then tick by tick."""
-        self._still()
+    def log_all(self) -> None:
+        """Log what never changes, then every tick."""
+        self._log_static()
         times_s = [self.episode.time_s(tick.stamp_ns) for tick in self.episode.ticks]
         xs, ys = Motion(self.scenario).centers(np.array(times_s))
         curves = zip(clearances(self.episode), speeds(self.episode))
@@ -163,40 +163,40 @@ class _Log:
         ):
             self.stream.set_time("sim_time", duration=time_s)
             self.stream.set_time("tick", sequence=k)
-            self._obstacles(xs[k], ys[k], time_s)
-            self._robot(tick)
-            self._put(
+            self._log_obstacles(xs[k], ys[k], time_s)
+            self._log_robot(tick)
+            self._log(
                 "decision", self.rr.TextLog(f"{format_values.MODES[tick.mode]}: {tick.reason}")
             )
             if math.isfinite(gap_m):
-                self._put("curves/clearance", self.rr.Scalars(gap_m))
-            self._put("curves/speed", self.rr.Scalars(speed))
+                self._log("curves/clearance", self.rr.Scalars(gap_m))
+            self._log("curves/speed", self.rr.Scalars(speed))
 
-    def _put(self, path: str, what: Any, *, static: bool = False) -> None:
-        self.stream.log(f"{self.name}/{path}", what, static=static)
+    def _log(self, path: str, data: Any, *, static: bool = False) -> None:
+        self.stream.log(f"{self.name}/{path}", data, static=static)
 
-    def _still(self) -> None:
+    def _log_static(self) -> None:
         rr, scenario = self.rr, self.scenario
-        self._put("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         ends = [_flat(scenario.start_m), _flat(scenario.goal_m)]
         marks = rr.Points3D(
             ends, radii=0.08, colors=[_rgb(_DARK), _rgb(style.GREEN)], labels=["start", "goal"]
         )
-        self._put("world/task", marks, static=True)
+        self._log("world/task", marks, static=True)
         if scenario.walls:
             (left, low), (right, high) = scenario.walls.lower_m, scenario.walls.upper_m
             corners = [(left, low), (right, low), (right, high), (left, high), (left, low)]
             lines = rr.LineStrips3D([[_flat(corner) for corner in corners]], colors=_rgb(_DARK))
-            self._put("world/walls", lines, static=True)
+            self._log("world/walls", lines, static=True)
 
-    def _obstacles(self, xs: Any, ys: Any, time_s: float) -> None:
+    def _log_obstacles(self, xs: Any, ys: Any, time_s: float) -> None:
         obstacles = self.scenario.obstacles[: len(self.names)]
         if not obstacles:
             return
         rr = self.rr
         centers = [(x, y, 0.0) for x, y, _ in zip(xs.tolist(), ys.tolist(), self.names)]
         radii = [obstacle.radius_m for obstacle in obstacles]
-        self._put(
+        self._log(
             "world/obstacles",
             rr.Points3D(centers, radii=radii, colors=_rgb(_GREY), labels=list(self.names)),
         )
@@ -204,32 +204,36 @@ class _Log:
             _ring(center, self.scenario.enlarged_radius(obstacle))
             for center, obstacle in zip(centers, obstacles)
         ]
-        self._put("world/enlarged", rr.LineStrips3D(edges, colors=_rgb(_GREY)))
+        self._log("world/enlarged", rr.LineStrips3D(edges, colors=_rgb(_GREY)))
         moves = [velocity_at(obstacle, time_s, self.scenario.walls) for obstacle in obstacles]
         ahead = [(vx * _AHEAD_S, vy * _AHEAD_S, 0.0) for vx, vy in moves]
-        self._put("world/moves", rr.Arrows3D(origins=centers, vectors=ahead, colors=_rgb(_GREY)))
+        self._log("world/moves", rr.Arrows3D(origins=centers, vectors=ahead, colors=_rgb(_GREY)))
 
-    def _robot(self, tick: Decision) -> None:
-        rr, here = self.rr, (tick.pose.x, tick.pose.y, 0.0)
+    def _log_robot(self, tick: Decision) -> None:
+        rr, position = self.rr, (tick.pose.x, tick.pose.y, 0.0)
         color = _rgb(style.MODE_COLOURS[tick.mode])
         radius_m = self.scenario.robot_radius_m
-        body = rr.Points3D([here], radii=radius_m, colors=color, labels=self.label)
-        self._put("world/robot", body)
+        body = rr.Points3D([position], radii=radius_m, colors=color, labels=self.label)
+        self._log("world/robot", body)
         reach = self.episode.sensor.sensing_range_m
-        self._put(
-            "world/sensor/ring", rr.LineStrips3D([_ring(here, reach)], colors=_rgb(style.ORANGE))
+        self._log(
+            "world/sensor/ring",
+            rr.LineStrips3D([_ring(position, reach)], colors=_rgb(style.ORANGE)),
         )
         ring = ring_of(self.episode, tick.vs)
-        lit = [_sector(here, reach, *ring.wedge(k)) for k, bit in enumerate(tick.vs) if bit]
-        self._put(
-            "world/sensor/sectors", rr.LineStrips3D(lit, colors=_rgb(style.ORANGE), radii=0.02)
+        set_sectors = [
+            _sector(position, reach, *ring.wedge(k)) for k, bit in enumerate(tick.vs) if bit
+        ]
+        self._log(
+            "world/sensor/sectors",
+            rr.LineStrips3D(set_sectors, colors=_rgb(style.ORANGE), radii=0.02),
         )
         bats = rr.Points3D([_flat(bat) for bat in tick.candidates], radii=0.02, colors=_rgb(_DARK))
-        self._put("world/bats", bats)
+        self._log("world/bats", bats)
         if tick.mode not in (Mode.STOPPED, Mode.IDLE):
-            step = rr.LineStrips3D([[here, _flat(tick.waypoint)]], colors=color)
-            self._put("world/waypoint", step)
-        self._put("world/trail", rr.Points3D([here], radii=0.04, colors=color))
+            step = rr.LineStrips3D([[position, _flat(tick.waypoint)]], colors=color)
+            self._log("world/waypoint", step)
+        self._log("world/trail", rr.Points3D([position], radii=0.04, colors=color))
 
 
 def _rgb(color: str) -> list[int]:
@@ -245,8 +249,8 @@ def _ring(center: Sequence[float], radius_m: float) -> Any:
     return np.stack([x, y, np.zeros_like(x)], axis=1)
 
 
-def _sector(center: Sequence[float], radius_m: float, begin: float, end: float) -> Any:
-    angles = np.linspace(begin, end, 7)
+def _sector(center: Sequence[float], radius_m: float, start: float, end: float) -> Any:
+    angles = np.linspace(start, end, 7)
     x = np.concatenate([[0.0], radius_m * np.cos(angles), [0.0]]) + center[0]
     y = np.concatenate([[0.0], radius_m * np.sin(angles), [0.0]]) + center[1]
     return np.stack([x, y, np.zeros_like(x)], axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run's result as JSON: what was run, with what, and what came of it."""
+"""Write and read a run's result as JSON: scenario, parameters, versions, digest, metrics."""
 
 from __future__ import annotations
 
@@ -37,17 +37,16 @@ _KINDS = {
     "result": dict,
     "extra": dict,
 }
-_LATER = {"world"}  # keys that the oldest results lack
+_OPTIONAL = {"world"}  # keys that the oldest results lack
 
 
 def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str, Any]:
-    """Everything a result file holds, in plain JSON values.
+    """The content of a result file, in plain JSON values.
 
-    world is the whole scenario as its files have it (the oldest results lack it); parameters
-    has the flattened options of planner and sensor; extra holds what the caller
-    knows beyond the episode (wall time, file names). JSON has no infinity: null stands for a
-    number that is not finite, which means for fitness that the robot never moved, for
-    min_clearance_m that there are no obstacles.
+    world: the whole scenario, as in scenario files (the oldest results lack it). parameters: the
+    flattened options of planner and sensor. extra: what the caller adds (wall time, file names).
+    JSON has no infinity, so null stands for a number that is not finite: fitness is null if the
+    robot never moved, min_clearance_m if there are no obstacles.
     """
     return {
         "schema_version": SCHEMA_VERSION,
@@ -72,7 +71,7 @@ def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str,
 
 
 def _plain(value: Any) -> Any:
-    """Turn a value into what JSON can hold, numbers that are not finite into None."""
+    """Convert a value to plain JSON values; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -95,7 +94,7 @@ def write_result(path: Path, data: Mapping[str, Any]) -> None:
 
 
 def read_result(path: Path) -> dict[str, Any]:
-    """Read a result file back; InputError for anything that is not one."""
+    """Read a result file; InputError for anything else."""
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
@@ -121,7 +120,7 @@ def _refused(path: Path, reason: str) -> InputError:
 
 
 def _fault(data: Any) -> str:
-    """What keeps data from being a result, "" for nothing."""
+    """Why data is not a result, "" if it is one."""
     if not isinstance(data, dict):
         return f"of type {type(data).__name__}, not a mapping"
     version = data.get("schema_version")
@@ -129,7 +128,7 @@ def _fault(data: Any) -> str:
         return f"schema_version={version!r} is unknown (this is version {SCHEMA_VERSION})"
     for key, kind in _KINDS.items():
         if key not in data:
-            if key in _LATER:
+            if key in _OPTIONAL:
                 continue
             return f"{key} is missing"
         if type(data[key]) is not kind:
@@ -147,7 +146,7 @@ def _result_fault(result: Mapping[str, Any]) -> str:
 
 
 def _fits(value: Any, kind: Any) -> bool:
-    """Tell whether a JSON value can stand for a field of Result; a float may be null."""
+    """Whether a JSON value fits a field of Result of this type; a float may be null."""
     if kind is Outcome:
         return value in [outcome.value for outcome in Outcome]
     if kind is float:

@@ -28,16 +28,16 @@ def result_rows(
     *,
     names: Sequence[str] = (),
 ) -> Iterator[Row]:
-    """Yield (name, figure, remark) for each line of the table; names are the obstacles'."""
+    """Yield (name, value, remark) for each line of the table; names: those of the obstacles."""
     yield "outcome", format_values.outcome(result), _why_no_success(result)
-    yield "length", format_values.length(result), _against_straight(episode, result)
+    yield "length", format_values.length(result), _excess(episode, result)
     yield "time", format_values.time(result), "simulated"
     yield "fitness", format_values.fitness(result), "1 / length"
     between = "edge to edge" if math.isfinite(result.min_clearance_m) else ""
     yield "min clearance", format_values.clearance(result), between
     yield "collisions", str(result.collisions), ""
-    yield "encounters", str(len(result.encounters)), _numbered(result, names)
-    yield "mode switches", str(result.mode_switches), _standing(result)
+    yield "encounters", str(len(result.encounters)), _encountered(result, names)
+    yield "mode switches", str(result.mode_switches), _ticks_by_mode(result)
     rate = "" if ticks_per_s is None else f"{format_values.number(ticks_per_s, 0)} ticks/s"
     yield "ticks", str(result.ticks), rate
 
@@ -47,7 +47,7 @@ def _why_no_success(result: Result) -> str:
     return "but not without collision" if reached and not result.success else ""
 
 
-def _against_straight(episode: Episode, result: Result) -> str:
+def _excess(episode: Episode, result: Result) -> str:
     straight = format_values.straight_m(episode)
     line = f"straight line {format_values.number(straight, 3, 'm')}"
     if result.outcome is not Outcome.GOAL_REACHED:
@@ -56,29 +56,29 @@ def _against_straight(episode: Episode, result: Result) -> str:
     return f"{line} ({excess:+.1f} %)"
 
 
-def _numbered(result: Result, names: Sequence[str] = ()) -> str:
-    """Who was encountered: obstacles by number, robots by name."""
-    met = [names[number - 1] if names else str(number) for number in result.encounters]
-    numbers = [name for name in met if name.isdecimal()]
+def _encountered(result: Result, names: Sequence[str] = ()) -> str:
+    """What was encountered: obstacles by number, robots by name."""
+    encountered = [names[number - 1] if names else str(number) for number in result.encounters]
+    numbers = [name for name in encountered if name.isdecimal()]
     plural = "s" if len(numbers) > 1 else ""
-    told = [f"obstacle{plural} {', '.join(numbers)}"] if numbers else []
-    return ", ".join(told + [name for name in met if not name.isdecimal()])
+    texts = [f"obstacle{plural} {', '.join(numbers)}"] if numbers else []
+    return ", ".join(texts + [name for name in encountered if not name.isdecimal()])
 
 
-def _standing(result: Result) -> str:
+def _ticks_by_mode(result: Result) -> str:
     counts = (
         (result.avoidance_ticks, "avoiding"),
         (result.blocked_ticks, "blocked"),
         (result.stopped_ticks, "stopped"),
     )
-    told = [f"{count} {what}" for count, what in counts if count]
-    return f"ticks: {', '.join(told)}" if told else ""
+    texts = [f"{count} {name}" for count, name in counts if count]
+    return f"ticks: {', '.join(texts)}" if texts else ""
 
 
 def result_table(
     episode: Episode, result: Result, ticks_per_s: float | None = None, *, remarks: bool = True
 ) -> Table:
-    """The result as a rich table; its title tells scenario, algorithm, seed and driver."""
+    """The result as a rich table, titled with scenario, algorithm, seed and driver."""
     title = Text(format_values.run_title(episode), style="bold")
     table = Table(title=title, title_justify="left", box=None, show_header=False, padding=(0, 2))
     table.add_column(style="dim", no_wrap=True)
@@ -105,14 +105,14 @@ def result_text(
 def print_result(
     console: Console, episode: Episode, result: Result, ticks_per_s: float | None = None
 ) -> None:
-    """Print the table; the console knows width, colour and encoding of where it goes."""
+    """Print the table with the console's width, colours and encoding."""
     remarks = console.width >= _ROOM_FOR_REMARKS
     table = result_table(episode, result, ticks_per_s, remarks=remarks)
     print_encodable(console, lambda encodable: encodable.print(table))
 
 
 def comparison_text(left: tuple[str, Result], right: tuple[str, Result]) -> str:
-    """Two results side by side as plain text; what differs is marked with >."""
+    """Two results side by side as plain text; lines that differ are marked with >."""
     (left_name, a), (right_name, b) = left, right
     rows = [
         ("outcome", format_values.outcome(a), format_values.outcome(b)),

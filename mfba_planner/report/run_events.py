@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What there is to show of a run: stretches of one mode, encounters, closest passes, tracks."""
+"""Events of a run for pictures: stretches of one mode, encounters, closest passes, tracks."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from mfba_planner.evaluation.metrics import steps_driven, tick_clearances
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, bounce_times, center_at
 
-_PARTS = 64  # of one step; in 0.3 m of robot path that leaves an error below 3 mm
+_INTERVALS = 64  # per tick; in 0.3 m of robot path the error is below 3 mm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stretch:
-    """An unbroken run of ticks in one mode; points_m leads to where the next stretch starts."""
+    """Consecutive ticks in one mode; points_m ends where the next stretch starts."""
 
     mode: Mode
     ticks: tuple[Decision, ...]
@@ -29,7 +29,7 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pass:
-    """The moment at which robot and obstacle (from 1) were closest; gap_m between the edges."""
+    """Closest pass: when robot and obstacle (number from 1) were closest; gap_m edge to edge."""
 
     number: int
     time_s: float
@@ -39,7 +39,7 @@ class Pass:
 
 
 def is_finite(point: Point) -> bool:
-    """Tell a usable point from one that a refused input has left behind."""
+    """Whether both coordinates are finite; those of a refused input may not be."""
     return math.isfinite(point[0]) and math.isfinite(point[1])
 
 
@@ -50,7 +50,7 @@ def span_s(episode: Episode) -> tuple[float, float]:
 
 
 def stretches(episode: Episode) -> list[Stretch]:
-    """The run cut where its mode changes, in order of time."""
+    """The run split where its mode changes, sorted by time."""
     found, start = [], 0
     for mode, group in groupby(episode.ticks, key=lambda tick: tick.mode):
         ticks = tuple(group)
@@ -62,12 +62,12 @@ def stretches(episode: Episode) -> list[Stretch]:
 
 
 def encounter_ticks(episode: Episode) -> list[Decision]:
-    """The first tick of each obstacle-avoidance stretch: where the planner switches (Fig. 7 b)."""
+    """The first tick of each stretch of obstacle avoidance (Fig. 7 b)."""
     return [s.ticks[0] for s in stretches(episode) if s.mode is Mode.OBSTACLE_AVOIDANCE]
 
 
 def closest_passes(episode: Episode) -> list[Pass]:
-    """The closest moment for each obstacle, in scenario order."""
+    """The closest pass of each obstacle, sorted by obstacle number."""
     columns = zip(*tick_clearances(episode))
     return [
         _closest_within(episode, index, min(range(len(gaps)), key=gaps.__getitem__))
@@ -76,13 +76,13 @@ def closest_passes(episode: Episode) -> list[Pass]:
 
 
 def _closest_within(episode: Episode, index: int, step: int) -> Pass:
-    """Search one step, in which robot and obstacle move uniformly but for bounces."""
+    """Search between two ticks: uniform motion of robot and obstacle, except for bounces."""
     a, b = steps_driven(episode)[step]
     (ax, ay), (bx, by) = a.pose.position, b.pose.position
     ta, tb = episode.time_s(a.stamp_ns), episode.time_s(b.stamp_ns)
     moments = (
         _pass(episode, index, ta + s * (tb - ta), (ax + s * (bx - ax), ay + s * (by - ay)))
-        for s in np.linspace(0.0, 1.0, _PARTS + 1).tolist()
+        for s in np.linspace(0.0, 1.0, _INTERVALS + 1).tolist()
     )
     return min(moments, key=lambda moment: moment.gap_m)
 
@@ -95,6 +95,6 @@ def _pass(episode: Episode, index: int, time_s: float, robot_m: Point) -> Pass:
 
 
 def track(obstacle: Obstacle, walls: Walls | None, t0_s: float, t1_s: float) -> list[Point]:
-    """Corner points of an obstacle's way from t0 to t1: both ends and every bounce between."""
+    """Corner points of an obstacle's track from t0 to t1: both ends and every bounce."""
     times = [t0_s, *bounce_times(obstacle, t0_s, t1_s, walls), t1_s]
     return [center_at(obstacle, t, walls) for t in times]

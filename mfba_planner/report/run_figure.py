@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run as a picture in the manner of Fig. 7, with legend and result."""
+"""A run as a picture in the style of Fig. 7, with legend and result."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mfba_planner.evaluation.metrics import Result, evaluate
 from mfba_planner.simulation.episode import Episode
 
 from . import format_values, legend, style
-from .draw_scene import draw_scene, draw_way, label_numbers
-from .figure_canvas import to_bytes
+from .draw_scene import draw_recorded_path, draw_scene, label_numbers
+from .figure_sheet import to_bytes
 from .run_events import Pass, closest_passes
-from .scene_layout import Page
+from .scene_layout import SceneLayout
 from .view_bounds import choose_view
 
 
@@ -35,7 +35,7 @@ def png_bytes(episode: Episode) -> bytes:
 
 
 def draw_what_if(recorded: Episode, episode: Episode, change: str, path: Path) -> None:
-    """Write the picture of a run with the way of the recorded one beneath, as PNG.
+    """Write the picture of a run and, beneath it, the path of the recorded run, as PNG.
 
     Raises OutputError when path exists already or cannot be written.
     """
@@ -45,36 +45,38 @@ def draw_what_if(recorded: Episode, episode: Episode, change: str, path: Path) -
 
 
 def run_figure(episode: Episode, recorded: Episode | None = None, subtitle: str = "") -> Figure:
-    """Compose head, world, panel and strip; to be called and saved within style.context().
+    """Compose head, world, panel and strip; call and save within style.context().
 
-    The way of `recorded`, another run of the same world, is drawn beneath.
+    The path of `recorded`, another run of the same world, is drawn beneath.
     """
     result, passes = evaluate(episode), closest_passes(episode)
     view, scale = choose_view(episode, passes)
-    page = Page(view, scale)
+    layout = SceneLayout(view, scale)
     if recorded:
-        draw_way(page.ax, recorded)
-    draw_scene(page.ax, episode, view, passes, result.encounters)
-    label_numbers(page.ax, episode, view, passes)
+        draw_recorded_path(layout.ax, recorded)
+    draw_scene(layout.ax, episode, view, passes, result.encounters)
+    label_numbers(layout.ax, episode, view, passes)
     about = episode.scenario.description or f"{episode.driver} driver"
-    page.head(episode.scenario.name, subtitle or about)
-    page.legend(legend.entries(page.ax))
-    page.rows("Closest pass, edge to edge", _pass_rows(passes, result))
+    layout.head(episode.scenario.name, subtitle or about)
+    layout.legend(legend.entries(layout.ax))
+    layout.rows("Closest pass, edge to edge", _pass_rows(passes, result))
     hidden = [str(p.number) for p in passes if not view.holds(p.center_m)]
-    page.note(f"outside the picture: {', '.join(hidden)}" if hidden else "")
-    page.strip(_cells(episode, result))
-    return page.figure
+    layout.note(f"outside the picture: {', '.join(hidden)}" if hidden else "")
+    layout.strip(_cells(episode, result))
+    return layout.figure
 
 
 def _pass_rows(passes: Sequence[Pass], result: Result) -> list[tuple[str, str, str]]:
-    met = sorted((p for p in passes if p.number in result.encounters), key=lambda p: p.gap_m)
+    encountered = sorted(
+        (p for p in passes if p.number in result.encounters), key=lambda p: p.gap_m
+    )
     return [
         (
             f"obstacle {p.number}",
             format_values.number(p.gap_m, 2, "m"),
             f"at {format_values.number(p.time_s, 1, 's')}",
         )
-        for p in met
+        for p in encountered
     ]
 
 

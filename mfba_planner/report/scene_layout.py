@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sheet a scene is printed on: head, axes to scale, a panel at the right, a result strip."""
+"""The layout of a scene's picture: head, axes to scale, panel at the right, result strip."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from . import style
-from .figure_canvas import EDGE, Sheet
+from .figure_sheet import EDGE, Sheet
 from .format_values import one_line
 from .legend import Entry
 from .view_bounds import View
@@ -19,25 +19,25 @@ _GAP, _HEAD, _AXIS, _STRIP, _PANEL = 0.3, 0.85, 0.6, 0.8, 2.45
 _ROW = 0.18
 
 
-class Page:
-    """A sheet with one pair of axes; measures are in inches from the lower left corner."""
+class SceneLayout:
+    """A figure with one pair of axes; positions in inches from the lower left corner."""
 
     def __init__(self, view: View, scale: float) -> None:
-        """Lay the sheet out for a view at a scale in inches per metre."""
+        """Lay out the figure for a view at a scale in inches per metre."""
         width, height = view.width * scale, view.height * scale
         self._sheet = Sheet(width, height)
         self.figure = self._sheet.figure
         self.ax = self._sheet.axes(0.0, 0.0, width, height)
-        self._rule_axes(view)
+        self._set_limits(view)
         labels = self.ax.yaxis.get_tightbbox(self._sheet.renderer)
         self._left = left = EDGE + (-labels.x0 / style.DPI if labels else 0.0)
         bottom = _STRIP + _AXIS
         self._panel, self._floor, self._y = left + width + _GAP, bottom, bottom + height
         self._sheet.resize(self._panel + _PANEL + EDGE, bottom + height + _HEAD)
-        self._sheet.place(self.ax, left, bottom, width, height)
+        self._sheet.move_axes(self.ax, left, bottom, width, height)
 
-    def _rule_axes(self, view: View) -> None:
-        """Limits, and the same round step of the grid along both axes."""
+    def _set_limits(self, view: View) -> None:
+        """Set the limits, and the same round grid spacing for both axes."""
         ax = self.ax
         ax.set_xlim(view.left, view.right)
         ax.set_ylim(view.bottom, view.top)
@@ -58,7 +58,7 @@ class Page:
         self._y = self._sheet.legend(entries, self._panel, self._y)
 
     def rows(self, title: str, rows: Sequence[tuple[str, str, str]]) -> None:
-        """Write a small table into the panel; what does not fit is counted."""
+        """Write a small table into the panel; rows that do not fit are counted."""
         if not rows:
             return
         self._y -= 0.35
@@ -74,7 +74,7 @@ class Page:
             self.note(f"and {len(rows) - len(shown)} more")
 
     def note(self, text: str) -> None:
-        """Write a quiet line into the panel."""
+        """Write a grey line into the panel."""
         self._y -= _ROW
         self._sheet.text(
             self._panel, self._y, one_line(text, 40), fontsize=style.SMALL, color=style.QUIET

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the bits of a run's decisions stand for around the robot: sectors, or headings."""
+"""The geometry of a decision's bits around the robot: a ring of sectors, or of headings."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..simulation.episode import Episode
 
 @dataclass(frozen=True, slots=True)
 class Ring:
-    """As many equal wedges as there are bits; wedge i (from 0) begins i + first of them from +x.
+    """One equal wedge per bit; wedge i (from 0) starts i + first wedge widths from +x.
 
-    Sectors begin at +x (Table 1). A planner of headings has each in the middle of its wedge, and
-    every heading is its own gap. rule says where gaps lead.
+    Sectors start at +x (Table 1). In a ring of headings (predictive planner) each heading is the
+    middle of its wedge and its own gap. rule: how the heading of a gap is computed.
     """
 
     count: int
@@ -25,22 +25,22 @@ class Ring:
 
     @property
     def of_headings(self) -> bool:
-        """Whether the bits are headings that lead to contact, not sectors with something in."""
+        """Whether a bit is a heading that leads to a contact, not a sector with an obstacle."""
         return self.first != 0.0
 
     @property
     def gaps(self) -> list[float]:
-        """The headings of the gaps in radians."""
+        """The headings of the gaps (rad)."""
         return [gap_heading(gap, self.count, self.rule) for gap in range(1, self.count + 1)]
 
     def wedge(self, i: int, wedges: int = 1) -> tuple[float, float]:
-        """Where wedge i, or so many from it on, begins and ends: radians from +x."""
+        """Start and end of wedge i, or of so many wedges from i on: radians from +x."""
         width = 2.0 * math.pi / self.count
         return (i + self.first) * width, (i + self.first + wedges) * width
 
 
 def ring_of(episode: Episode, bits: Bits = ()) -> Ring:
-    """The ring of a run's bits: of headings where they are not as many as its sectors."""
+    """The ring of a run's bits: of headings if their number is not that of its sectors."""
     sectors = episode.sensor.sectors
     if len(bits) in (0, sectors):
         return Ring(sectors, rule=episode.planner.gap_heading)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One visual language for all pictures; colours that colour-blind readers tell apart.
+"""Colours, line styles and fonts of all pictures.
 
-The palette is Okabe and Ito's (2008). What must not be mistaken for something else differs in
-width, dashes or shape too.
+The palette is Okabe and Ito's (2008), for colour-blind readers. Marks that must not be confused
+differ in width, dashes or shape too.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ ARROW: Looks = {
     "arrowstyle": "-|>", "mutation_scale": 9.0, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 0.0,
     "color": QUIET,
 }  # fmt: skip
-WAY: Looks = {"color": INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5, 1, 1.5))}
+RECORDED: Looks = {"color": INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5, 1, 1.5))}
 PASS: Looks = {
     "color": INK, "linewidth": 1.0, "marker": "o", "markersize": 4.0,
     "markerfacecolor": PAPER, "markeredgecolor": INK,
@@ -78,7 +78,7 @@ FREE_GAP: Looks = {**_ARROW, "color": GREEN, "linewidth": 1.6}
 TAKEN: Looks = {**_ARROW, "color": VERMILLION, "linewidth": 3.0}
 CLOSED_GAP: Looks = {"color": ORANGE, "linewidth": 1.4, "linestyle": (0, (1, 1.8))}
 WALL: Looks = {"edgecolor": INK, "linewidth": 1.8}
-# where the robot stands still its line has no length: a frame around the place says so
+# Where the robot stands still its line has no length: a frame marks the position.
 _FRAME: Looks = {"markersize": 15.0, "markerfacecolor": "none", "markeredgewidth": 2.2}
 STANDING: dict[Mode, Looks] = {
     Mode.BLOCKED: {**_FRAME, "marker": "s"},
@@ -94,10 +94,10 @@ NUMBER: Looks = {"ha": "center", "va": "center", "fontsize": SMALL, "color": INK
 HALO: Looks = {"linewidth": 2.5, "foreground": PAPER}
 
 _RC: dict[str, Any] = {
-    "font.family": ["DejaVu Sans"],  # comes with matplotlib: the same letters everywhere
+    "font.family": ["DejaVu Sans"],  # comes with matplotlib: the same glyphs everywhere
     "font.size": NORMAL,
     "text.color": INK,
-    "text.parse_math": False,  # a name with two dollar signs is a name
+    "text.parse_math": False,  # a name may contain dollar signs
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,
     "axes.labelsize": NORMAL,
@@ -116,12 +116,12 @@ _RC: dict[str, Any] = {
     "legend.fontsize": SMALL,
     "figure.dpi": DPI,
     "savefig.dpi": "figure",
-    "svg.hashsalt": "mfba",  # ids by content, not by chance
+    "svg.hashsalt": "mfba",  # ids by content, not random
 }
 
 
 def context() -> AbstractContextManager[None]:
-    """Draw within this: the house style on matplotlib's defaults, not on the user's settings."""
+    """Drawing context: this style on matplotlib's defaults, not on the user's settings."""
     from matplotlib import style
 
     return style.context(_RC, after_reset=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sweep's report: for terminals, and as Markdown."""
+"""The tables of a sweep's report: for terminals, and as Markdown."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ VERSUS_HEAD = (
 VERSUS_NOTE = "the same worlds with the same seeds; gaps where both succeeded, negative: shorter"
 
 
-def tables(standings: Sequence[Standing], versus: Sequence[Versus], title: str) -> list[Table]:
+def tables(summaries: Sequence[Standing], versus: Sequence[Versus], title: str) -> list[Table]:
     """Tables for a terminal."""
-    found = [_table(title, HEAD, _standing_lines(standings), NOTE)]
+    found = [_table(title, HEAD, _summary_lines(summaries), NOTE)]
     if versus:
         found.append(_table("In pairs", VERSUS_HEAD, _versus_lines(versus), VERSUS_NOTE))
     return found
 
 
 def to_markdown(
-    standings: Sequence[Standing], versus: Sequence[Versus], title: str, facts: Sequence[str]
+    summaries: Sequence[Standing], versus: Sequence[Versus], title: str, facts: Sequence[str]
 ) -> str:
-    """The same as a page; facts are lines that tell how it was made."""
+    """The same as a Markdown page; facts: lines about how the sweep was made."""
     blocks = [f"# {title}", "\n".join(f"- {fact}" for fact in facts)]
-    blocks += [standing_table(standings), NOTE + "."]
+    blocks += [standing_table(summaries), NOTE + "."]
     failures = [
-        f"- {s.planner}: {count} x {reason}" for s in standings for reason, count in s.failures
+        f"- {s.planner}: {count} x {reason}" for s in summaries for reason, count in s.failures
     ]
     if failures:
         blocks += ["## Failures of planners", "\n".join(failures)]
@@ -52,18 +52,18 @@ def to_markdown(
     return "\n\n".join(blocks) + "\n"
 
 
-def standing_table(standings: Sequence[Standing]) -> str:
-    """A line for each planner, as Markdown."""
-    return markdown(HEAD, _standing_lines(standings))
+def standing_table(summaries: Sequence[Standing]) -> str:
+    """One line per planner, as Markdown."""
+    return markdown(HEAD, _summary_lines(summaries))
 
 
 def versus_table(versus: Sequence[Versus]) -> str:
-    """A line for each pair, as Markdown."""
+    """One line per pair of planners, as Markdown."""
     return markdown(VERSUS_HEAD, _versus_lines(versus))
 
 
-def _standing_lines(standings: Sequence[Standing]) -> Iterator[list[str]]:
-    for s in standings:
+def _summary_lines(summaries: Sequence[Standing]) -> Iterator[list[str]]:
+    for s in summaries:
         yield [
             s.planner,
             str(s.runs),
@@ -94,7 +94,7 @@ def _versus_lines(versus: Sequence[Versus]) -> Iterator[list[str]]:
 
 
 def _table(title: str, head: Sequence[str], lines: Iterator[list[str]], note: str) -> Table:
-    """One column per planner or pair: the figures are too many for one line."""
+    """One column per planner or pair: too many numbers for one line."""
     columns = [head, *lines]
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, show_header=False)
     table.caption, table.caption_justify = note, "left"
@@ -106,13 +106,13 @@ def _table(title: str, head: Sequence[str], lines: Iterator[list[str]], note: st
 
 
 def markdown(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    """A table, as Markdown."""
+    """A Markdown table."""
     rows = [head, ["---"] * len(head), *lines]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
 
 
 def percent(interval: Interval | None) -> str:
-    """A share and the ends of its interval."""
+    """A share and its interval, in per cent."""
     if interval is None:
         return _NONE
     middle, low, high = (100.0 * v for v in (interval.middle, interval.low, interval.high))
@@ -120,7 +120,7 @@ def percent(interval: Interval | None) -> str:
 
 
 def points(interval: Interval) -> str:
-    """A difference of shares and the ends of its interval."""
+    """A difference of shares and its interval, in percentage points."""
     middle, low, high = (100.0 * v for v in (interval.middle, interval.low, interval.high))
     return f"{middle:+.2f} [{low:+.2f}, {high:+.2f}] points"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Onto a terminal or into a pipe, whatever letters its encoding has."""
+"""Print to a terminal or pipe whose encoding may lack some characters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rich.console import Console
 
 
 def print_encodable(console: Console, draw: Callable[[Console], None]) -> None:
-    """Print what draw prints, with a question mark for each letter the encoding lacks."""
+    """Print what draw prints, with a question mark for each character the encoding lacks."""
     with console.capture() as captured:
         draw(console)
     encoding = console.encoding

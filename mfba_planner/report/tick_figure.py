@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One moment of a run, close up: what was where, what the sensors saw, what was decided."""
+"""One tick of a run as a close-up picture: obstacles, sectors, gaps, waypoint."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from mfba_planner.simulation.episode import Episode
 
 from . import legend, style
 from .draw_tick import draw_snapshot
-from .figure_canvas import EDGE, Sheet, to_bytes
+from .figure_sheet import EDGE, Sheet, to_bytes
 
 _SIDE, _HEAD, _AXIS, _PANEL = 5.0, 0.85, 0.6, 2.6  # inches
-_AROUND = 3.0  # of the sensing range
+_AROUND = 3.0  # sensing ranges shown around the robot
 
 
 def moment_png(episode: Episode, index: int, title: str, lines: Sequence[str]) -> bytes:
-    """The surroundings of the robot at tick index (from 0) as PNG, with a headline."""
+    """The robot's surroundings at tick index (from 0) as PNG, with title and subtitle."""
     with style.context():
         sheet = Sheet(EDGE + _AXIS + _SIDE + EDGE + _PANEL, _AXIS + EDGE + _SIDE + _HEAD)
         sheet.head(title, lines[0] if lines else "")

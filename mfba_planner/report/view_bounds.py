@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which part of the world a picture shows."""
+"""The view of a picture: the rectangle of the world that it shows, and its scale."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mfba_planner.simulation.episode import Episode
 
 from .run_events import Pass, encounter_ticks, is_finite
 
-_NEAR = 0.35  # of the trip's extent: what is further away is not worth shrinking the path for
+_NEAR = 0.35  # times the trip's extent: what is further away is left out, for a larger path
 _MARGIN = 0.04
 _WIDEST, _HIGHEST = 8.0, 6.4  # of the axes, inches
 _SLIMMEST, _LOWEST = 4.6, 4.0
@@ -36,7 +36,7 @@ class View(NamedTuple):
         return self.top - self.bottom
 
     def around(self, center: Point, radius: float = 0.0) -> View:
-        """The view widened to hold a circle, or a point."""
+        """The view extended to hold a circle, or a point."""
         (x, y), r = center, radius
         left, bottom = min(self.left, x - r), min(self.bottom, y - r)
         return View(left, bottom, max(self.right, x + r), max(self.top, y + r))
@@ -46,7 +46,7 @@ class View(NamedTuple):
         return View(self.left - dx, self.bottom - dy, self.right + dx, self.top + dy)
 
     def holds(self, point: Point, slack: float = 0.0) -> bool:
-        """Tell whether a point is inside, or at most slack (m) outside."""
+        """Whether a point is inside, or at most slack (m) outside."""
         x, y = point
         return (
             self.left - slack <= x <= self.right + slack
@@ -55,9 +55,9 @@ class View(NamedTuple):
 
 
 def choose_view(episode: Episode, passes: Sequence[Pass]) -> tuple[View, float]:
-    """The view and its scale in inches per metre.
+    """The view of a run and its scale in inches per metre.
 
-    All of the path is in it; rings, walls and obstacles are unless far away or too large.
+    It holds the whole path, and rings, walls and obstacles unless far away or too large.
     """
     scenario = episode.scenario
     trip = View(*scenario.start_m, *scenario.start_m).around(scenario.goal_m)
@@ -76,7 +76,7 @@ def choose_view(episode: Episode, passes: Sequence[Pass]) -> tuple[View, float]:
     view = _holding(trip, [c for c in circles if trip.holds(c[0], near)])
     margin = max(scenario.robot_radius_m, _MARGIN * max(view.width, view.height))
     view, _ = fitted(view.grown(margin, margin))
-    # filling the sheet may have brought in a part of something: then show all of it
+    # fitted() may have brought a circle partly into view: then show all of it.
     cut = [(c, 1.1 * r) for c, r in circles if view.holds(c, r)]
     return fitted(_holding(view, cut))
 
@@ -88,7 +88,7 @@ def _holding(view: View, circles: Sequence[tuple[Point, float]]) -> View:
 
 
 def fitted(view: View) -> tuple[View, float]:
-    """The view, grown where it is too slim to read, and its scale in inches per metre."""
+    """The view, extended to the minimum size of a figure, and its scale in inches per metre."""
     scale = min(_WIDEST / view.width, _HIGHEST / view.height)
     dx, dy = _SLIMMEST / scale - view.width, _LOWEST / scale - view.height
     return view.grown(max(0.0, dx) / 2.0, max(0.0, dy) / 2.0), scale

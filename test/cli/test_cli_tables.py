@@ -358,7 +358,7 @@ def test_a_page_without_a_place_is_left_as_it_was(capsys: Said, tmp_path: Path) 
     page = tmp_path / "page.md"
     page.write_text("# mine\n")
     said = refused(capsys, "1", "--out", str(tmp_path / "out"), "--update", str(page))
-    assert "no place for 'origin': put the lines <!-- begin generated: origin -->" in said
+    assert "no block 'origin' in the page: add the lines <!-- begin generated: origin -->" in said
     assert page.read_text() == "# mine\n"
     assert os.listdir(tmp_path) == ["page.md"]  # seen to before anything is run
 

@@ -57,9 +57,9 @@ def test_without_a_screen_or_a_viewer(monkeypatch: pytest.MonkeyPatch, tmp_path:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     assert cli.main(["sim", "empty", "--out", "made"]) == 0
-    with pytest.raises(ConfigError, match=r"^no screen .*--save FILE.rrd"):
+    with pytest.raises(ConfigError, match=r"^no display .*--save FILE.rrd"):
         cli.main(["view", "made"])
-    with pytest.raises(ConfigError, match=r"^no screen "):  # before anything is run
+    with pytest.raises(ConfigError, match=r"^no display "):  # before anything is run
         read_request(["case1", "--view"], "mfba run")
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(ConfigError, match=r"rerun is not installed; pip install 'mfba_planner\[v"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The preset `best` against what bench/peers.py measured of others, at the same budget."""
+"""The preset `best` compared with other optimisers (bench/peers.py) at the same budget."""
 
 import numpy as np
 import pytest
@@ -46,11 +46,11 @@ def test_best_reaches_the_minimum_of_each_function(best: list[float]) -> None:
         assert mean - function.minimum() < 0.02, function.key
 
 
-def test_best_spends_what_the_others_spend() -> None:
+def test_best_has_the_budget_of_the_others() -> None:
     params = readings.swarm("best")
     assert (params.population, params.iterations) == (40, 200)
 
 
-def test_a_reading_with_a_slip_in_its_name() -> None:
+def test_a_misspelt_reading_gets_a_suggestion() -> None:
     with pytest.raises(ConfigError, match=r"^'bets': unknown swarm reading; did you mean 'best'"):
         readings.swarm("bets")

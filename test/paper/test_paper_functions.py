@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Table 2: values from elsewhere, minima that hold, symmetries, and both ways to evaluate."""
+"""Functions of Table 2: independent values, minima, symmetries, floats against arrays."""
 
 import math
 
@@ -20,7 +20,7 @@ def uniform(function: Function, d: int, count: int, seed: int = 3) -> np.ndarray
     return rng.uniform(function.lower, function.upper, (count, d))
 
 
-# Worked by hand, or with another program, from the printed formulas.
+# Computed by hand, or with another program, from the printed formulas.
 @pytest.mark.parametrize(
     ("key", "x", "value"),
     [
@@ -65,7 +65,7 @@ def test_minima_as_printed_in_table_2(function: Function) -> None:
 
 @pytest.mark.parametrize("function", ALL)
 @pytest.mark.parametrize("d", [1, 2, 3, 6])
-def test_nothing_in_the_range_is_below_the_minimum(function: Function, d: int) -> None:
+def test_no_value_in_the_range_is_below_the_minimum(function: Function, d: int) -> None:
     if function.key in FLAT and d != 2:
         with pytest.raises(ConfigError):
             function.minimum(d)
@@ -126,7 +126,7 @@ def test_far_outside_a_batch_gives_nan_or_inf_and_no_warning() -> None:
         assert values.shape == (3,)
 
 
-def test_dimensions_that_are_not() -> None:
+def test_impossible_dimensions_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"^F1 \(Sphere\): d=0; give d >= 1$"):
         FUNCTIONS["F1"].box(0)
     with pytest.raises(ConfigError, match=r"^F4 \(Booth\): d=3; it has d = 2$"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The printed numbers, and each impossibility recomputed in another way than doubts.py does."""
+"""The printed numbers, and each impossible one recomputed independently of doubts.py."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.published import BY_KEY, values
 
 
-def test_every_number_of_the_tables_is_there_under_one_name() -> None:
+def test_every_number_of_the_tables_has_a_unique_key() -> None:
     count = {
         place: sum(p.place == place for p in published.ALL)
         for place in (f"Table {n}" for n in range(1, 8))
@@ -47,11 +47,11 @@ def test_every_number_of_the_tables_is_there_under_one_name() -> None:
         ("Section 6.2, case 1/MFBA/run time", "8.151829"),
     ],
 )
-def test_numbers_stand_as_printed(key: str, text: str) -> None:
+def test_texts_are_as_printed(key: str, text: str) -> None:
     assert BY_KEY[key].text == text
 
 
-def test_values_are_what_the_texts_mean() -> None:
+def test_values_are_those_of_the_texts() -> None:
     for printed in published.ALL:
         if re.fullmatch(r"-?\d[\d.]*(e-?\d+)?", printed.text) and printed.column != "formula":
             assert printed.value == float(printed.text), printed.key
@@ -59,7 +59,7 @@ def test_values_are_what_the_texts_mean() -> None:
             assert printed.value in (None, math.pi), printed.key
 
 
-def test_what_cannot_be_is_exactly_this() -> None:
+def test_the_impossible_numbers_are_exactly_these() -> None:
     assert set(doubts.IMPOSSIBLE) == {
         "Table 3/F4 MFBA/sd",
         "Table 3/F6 BA/best",
@@ -79,7 +79,7 @@ def test_what_cannot_be_is_exactly_this() -> None:
 @pytest.mark.parametrize(
     ("place", "law"), [("Table 5", "MFBA"), ("Table 7", "BA"), ("Table 7", "MFBA")]
 )
-def test_deviations_of_trips_are_beyond_popoviciu_and_bhatia_davis(place: str, law: str) -> None:
+def test_deviations_of_trips_exceed_popoviciu_and_bhatia_davis(place: str, law: str) -> None:
     v = values(place, law)
     low, high, mean, sd = v["minimum"], v["maximum"], v["mean"], v["standard deviation"]
     to_sample = math.sqrt(10 / 9)
@@ -87,13 +87,13 @@ def test_deviations_of_trips_are_beyond_popoviciu_and_bhatia_davis(place: str, l
     assert sd > 100 * to_sample * math.sqrt((high - mean) * (mean - low))
 
 
-def test_the_other_deviation_of_table_5_can_be() -> None:
+def test_the_other_deviation_of_table_5_is_possible() -> None:
     v = values("Table 5", "BA")
     ten = [v["minimum"]] * 4 + [v["maximum"]] * 6
     assert np.std(ten, ddof=1) > v["standard deviation"]
 
 
-def test_f4_s_deviation_is_too_small_for_its_ends() -> None:
+def test_the_deviation_of_f4_is_too_small_for_its_ends() -> None:
     v = values("Table 3", "F4 MFBA")
     # Both ends are among the fifteen, so their squares alone are a lower bound.
     ends = (v["best"] - v["mean"]) ** 2 + (v["worst"] - v["mean"]) ** 2
@@ -101,7 +101,7 @@ def test_f4_s_deviation_is_too_small_for_its_ends() -> None:
     assert math.sqrt(ends / 14) > v["sd"] * 1.1
 
 
-def test_f6_s_bests_are_out_of_the_range() -> None:
+def test_the_best_values_of_f6_are_below_its_minimum() -> None:
     grid = np.linspace(0.0, math.pi, 2001)
     points = np.stack(np.meshgrid(grid, grid), axis=-1)
     least = float(FUNCTIONS["F6"].batch(points).min())
@@ -122,7 +122,7 @@ numbers = st.lists(st.floats(-1e3, 1e3, allow_nan=False), min_size=3, max_size=2
 
 
 @given(numbers)
-def test_no_sample_escapes_the_bounds(sample: list[float]) -> None:
+def test_every_sample_is_within_the_bounds(sample: list[float]) -> None:
     low, high, mean = min(sample), max(sample), float(np.mean(sample))
     if high - low < 1e-6:
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The named readings of section 6.2 hold the printed path lengths, without a collision."""
+"""The named readings of section 6.2 reproduce the printed path lengths without a collision."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams
 
-SEEDS = 200  # of the 1000 that the full claim is made of
+SEEDS = 200  # of the 1000 seeds behind the full claim
 # Fitness of Tables 5 and 7: maximum, mean, minimum; lengths are the reciprocals.
 PRINTED = {
     ("section6", "case1"): (0.0585072461, 0.05844756632, 0.05830325),
@@ -33,7 +33,7 @@ def ten_runs(lengths: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("reading", "case"), PRINTED)
-def test_ten_runs_of_a_reading_hold_the_printed_row(reading: str, case: str) -> None:
+def test_intervals_of_ten_runs_contain_the_printed_row(reading: str, case: str) -> None:
     params = override(readings.planner(reading), {"bat.algorithm": ALGORITHMS[reading].value})
     scenario = load_scenario(case)
     results: list[Result] = [
@@ -56,7 +56,7 @@ def test_the_fitted_constants_are_these() -> None:
     )
 
 
-def test_an_unknown_reading_is_named() -> None:
+def test_an_unknown_reading_is_refused() -> None:
     with pytest.raises(ConfigError, match="did you mean 'section6'"):
         readings.planner("section7")
     with pytest.raises(ConfigError, match="unknown swarm reading"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sensitivity study: what varies, what is judged, what the command leaves behind."""
+"""The sensitivity study: readings, results per reading, and the files of the command."""
 
 import csv
 import io
@@ -24,7 +24,7 @@ from mfba_planner.paper.study.run import Sample
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report import style
-from mfba_planner.report.figure_canvas import to_bytes
+from mfba_planner.report.figure_sheet import to_bytes
 from mfba_planner.report.figures.sensitivity import draw
 from mfba_planner.report.sensitivity_table import to_csv, to_markdown, to_table
 from mfba_planner.scenarios.scenario_files import load_scenario
@@ -43,7 +43,7 @@ def reading(label: str) -> Reading:
     return found
 
 
-# --- what varies ----------------------------------------------------------------------------
+# --- readings -------------------------------------------------------------------------------
 
 
 def test_the_first_reading_is_section6_and_every_other_differs_from_it() -> None:
@@ -65,14 +65,14 @@ def test_one_thing_is_changed_at_a_time() -> None:
         assert changed + (not r.enlarged) in ((1, 2) if r.group == "SR measured" else (1,)), r
 
 
-def test_the_quick_form_leaves_readings_out_and_changes_none() -> None:
+def test_the_quick_form_has_some_of_the_readings_unchanged() -> None:
     quick = sensitivity.all_readings(quick=True)
     assert quick[0] == BASE
     assert {r.name for r in quick} < {r.name for r in [BASE, *OTHERS]}
     assert {r.group for r in quick} >= set(sensitivity.GROUPS) - {"SR measured"}
 
 
-def test_section6_runs_as_without_the_study() -> None:
+def test_section6_gives_the_same_runs_as_outside_the_study() -> None:
     columns = variation(BASE, "case2").run([3, 4])
     episodes = [run(SCENARIOS["case2"], seed=seed) for seed in (3, 4)]
     assert columns["length_m"] == [evaluate(episode).length_m for episode in episodes]
@@ -82,13 +82,13 @@ def test_section6_runs_as_without_the_study() -> None:
 
 
 @pytest.mark.parametrize("angle", [math.pi / 12.0, -1.0])
-def test_turning_the_world_turns_the_sectors_back(angle: float) -> None:
+def test_turning_the_world_turns_the_sectors_the_other_direction(angle: float) -> None:
     world = replace(SCENARIOS["case2"], start_m=(0.5, -1.0))
-    there = turned(world, angle)
+    turned_world = turned(world, angle)
     for t in (0.0, 7.0):
-        for a, b in zip(world.centers(t), there.centers(t)):
-            assert distance(world.start_m, a) == pytest.approx(distance(there.start_m, b))
-    assert distance(there.start_m, there.goal_m) == pytest.approx(
+        for a, b in zip(world.centers(t), turned_world.centers(t)):
+            assert distance(world.start_m, a) == pytest.approx(distance(turned_world.start_m, b))
+    assert distance(turned_world.start_m, turned_world.goal_m) == pytest.approx(
         distance(world.start_m, world.goal_m)
     )
     width = math.pi / 6.0
@@ -102,18 +102,20 @@ def test_turning_the_world_turns_the_sectors_back(angle: float) -> None:
     assert other == one[-1:] + one[:-1]
 
 
-def test_a_robot_unaware_of_its_size_touches_what_it_does_not_see() -> None:
-    blind = reading("own edge, not enlarged")
-    columns = variation(blind, "case2").run(range(6))
+def test_without_enlargement_the_robot_touches_obstacles() -> None:
+    not_enlarged = reading("own edge, not enlarged")
+    columns = variation(not_enlarged, "case2").run(range(6))
     assert sum(columns["collisions"]) > 0
     assert sum(variation(BASE, "case2").run(range(6))["collisions"]) == 0
 
 
-# --- what is judged -------------------------------------------------------------------------
+# --- results --------------------------------------------------------------------------------
 
 
-def samples(length: Mapping[str, float], told: float = 1.0, hit: float = 0.0) -> dict[str, Sample]:
-    """Made-up samples: every run of a case as long as that, give or take 5 mm."""
+def samples(
+    length: Mapping[str, float], as_figure: float = 1.0, hit: float = 0.0
+) -> dict[str, Sample]:
+    """Synthetic samples: the lengths of a case's runs differ by at most 5 mm from this length."""
     found: dict[str, Sample] = {}
     for r in sensitivity.all_readings(quick=True):
         for case in CASES:
@@ -122,7 +124,7 @@ def samples(length: Mapping[str, float], told: float = 1.0, hit: float = 0.0) ->
                 "length_m": length[case] + spread,
                 "collisions": np.full(41, hit),
                 "reached": np.ones(41),
-                "told": np.full(41, told),
+                "told": np.full(41, as_figure),
             }
     return found
 
@@ -146,11 +148,11 @@ def row(
         intervals=tuple(Interval(m, m - 0.01, m + 0.01) for m in middles),
         contacts=contacts,
         reached=reached,
-        told=0.4,
+        as_figure=0.4,
     )
 
 
-def test_a_row_is_reproduced_when_all_of_it_lies_within() -> None:
+def test_a_row_is_reproduced_when_all_its_lengths_lie_within() -> None:
     good = row(17.09, 17.11, 17.15)
     assert good.reproduces == ("MFBA",)
     assert good.holds("BA") == (True, False, False)
@@ -162,7 +164,7 @@ def test_a_row_is_reproduced_when_all_of_it_lies_within() -> None:
 
 
 def test_shares_and_intervals_come_from_the_samples() -> None:
-    rows = sensitivity.rows(samples({"case1": 17.0, "case2": 18.0}, told=1.0, hit=2.0), True)
+    rows = sensitivity.rows(samples({"case1": 17.0, "case2": 18.0}, as_figure=1.0, hit=2.0), True)
     assert [r.case for r in rows[:2]] == list(CASES)
     for r in rows:
         length = 17.0 if r.case == "case1" else 18.0
@@ -170,10 +172,10 @@ def test_shares_and_intervals_come_from_the_samples() -> None:
         assert length - 0.005 <= best.low <= best.middle < mean.middle < worst.middle
         assert worst.high <= length + 0.005
         assert mean.middle == pytest.approx(length, abs=0.001)
-        assert (r.contacts, r.reached, r.told, r.as_told) == (1.0, 1.0, 1.0, True)
+        assert (r.contacts, r.reached, r.as_figure, r.mostly_as_figure) == (1.0, 1.0, 1.0, True)
 
 
-def test_csv_table_and_picture_tell_the_same_rows() -> None:
+def test_csv_table_and_picture_have_the_same_rows() -> None:
     rows = sensitivity.rows(samples({"case1": 17.1, "case2": 18.5}), True)
     lines = list(csv.DictReader(to_csv(rows).splitlines()))
     assert [(line["reading"], line["case"]) for line in lines] == [
@@ -191,11 +193,11 @@ def test_csv_table_and_picture_tell_the_same_rows() -> None:
         figure = draw(rows)
         assert to_bytes(figure, "svg") == to_bytes(draw(rows), "svg")
         numbers = [text.get_text() for ax in figure.axes for text in ax.texts]
-    assert numbers.count("100") == table.row_count * 2  # all meet as told
+    assert numbers.count("100") == table.row_count * 2  # all have the encounters of the figure
     assert "preset" in numbers
 
 
-def test_the_page_has_the_readings_of_this_code() -> None:
+def test_the_docs_page_has_the_readings_of_this_code() -> None:
     page = (ROOT / "docs/sensitivity.md").read_text(encoding="utf-8")
     lines = [line.split(" | ") for line in page.splitlines() if line.startswith("|")][2:]
     assert [line[1].strip() for line in lines] == [r.label for r in [BASE, *OTHERS]]
@@ -210,21 +212,21 @@ def test_the_page_has_the_readings_of_this_code() -> None:
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Three readings and two seeds: what the command does does not depend on how many."""
+    """Three readings and two seeds, for a fast test of the command."""
     few = [BASE, reading("0.6 m/s"), reading("turned by half a sector")]
     monkeypatch.setattr(sensitivity, "all_readings", lambda quick=False: few)
     monkeypatch.setattr(sensitivity, "QUICK_SEEDS", 2)
 
 
 @pytest.mark.usefixtures("small")
-def test_the_command_goes_on_where_it_was(
+def test_an_interrupted_command_is_resumed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "s"
     args = ["sensitivity", "--quick", "--workers", "1", "--out", str(out)]
     assert cli.main(args) == 0
-    told = capsys.readouterr().out
-    assert "turned by half a sector" in told
+    text = capsys.readouterr().out
+    assert "turned by half a sector" in text
     names = {"sensitivity.csv", "sensitivity.md", "sensitivity.png", "sensitivity.svg"}
     before = {name: (out / name).read_bytes() for name in names}
     (out / "sensitivity.csv").unlink()
@@ -236,7 +238,7 @@ def test_the_command_goes_on_where_it_was(
 
 
 @pytest.mark.usefixtures("small")
-def test_a_terminal_without_these_letters_is_no_error(
+def test_a_terminal_without_these_characters_is_no_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     console = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
@@ -248,7 +250,7 @@ def test_a_terminal_without_these_letters_is_no_error(
 
 
 @pytest.mark.usefixtures("small")
-def test_numbers_that_cannot_be_are_refused(tmp_path: Path) -> None:
+def test_impossible_arguments_are_refused(tmp_path: Path) -> None:
     out = ["--out", str(tmp_path / "s")]
     with pytest.raises(ConfigError, match="--workers=0"):
         cli.main(["sensitivity", "--workers", "0", *out])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The study's runs: the same for any number of workers, resumable, refused when not ours."""
+"""The study's runs: the same for any number of workers, resumable, other directories refused."""
 
 import json
 import os
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from project import ROOT
 
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
 from mfba_planner.core.geometry import Pose2D
@@ -19,7 +20,7 @@ from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.paper.readings import PLANNERS
 from mfba_planner.paper.study.chunk import BENCHMARK_STREAM, Benchmark, SampleChunk, Trips, chunks
 from mfba_planner.paper.study.plan import FULL, QUICK, benchmark_plan, trip_plan
-from mfba_planner.paper.study.run import open_store, run_plan
+from mfba_planner.paper.study.run import PACKAGES, open_store, run_plan
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
@@ -30,7 +31,7 @@ SWARM = BatParams(population=6, iterations=10)
 
 
 def a_plan(first: int = 3, size: int = 4) -> list[SampleChunk]:
-    """Two samples of a few cheap runs."""
+    """Two samples of a few fast runs."""
     return [
         *chunks("a/F5/mfba", Benchmark(function="F5", bat=SWARM), first, 10, size),
         *chunks("b/near/mfba", Trips(scenario=NEAR, planner=PlannerParams()), first, 5, size),
@@ -44,27 +45,29 @@ def plain(samples: Any) -> dict[str, dict[str, list[float]]]:
     }
 
 
-def test_a_run_of_the_study_is_a_run_of_the_single_engine() -> None:
+def test_a_run_of_the_study_equals_a_single_run_of_minimize() -> None:
     for algorithm in Algorithm:
         params = replace(SWARM, algorithm=algorithm)
         key = (BENCHMARK_STREAM, 4, int.from_bytes(algorithm.value.encode(), "big"))
         rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(17, spawn_key=key)))
-        alone = minimize(FUNCTIONS["F4"], FUNCTIONS["F4"].box(2), params, rng).best_value
+        single = minimize(FUNCTIONS["F4"], FUNCTIONS["F4"].box(2), params, rng).best_value
         work = Benchmark(function="F4", bat=params)
-        assert work.run([16, 17])["best"][1] == alone
+        assert work.run([16, 17])["best"][1] == single
 
 
-def test_laws_functions_and_seeds_have_streams_of_their_own() -> None:
-    still = replace(SWARM, iterations=1, sigma=0.0, f_max=0.0)  # the best of the first bats
+def test_laws_functions_and_seeds_have_different_random_streams() -> None:
+    no_motion = replace(SWARM, iterations=1, sigma=0.0, f_max=0.0)  # the best of the first bats
     found = [
-        Benchmark(function=function, bat=replace(still, algorithm=algorithm)).run([1, 2])["best"]
+        Benchmark(function=function, bat=replace(no_motion, algorithm=algorithm)).run([1, 2])[
+            "best"
+        ]
         for function in ("F1", "F5")
         for algorithm in Algorithm
     ]
     assert len({value for pair in found for value in pair}) == 8
 
 
-def test_a_trip_of_the_study_is_what_sim_tells_of_its_seed() -> None:
+def test_a_trip_of_the_study_equals_the_run_of_its_seed() -> None:
     found = Trips(scenario=NEAR, planner=PLANNERS["fig1"]).run([7, 8])
     episode = run(NEAR, planner=PLANNERS["fig1"], seed=8)
     result = evaluate(episode)
@@ -95,7 +98,7 @@ def test_seeds_are_those_asked_for() -> None:
 
 
 @pytest.mark.parametrize("workers", [0, -1, 257])
-def test_workers_that_cannot_be_are_refused(workers: int) -> None:
+def test_impossible_numbers_of_workers_are_refused(workers: int) -> None:
     with pytest.raises(ConfigError, match=rf"--workers={workers}: out of range; give 1 to 256"):
         run_plan(a_plan(), workers=workers)
 
@@ -105,25 +108,25 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     compute = SampleChunk.run
 
-    def noted(chunk: SampleChunk) -> Any:
+    def recorded(chunk: SampleChunk) -> Any:
         names.append(chunk.name)
         return compute(chunk)
 
-    monkeypatch.setattr(SampleChunk, "run", noted)
+    monkeypatch.setattr(SampleChunk, "run", recorded)
     return names
 
 
-def test_an_interrupted_study_goes_on_and_gives_the_same(
+def test_an_interrupted_study_is_resumed_with_the_same_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = a_plan()
     whole = plain(run_plan(plan))
     computed = counted(monkeypatch)
-    seen: list[SampleChunk] = []
+    finished: list[SampleChunk] = []
 
     def interrupt(chunk: SampleChunk) -> None:
-        seen.append(chunk)
-        if len(seen) == 2:
+        finished.append(chunk)
+        if len(finished) == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -189,7 +192,12 @@ def test_results_of_anything_else_are_refused(
     assert "cut short or not JSON" in refusal(out, plan, {"seed": 3})
 
 
-def test_other_people_s_directories_are_left_alone(tmp_path: Path) -> None:
+def test_the_code_that_decides_the_numbers_is_in_folders_that_exist() -> None:
+    for name in PACKAGES:
+        assert list((ROOT / "mfba_planner" / name).rglob("*.py")), name
+
+
+def test_directories_of_other_files_are_left_unchanged(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     assert "not empty and no results of `mfba tables`" in refusal(tmp_path, a_plan(), {})
     assert os.listdir(tmp_path) == ["mine.txt"]
@@ -197,7 +205,7 @@ def test_other_people_s_directories_are_left_alone(tmp_path: Path) -> None:
     assert "cannot be written (not a directory)" in refusal(tmp_path / "mine.txt", a_plan(), {})
 
 
-def test_the_manifest_says_what_was_run(tmp_path: Path) -> None:
+def test_the_manifest_lists_what_was_run(tmp_path: Path) -> None:
     open_store(tmp_path / "deep/out", a_plan(), {"seed": 3})
     found = json.loads((tmp_path / "deep/out/study.json").read_text())
     assert found["seed"] == 3
@@ -206,8 +214,8 @@ def test_the_manifest_says_what_was_run(tmp_path: Path) -> None:
 
 
 @dataclass(frozen=True)
-class Deadly:
-    """Work that ends its process, as the kernel does when memory is out."""
+class ProcessKiller:
+    """Work that ends its process, as the kernel does when memory runs out."""
 
     def facts(self) -> dict[str, Any]:
         return {}
@@ -217,24 +225,24 @@ class Deadly:
 
 
 @dataclass(frozen=True)
-class Faulty(Deadly):
+class ErrorRaiser(ProcessKiller):
     def run(self, seeds: Any) -> dict[str, list[float]]:
         raise ConfigError("x=1: out of range; give 2")
 
 
-def test_a_worker_that_dies_costs_one_line() -> None:
-    plan: Any = chunks("x", Deadly(), 0, 4, 1)  # type: ignore[arg-type]
+def test_a_worker_that_dies_gives_one_error_line() -> None:
+    plan: Any = chunks("x", ProcessKiller(), 0, 4, 1)  # type: ignore[arg-type]
     with pytest.raises(MfbaError, match="a worker process died"):
         run_plan(plan, workers=2)
 
 
-def test_an_error_inside_a_worker_arrives_as_it_was() -> None:
-    plan: Any = chunks("x", Faulty(), 0, 4, 1)  # type: ignore[arg-type]
+def test_an_error_inside_a_worker_is_raised_unchanged() -> None:
+    plan: Any = chunks("x", ErrorRaiser(), 0, 4, 1)  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="x=1: out of range; give 2"):
         run_plan(plan, workers=2)
 
 
-def test_the_plans_hold_what_the_tables_need() -> None:
+def test_the_plans_have_the_samples_of_the_tables() -> None:
     for size in (QUICK, FULL):
         by_sample: dict[str, int] = {}
         for chunk in [*benchmark_plan(size, 0), *trip_plan("case1", NEAR, size, 0)]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verdicts on made-up samples: each must turn when what it speaks of turns."""
+"""Verdicts on synthetic samples: each must change with the samples that it depends on."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -48,7 +48,7 @@ def grid(section: Section, key: str) -> Grid:
 
 
 def trips(**changed: Any) -> Samples:
-    """Lengths of RUNS seeds, all alike and harmless but for what is changed: {law: values}."""
+    """Synthetic trips of RUNS seeds, the same for all samples; `changed` is added to MFBA's."""
     rng = np.random.default_rng(1)
     common = {
         "length_m": rng.normal(17.3, 0.2, RUNS),
@@ -69,7 +69,7 @@ def trips(**changed: Any) -> Samples:
     }
 
 
-def test_the_verdict_is_that_of_the_reading_that_is_meant() -> None:
+def test_the_verdict_is_that_of_the_meant_reading() -> None:
     printed = BY_KEY["Table 3/F5 BA/best"]
     around, away = Interval(1.0, 0.0121, 2.0), Interval(1.0, 0.0122, 2.0)
     both = [Ours(reading="a", value=around), Ours(reading="b", value=away)]
@@ -80,7 +80,7 @@ def test_the_verdict_is_that_of_the_reading_that_is_meant() -> None:
     assert inside(printed, both, "b").verdict is Verdict.DIFFERS
 
 
-def test_what_is_impossible_stays_so_whatever_we_get() -> None:
+def test_an_impossible_number_stays_impossible_for_any_result() -> None:
     printed = BY_KEY["Table 3/F6 BA/best"]
     found = inside(printed, [Ours(reading="a", value=Interval(-1.9, -2.0, -1.8))], "a")
     assert found.verdict is Verdict.IMPOSSIBLE
@@ -92,12 +92,12 @@ def test_printed_lengths_are_reciprocals() -> None:
     assert [round(x, 4) for x in found.values()] == [17.0919, 17.1094, 17.1517]
 
 
-def test_trips_that_are_the_printed_ones_are_reproduced() -> None:
+def test_trips_with_the_printed_lengths_are_reproduced() -> None:
     made = trips()
     for case, place in published.TRIP_TABLES.items():
         for law in LAWS:
             best, mean, worst = printed_lengths(case, law).values()
-            ends = [best * (1.0 - 1e-9), worst * (1.0 + 1e-9)]  # rounding must not decide
+            ends = [best * (1.0 - 1e-9), worst * (1.0 + 1e-9)]  # safe from rounding
             ten = [*ends, *[(10 * mean - best - worst) / 8] * 8]
             for reading in PLANNER_READINGS:
                 made[trip_sample(reading, case, law)] = {
@@ -114,7 +114,7 @@ def test_trips_that_are_the_printed_ones_are_reproduced() -> None:
         assert section.title.startswith(place)
 
 
-def test_trips_that_are_others_differ() -> None:
+def test_trips_with_other_lengths_differ() -> None:
     section = trip_section("case2", trips(), 0)  # 17.3 m, printed are 18.4 to 19.2
     assert find(section, "BA", "mean").verdict is Verdict.DIFFERS
     assert find(section, "MFBA", "length").verdict is Verdict.DIFFERS
@@ -140,7 +140,7 @@ def verdicts(samples: Samples, scenarios: dict[str, Scenario]) -> dict[str, Verd
     return {e.row: e.verdict for e in claim_section(samples, scenarios).entries}
 
 
-def test_claims_turn_with_what_they_claim(scenarios: dict[str, Scenario]) -> None:
+def test_verdicts_of_claims_follow_the_samples(scenarios: dict[str, Scenario]) -> None:
     none = verdicts(trips(), scenarios)
     assert none["a collision-free path"] is Verdict.REPRODUCED
     assert none["shortest time"] is Verdict.NOT_STATED
@@ -160,7 +160,9 @@ def test_claims_turn_with_what_they_claim(scenarios: dict[str, Scenario]) -> Non
     assert verdicts(trips(collisions=one), scenarios)["a collision-free path"] is Verdict.DIFFERS
 
 
-def test_the_straight_line_of_case_1_is_shorter_and_free(scenarios: dict[str, Scenario]) -> None:
+def test_the_straight_line_of_case_1_is_shorter_and_collision_free(
+    scenarios: dict[str, Scenario],
+) -> None:
     found = find(claim_section(trips(), scenarios), "the shortest path", "claim")
     assert found.verdict is Verdict.DIFFERS
     assert "case1, 0.785 m/s, 0.37 m to spare" in found.why
@@ -198,7 +200,7 @@ def test_signs_follow_the_samples(factor: float, sign: str, verdict: Verdict) ->
     assert expected is None or chance == [expected] * 6
 
 
-def test_rows_are_consistent_with_runs_like_them() -> None:
+def test_rows_are_consistent_with_similar_samples() -> None:
     made = benchmarks(1.0)
     assert consistent_rows(grid(benchmark_section(made, 0), "joint")) == 0
     rng = np.random.default_rng(3)
@@ -213,7 +215,7 @@ def test_rows_are_consistent_with_runs_like_them() -> None:
     assert consistent_rows(grid(benchmark_section(made, 0), "joint")) >= 1
 
 
-def test_sections_come_in_the_paper_s_order() -> None:
+def test_sections_have_the_sequence_of_the_paper() -> None:
     assert check_sections(["7", "1", "7"]) == ("1", "7")
     assert len(check_sections([])) == 9
     with pytest.raises(ConfigError, match="tabel 3: unknown table"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of a run in a real browser: it plays, scrubs and shows what the run holds."""
+"""The HTML page of runs in a real browser: content, replay, keyboard, themes, safety."""
 
 import json
 import math
@@ -50,7 +50,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The directory of a recorded run of case 2."""
-    where = tmp_path_factory.mktemp("recorded")
+    directory = tmp_path_factory.mktemp("recorded")
     done = complete(
         "mfba",
         "run",
@@ -59,10 +59,10 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "--planner=paper",
         "--driver=in-process",
         "--no-picture",
-        cwd=where,
+        cwd=directory,
     )
     assert (done.process.returncode, done.stderr) == (0, "")
-    return where / "runs/run-001"
+    return directory / "runs/run-001"
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def episode(bag: Path) -> Episode:
 
 @pytest.fixture(scope="module")
 def single(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The page of that run, as a user makes it."""
+    """The page of that run, made by `mfba report`."""
     path = tmp_path_factory.mktemp("page") / "page.html"
     done = complete("mfba", "report", str(bag), "--out", str(path), cwd=path.parent)
     assert (done.process.returncode, done.stdout, done.stderr) == (0, f"wrote {path}\n", "")
@@ -114,7 +114,9 @@ def press(browser: Browser, *keys: str) -> None:
     browser.driver.switch_to.active_element.send_keys(*keys)
 
 
-def test_it_opens_fast_alone_and_without_a_word(browser: Browser, single: Path) -> None:
+def test_it_opens_fast_without_requests_or_console_messages(
+    browser: Browser, single: Path
+) -> None:
     assert single.stat().st_size < 6_000_000
     browser.open(single)
     assert browser.said() == []
@@ -125,7 +127,7 @@ def test_it_opens_fast_alone_and_without_a_word(browser: Browser, single: Path) 
     assert browser.run("return document.title") == "case2"
 
 
-def test_nothing_in_it_leads_elsewhere(single: Path, bag: Path) -> None:
+def test_it_has_no_links_and_no_local_paths(single: Path, bag: Path) -> None:
     text = single.read_text(encoding="utf-8")
     addresses = set(re.findall(r"https?://[^\s\"'<>)\\]*", text))
     assert addresses <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
@@ -134,15 +136,15 @@ def test_nothing_in_it_leads_elsewhere(single: Path, bag: Path) -> None:
     assert str(ROOT) not in text
 
 
-def test_every_tick_shows_what_the_bag_holds(
+def test_every_tick_shows_the_decision_in_the_bag(
     browser: Browser, single: Path, episode: Episode
 ) -> None:
     browser.open(single)
     gaps = clearances(episode)
-    seen = set()
+    modes = set()
     for k, decision in enumerate(episode.ticks):
         scrub(browser, k)
-        seen.add(decision.mode)
+        modes.add(decision.mode)
         assert field(browser, "tick") == f"{k} of {len(episode.ticks) - 1}"
         assert field(browser, "mode") == format_values.MODES[decision.mode]
         assert field(browser, "reason") == decision.reason
@@ -153,11 +155,11 @@ def test_every_tick_shows_what_the_bag_holds(
         assert field(browser, "time") == f"{episode.time_s(decision.stamp_ns):.3f} s"
         last = k == len(episode.ticks) - 1
         assert field(browser, "clearance") == ("–" if last else f"{gaps[k]:.3f} m")
-    assert {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE, Mode.ARRIVED} <= seen
+    assert {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE, Mode.ARRIVED} <= modes
     assert min(gaps) == evaluate(episode).min_clearance_m
 
 
-def test_the_world_is_drawn_as_the_tick_has_it(
+def test_the_world_is_drawn_as_at_the_tick(
     browser: Browser, single: Path, episode: Episode
 ) -> None:
     browser.open(single)
@@ -168,20 +170,20 @@ def test_the_world_is_drawn_as_the_tick_has_it(
         """
         const one = (name) => document.querySelector(`.scene ${name}`);
         const all = (name) => [...document.querySelectorAll(`.scene ${name}`)];
-        const place = (element) =>
+        const position = (element) =>
           element.getAttribute("transform").match(/-?[\\d.]+(e-\\d+)?/g).slice(0, 2).map(Number);
         return {
-          robot: place(one(".robot")),
-          lit: all(".sector").map((s) => Number(s.classList.contains("lit"))),
+          robot: position(one(".robot")),
+          set: all(".sector").map((s) => Number(s.classList.contains("set"))),
           closed: all(".gap").map((g) => Number(g.classList.contains("closed"))),
-          taken: one(".taken").getAttribute("d"),
-          rooms: all(".sector").map((sector, i, { length }) => {
+          chosen: one(".chosen-gap").getAttribute("d"),
+          inside: all(".sector").map((sector, i, { length }) => {
             const middle = (2 * Math.PI * (i + 0.5)) / length;
             return sector.isPointInFill(
               new DOMPoint(0.5 * Math.cos(middle), -0.5 * Math.sin(middle)));
           }),
           motions: all(".obstacle .motion").map((m) => m.getAttribute("d")),
-          obstacles: all(".obstacle").map(place),
+          obstacles: all(".obstacle").map(position),
           radii: all(".obstacle .body").map((c) => Number(c.getAttribute("r"))),
           enlarged: all(".obstacle .enlarged").map((c) => Number(c.getAttribute("r"))),
           ring: Number(one(".ring").getAttribute("r")),
@@ -190,16 +192,16 @@ def test_the_world_is_drawn_as_the_tick_has_it(
         """
     )
     assert drawn["robot"] == pytest.approx([decision.pose.x, -decision.pose.y])
-    assert tuple(drawn["lit"]) == decision.vs
+    assert tuple(drawn["set"]) == decision.vs
     assert tuple(drawn["closed"]) == decision.vg
     heading = gap_heading(decision.gap, len(decision.vg), episode.planner.gap_heading)
-    tip = [float(word) for word in drawn["taken"].removeprefix("M0 0L").split()]
+    tip = [float(word) for word in drawn["chosen"].removeprefix("M0 0L").split()]
     reach = episode.sensor.sensing_range_m
     assert tip == pytest.approx([reach * math.cos(heading), -reach * math.sin(heading)])
-    assert drawn["rooms"] == [True] * len(decision.vs)
+    assert drawn["inside"] == [True] * len(decision.vs)
     for obstacle, arrow in zip(episode.scenario.obstacles, drawn["motions"], strict=True):
         x0, y0, x1, y1 = map(float, arrow[1:].split("M")[0].replace("L", " ").split())
-        vx, vy = obstacle.velocity  # in case 2 nobody bounces or turns
+        vx, vy = obstacle.velocity  # in case 2 no obstacle bounces or turns
         assert [x1 - x0, y0 - y1] == pytest.approx([2.0 * vx, 2.0 * vy], abs=1e-3)
     centers = episode.scenario.centers(episode.time_s(decision.stamp_ns))
     assert drawn["obstacles"] == [pytest.approx([x, -y], abs=1e-3) for x, y in centers]
@@ -211,7 +213,7 @@ def test_the_world_is_drawn_as_the_tick_has_it(
     assert drawn["bats"] == len(decision.candidates)
 
 
-def test_bits_of_headings_are_drawn_where_these_lead(browser: Browser, tmp_path: Path) -> None:
+def test_bits_of_headings_are_drawn_at_their_headings(browser: Browser, tmp_path: Path) -> None:
     planner = preset(PlannerParams(method=Method.PREDICTIVE))
     episode = simulate(load_scenario("case2"), planner=planner, sensor=SensorParams(), seed=2)
     write_page([("run", episode)], tmp_path / "page.html")
@@ -232,21 +234,21 @@ def test_bits_of_headings_are_drawn_where_these_lead(browser: Browser, tmp_path:
         const heading = (i) => (2 * Math.PI * (i + 1)) / all.length;
         const quarter = Math.PI / 2 / all.length;
         return {
-          lit: all.map((wedge) => Number(wedge.classList.contains("lit"))),
+          set: all.map((wedge) => Number(wedge.classList.contains("set"))),
           middle: all.every((wedge, i) => inside(wedge, heading(i) - quarter)
             && inside(wedge, heading(i) + quarter)),
-          taken: document.querySelector(".scene .taken").getAttribute("d"),
+          chosen: document.querySelector(".scene .chosen-gap").getAttribute("d"),
         };
         """
     )
-    assert tuple(drawn["lit"]) == decision.vs
+    assert tuple(drawn["set"]) == decision.vs
     assert drawn["middle"]
     heading, reach = 2.0 * math.pi * decision.gap / n, episode.sensor.sensing_range_m
-    tip = [float(word) for word in drawn["taken"].removeprefix("M0 0L").split()]
+    tip = [float(word) for word in drawn["chosen"].removeprefix("M0 0L").split()]
     assert tip == pytest.approx([reach * math.cos(heading), -reach * math.sin(heading)])
 
 
-def test_it_plays_and_pauses(browser: Browser, single: Path) -> None:
+def test_replay_plays_and_pauses(browser: Browser, single: Path) -> None:
     browser.open(single)
     browser.run("document.getElementById('speed').value = '16'")
     browser.run("document.getElementById('speed').dispatchEvent(new Event('change'))")
@@ -268,14 +270,14 @@ def test_it_plays_and_pauses(browser: Browser, single: Path) -> None:
     assert field(browser, "mode") == "arrived"
 
 
-PLACES = """
+POSITIONS = """
 const done = arguments[0];
-const places = [];
+const positions = [];
 const robot = document.querySelector(".scene .robot");
 const turn = () => {
-  places.push(robot.getAttribute("transform").slice(10, -1).split(" ").map(Number));
+  positions.push(robot.getAttribute("transform").slice(10, -1).split(" ").map(Number));
   const isOver = document.getElementById("play").dataset.icon === "play";
-  if (isOver || places.length > 400) done(places); else requestAnimationFrame(turn);
+  if (isOver || positions.length > 400) done(positions); else requestAnimationFrame(turn);
 };
 document.getElementById("play").click();
 turn();
@@ -283,18 +285,18 @@ turn();
 
 
 @pytest.mark.parametrize("calm", [False, True], ids=["smooth", "calm"])
-def test_between_ticks_things_move_unless_unwanted(
+def test_positions_are_interpolated_unless_motion_is_reduced(
     browser: Browser, single: Path, episode: Episode, calm: bool
 ) -> None:
     browser.open(single, calm=calm)
     scrub(browser, len(episode.ticks) - 4)
-    places = {(x, y) for x, y in browser.driver.execute_async_script(PLACES)}
+    positions = {(x, y) for x, y in browser.driver.execute_async_script(POSITIONS)}
     at_ticks = {(t.pose.x, -t.pose.y) for t in episode.ticks}
-    assert (places <= at_ticks) == calm
-    assert len(places) >= 4
+    assert (positions <= at_ticks) == calm
+    assert len(positions) >= 4
 
 
-def test_it_is_driven_by_keyboard(browser: Browser, single: Path, episode: Episode) -> None:
+def test_it_is_controlled_by_keyboard(browser: Browser, single: Path, episode: Episode) -> None:
     browser.open(single)
     last = len(episode.ticks) - 1
     press(browser, Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
@@ -315,12 +317,14 @@ def test_it_is_driven_by_keyboard(browser: Browser, single: Path, episode: Episo
     held = tick(browser)
     press(browser, Keys.ARROW_RIGHT)
     assert tick(browser) == held + 1
-    # with the slider focused the same keys do the same, once
+    # With the slider focused each key acts once, as without focus.
     browser.run("document.getElementById('time').focus()")
     press(browser, Keys.ARROW_LEFT)
     assert tick(browser) == held
-    heard = browser.run("return document.getElementById('time').getAttribute('aria-valuetext')")
-    assert heard.endswith(episode.ticks[held].reason)
+    announced = browser.run(
+        "return document.getElementById('time').getAttribute('aria-valuetext')"
+    )
+    assert announced.endswith(episode.ticks[held].reason)
 
 
 def test_every_control_has_a_name_and_can_be_focused(browser: Browser, single: Path) -> None:
@@ -339,27 +343,27 @@ def test_every_control_has_a_name_and_can_be_focused(browser: Browser, single: P
     assert all(names)
 
 
-def test_the_charts_show_where_the_clock_stands_and_move_it(
+def test_the_charts_show_and_set_the_time(
     browser: Browser, single: Path, episode: Episode
 ) -> None:
     browser.open(single)
-    where = "return document.querySelector('#charts .cursor').getAttribute('d')"
-    at_start = browser.run(where)
+    cursor = "return document.querySelector('#charts .cursor').getAttribute('d')"
+    at_start = browser.run(cursor)
     press(browser, Keys.END)
-    assert browser.run(where) != at_start
+    assert browser.run(cursor) != at_start
     browser.run(
         """
         const chart = document.getElementById("charts");
         chart.scrollIntoView({ block: "center" });
-        const sheet = DATA_CHARTS();
-        function DATA_CHARTS() {
+        const sheet = shownSheet();
+        function shownSheet() {
           const all = JSON.parse(document.getElementById("data").textContent).charts;
           return all.filter((sheet) => sheet.from_px <= chart.clientWidth).pop();
         }
         const box = chart.getBoundingClientRect();
-        const part = sheet.left + 0.5 * (sheet.right - sheet.left);
+        const fraction = sheet.left + 0.5 * (sheet.right - sheet.left);
         chart.dispatchEvent(new PointerEvent("pointerdown",
-          { clientX: box.left + part * box.width, clientY: box.top + 50, buttons: 1 }));
+          { clientX: box.left + fraction * box.width, clientY: box.top + 50, buttons: 1 }));
         """
     )
     times = [episode.time_s(t.stamp_ns) for t in episode.ticks]
@@ -367,7 +371,9 @@ def test_the_charts_show_where_the_clock_stands_and_move_it(
     assert tick(browser) == min(range(len(times)), key=lambda k: abs(times[k] - middle))
 
 
-def test_the_result_is_mfba_s_own(browser: Browser, single: Path, episode: Episode) -> None:
+def test_the_result_is_that_of_result_rows(
+    browser: Browser, single: Path, episode: Episode
+) -> None:
     browser.open(single)
     shown = browser.run(
         """
@@ -396,16 +402,18 @@ const behind = (element) => {
     if (!/, 0\\)$/.test(colour) && colour !== "transparent") return colour;
   }
 };
-const told = [];
+const texts = [];
 for (const element of document.querySelectorAll("body *")) {
   const hasText = [...element.childNodes].some((n) => n.nodeType === 3 && n.data.trim());
-  if (!hasText || !element.getClientRects().length || element.closest(".unseen")) continue;
+  const isHidden = element.closest(".visually-hidden") || !element.getClientRects().length;
+  if (!hasText || isHidden) continue;
   const style = getComputedStyle(element);
   const isDrawn = element instanceof SVGElement;
-  told.push([element.textContent.trim().slice(0, 30), isDrawn ? style.fill : style.color,
+  const ink = isDrawn ? style.fill : style.color;
+  texts.push([element.textContent.trim().slice(0, 30), ink,
     behind(isDrawn ? element.closest("svg").parentElement : element)]);
 }
-return told;
+return texts;
 """
 
 
@@ -452,7 +460,7 @@ def test_nothing_overflows_sideways(
         assert small == 0
 
 
-def test_two_runs_stand_side_by_side_on_one_clock(
+def test_two_runs_are_side_by_side_with_one_clock(
     browser: Browser, pair: tuple[Path, list[Episode]]
 ) -> None:
     path, runs = pair
@@ -480,12 +488,10 @@ def test_two_runs_stand_side_by_side_on_one_clock(
     )
     for column, episode in enumerate(runs):
         rows = result_rows(episode, evaluate(episode))
-        assert [cells[column] for cells in columns] == [figure for _, figure, _ in rows]
+        assert [cells[column] for cells in columns] == [value for _, value, _ in rows]
 
 
-def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
-    browser: Browser, tmp_path: Path
-) -> None:
+def test_a_fleet_is_one_scene_of_the_chosen_robot(browser: Browser, tmp_path: Path) -> None:
     whole = load_scenario("swap")
     names = [member.name for member in whole.robots[:8]]
     runs = list(zip(names, run_fleet(replace(whole, robots=whole.robots[:8]), seed=1)))
@@ -494,7 +500,7 @@ def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
     assert browser.said() == []
     heading = browser.run("return document.querySelector('h1').textContent")
     assert heading == "swap"
-    assert in_sight(browser) == ["1"]
+    assert shown_cards(browser) == ["1"]
     assert browser.run("return document.getElementById('robot').value") == "0"
     first = min(range(8), key=lambda number: len(runs[number][1].ticks))
     longest = max((episode for _, episode in runs), key=lambda episode: len(episode.ticks))
@@ -504,29 +510,29 @@ def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
         "list.dispatchEvent(new Event('change'))",
         first,
     )
-    assert in_sight(browser) == [str(first + 1)]
-    assert lit_lines(browser) == {f"line-{first + 1}"}
-    # It has arrived, and the last of the others has not: each is where it is at that time.
+    assert shown_cards(browser) == [str(first + 1)]
+    assert highlighted_lines(browser) == {f"line-{first + 1}"}
+    # This robot has arrived, the slowest has not: each is shown at its position at that time.
     scrub(browser, len(longest.ticks) - 2)
     assert tick(browser, first + 1) == len(runs[first][1].ticks) - 1
-    place = f'.card[data-run="{first + 1}"] .other[data-name="{{}}"]'
+    selector = f'.card[data-run="{first + 1}"] .other[data-name="{{}}"]'
     for name, episode in runs:
         if name != names[first]:
             moved = browser.run(
                 "return document.querySelector(arguments[0]).getAttribute('transform')",
-                place.format(name),
+                selector.format(name),
             )
             x, y = map(float, re.findall(r"-?[\d.]+(?:e-?\d+)?", moved))
             at = episode.ticks[min(len(longest.ticks) - 2, len(episode.ticks) - 1)].pose
             assert (x, -y) == pytest.approx(at.position, abs=1e-3)
-    # A press on another robot looks with its eyes.
+    # A press on another robot chooses that robot.
     other = (first + 3) % 8
     browser.run(
         "document.querySelector(arguments[0]).querySelector('.body').dispatchEvent("
         "new MouseEvent('click', {bubbles: true}))",
-        place.format(names[other]),
+        selector.format(names[other]),
     )
-    assert in_sight(browser) == [str(other + 1)]
+    assert shown_cards(browser) == [str(other + 1)]
     assert browser.run("return document.getElementById('robot').value") == str(other)
     last = runs[other][1].ticks[min(len(longest.ticks) - 2, len(runs[other][1].ticks) - 1)]
     assert field(browser, "reason", other + 1) == last.reason
@@ -540,8 +546,8 @@ def test_a_fleet_is_one_scene_seen_by_the_robot_that_is_chosen(
     assert browser.said() == []
 
 
-def in_sight(browser: Browser) -> list[str]:
-    """The numbers of the cards that are shown."""
+def shown_cards(browser: Browser) -> list[str]:
+    """The run numbers of the cards that are not hidden."""
     return list(
         browser.run(
             "return [...document.querySelectorAll('.card')].filter((card) => !card.hidden)"
@@ -550,8 +556,8 @@ def in_sight(browser: Browser) -> list[str]:
     )
 
 
-def lit_lines(browser: Browser) -> set[str]:
-    """The lines of the charts that stand out."""
+def highlighted_lines(browser: Browser) -> set[str]:
+    """The ids of the chart lines that are not faded."""
     return set(
         browser.run(
             "return [...document.querySelectorAll('#charts [id^=line-]:not(.aside)')]"
@@ -560,7 +566,7 @@ def lit_lines(browser: Browser) -> set[str]:
     )
 
 
-def test_thirty_six_lines_can_be_told_apart(tmp_path: Path) -> None:
+def test_thirty_six_lines_are_different(tmp_path: Path) -> None:
     assert len({look(number) for number in range(MOST_ROBOTS)}) == MOST_ROBOTS
     episode = run(load_scenario("empty"))
     names = [f"r{number}" for number in range(MOST_ROBOTS + 1)]
@@ -583,7 +589,7 @@ def test_names_are_text_and_never_markup(browser: Browser, tmp_path: Path) -> No
     assert browser.run("return document.querySelector('.card .run').textContent") == hostile
 
 
-def test_a_policy_stands_where_another_script_comes_in(browser: Browser, single: Path) -> None:
+def test_the_policy_blocks_other_scripts_and_requests(browser: Browser, single: Path) -> None:
     browser.open(single)
     browser.run(
         "const s = document.createElement('script'); s.textContent = 'window.owned = 1';"
@@ -593,7 +599,7 @@ def test_a_policy_stands_where_another_script_comes_in(browser: Browser, single:
     assert "Content Security Policy" in browser.said()[0]
 
 
-def test_json_cannot_end_its_element() -> None:
+def test_json_cannot_end_its_script_element() -> None:
     data = {"name": "</script><!--<script>&\u2028'\"\\"}
     text = as_json(data)
     assert not set("<>&") & set(text)
@@ -615,7 +621,7 @@ def test_a_run_of_one_tick_without_obstacles_has_a_page(browser: Browser, tmp_pa
     assert field(browser, "clearance") == "–"
 
 
-def test_what_is_too_much_is_refused(episode: Episode, tmp_path: Path) -> None:
+def test_too_many_runs_or_ticks_are_refused(episode: Episode, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=f"^{MOST_RUNS + 1} runs: too many.*; give"):
         page([("run", episode)] * (MOST_RUNS + 1))
     long = replace(episode, ticks=episode.ticks * 400)
@@ -626,7 +632,7 @@ def test_what_is_too_much_is_refused(episode: Episode, tmp_path: Path) -> None:
         write_page([("run", episode)], tmp_path / "page.html")
 
 
-def test_without_a_chromium_one_line_says_what_to_install(tmp_path: Path) -> None:
+def test_without_chromium_one_line_names_what_to_install(tmp_path: Path) -> None:
     for name in ("bash", "env"):
         (tmp_path / name).symlink_to(str(shutil.which(name)))
     done = subprocess.run(
@@ -645,8 +651,8 @@ def test_without_a_chromium_one_line_says_what_to_install(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("name", "noise"), [("case2", Noise()), ("case2", Noise(odom_m=0.05)), ("kidnapped", Noise())]
 )
-def test_the_least_clearance_is_the_result_s(name: str, noise: Noise) -> None:
-    """Where the robot really was, and not on the way on which it was carried off."""
+def test_the_smallest_clearance_is_that_of_the_result(name: str, noise: Noise) -> None:
+    """At the robot's true position, and without the time in which it is carried off."""
     scenario = load_scenario(name)
     scenario = replace(scenario, robot=replace(scenario.robot, noise=noise))
     episode = run(scenario, planner=PlannerParams(goal_tolerance_m=0.1), seed=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's figures: what they show is true, all of it is on the sheet, equal bytes."""
+"""The paper's figures: what they show is correct, no text is cut, equal bytes."""
 
 import re
 from dataclasses import replace
@@ -21,7 +21,7 @@ from mfba_planner.paper import convergence, published
 from mfba_planner.paper.functions import FUNCTIONS
 from mfba_planner.planning.gap_vector import gap_vector
 from mfba_planner.report import style
-from mfba_planner.report.figure_canvas import Sheet, to_bytes
+from mfba_planner.report.figure_sheet import Sheet, to_bytes
 from mfba_planner.report.figures import (
     beta,
     enlargement,
@@ -47,10 +47,10 @@ def figure_of(name: str) -> Figure:
 
 
 @pytest.mark.parametrize("name", [*SKETCHES, *TRIPS])
-def test_every_text_is_on_the_sheet_and_none_on_another(name: str) -> None:
+def test_every_text_is_inside_the_figure_and_none_overlap(name: str) -> None:
     figure = figure_of(name)
     canvas = FigureCanvasAgg(figure)
-    canvas.draw()  # axis labels find their places then
+    canvas.draw()  # this positions the axis labels
     renderer = canvas.get_renderer()
     boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in drawn_texts(figure)]
     for words, box in boxes:
@@ -63,7 +63,7 @@ def test_every_text_is_on_the_sheet_and_none_on_another(name: str) -> None:
 
 
 def drawn_texts(figure: Figure) -> list[Text]:
-    """Every text but tick labels beyond the limits and what belongs to axes switched off."""
+    """Every text, without tick labels beyond the limits and texts of hidden axes."""
     found = [*figure.texts]
     for legend in figure.legends:
         found += legend.get_texts()
@@ -85,7 +85,7 @@ def test_equal_bytes_without_a_date(name: str, form: str) -> None:
     assert not re.search(rb"20\d\d-\d\d-\d\d|<dc:date>|matplotlib v", data, re.IGNORECASE)
 
 
-# --- what they show -------------------------------------------------------------------------
+# --- content --------------------------------------------------------------------------------
 
 
 def test_fig_2_is_eq_10() -> None:
@@ -104,12 +104,12 @@ def test_fig_5_and_6_are_the_papers_example() -> None:
     assert " ".join(map(str, gap_vector(bits))) == published.EXAMPLE_VG
     centers = [obstacle.center_m for obstacle in sketch.EXAMPLE.obstacles]
     assert all(distance(a, b) >= 0.6 for i, a in enumerate(centers) for b in centers[:i])
-    told = [text.get_text() for text in figure_of("fig5").texts]
+    texts = [text.get_text() for text in figure_of("fig5").texts]
     for words in ("S1, S2", "none: out of range", "S7, S8", "S8, S9"):
-        assert words in told
+        assert words in texts
 
 
-def test_fig_6_takes_the_gap_nearest_to_the_goal() -> None:
+def test_fig_6_chooses_the_free_gap_nearest_to_the_goal() -> None:
     axes = figure_of("fig6").axes
     (ring,) = (ax for ax in axes if any(p.get_gid() == "set" for p in ax.patches))
     bold = [text.get_text() for text in ring.texts if text.get_fontweight() == "bold"]
@@ -123,9 +123,10 @@ def test_the_runs_of_fig_7_and_8_have_the_printed_lengths(name: str) -> None:
     assert result.length_m == pytest.approx(PRINTED_M[name], abs=0.0015)
 
 
-def test_the_moments_are_those_of_the_papers_captions() -> None:
+def test_the_captions_are_those_of_the_paper() -> None:
     words = {
-        name: [s.caption for s in trips.scenes(paper_figures.figure_run(name))] for name in TRIPS
+        name: [s.caption for s in trips.snapshots(paper_figures.figure_run(name))]
+        for name in TRIPS
     }
     assert words == {
         "fig7": [
@@ -145,24 +146,24 @@ def test_the_moments_are_those_of_the_papers_captions() -> None:
 
 
 @pytest.mark.parametrize("name", TRIPS)
-def test_the_moments_are_what_they_are_called(name: str) -> None:
+def test_each_snapshot_is_what_its_caption_names(name: str) -> None:
     episode = paper_figures.figure_run(name)
-    for scene in trips.scenes(episode):
-        tick = episode.ticks[scene.index]
+    for snapshot in trips.snapshots(episode):
+        tick = episode.ticks[snapshot.index]
         near = within_range(episode, tick)
-        named = tuple(int(word) for word in scene.caption.split() if word.isdigit())
+        named = tuple(int(word) for word in snapshot.caption.split() if word.isdigit())
         assert near == named
         assert (tick.mode is Mode.OBSTACLE_AVOIDANCE) == bool(named)
 
 
-def test_a_run_that_avoids_nothing_has_no_such_figure() -> None:
+def test_a_run_without_avoidance_is_refused() -> None:
     episode = paper_figures.figure_run("fig7")
     free = replace(episode, ticks=episode.ticks[:3])
     with pytest.raises(InputError, match="avoids no obstacle"):
-        trips.scenes(free)
+        trips.snapshots(free)
 
 
-def test_convergence_is_quantiles_that_only_fall() -> None:
+def test_convergence_quantiles_are_sorted_and_never_rise() -> None:
     found = convergence.curves("F3", range(9))
     assert [curve.algorithm for curve in found] == list(Algorithm)
     for curve in found:
@@ -176,7 +177,7 @@ def test_convergence_is_quantiles_that_only_fall() -> None:
 # --- the command ----------------------------------------------------------------------------
 
 
-def test_the_command_writes_what_is_asked_for(
+def test_the_command_writes_the_chosen_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "new" / "figures"
@@ -191,7 +192,7 @@ def test_the_command_writes_what_is_asked_for(
         cli.main(["figures", "--only", "fig4", "--out", str(out)])
 
 
-def test_unknown_names_are_refused_before_anything_is_drawn(tmp_path: Path) -> None:
+def test_unknown_names_are_refused_and_nothing_is_written(tmp_path: Path) -> None:
     out = str(tmp_path / "out")
     with pytest.raises(ConfigError, match="'fig3': no such figure"):
         cli.main(["figures", "--only", "fig3", "--out", out])
@@ -200,7 +201,7 @@ def test_unknown_names_are_refused_before_anything_is_drawn(tmp_path: Path) -> N
     assert not (tmp_path / "out").exists()
 
 
-def test_a_sheet_cuts_a_long_head_and_replaces_unknown_letters() -> None:
+def test_a_long_head_is_cut_and_unknown_characters_replaced() -> None:
     with style.context():
         sheet = Sheet(3.0, 2.0)
         sheet.head("a title " * 30, "漢字")

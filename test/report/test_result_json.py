@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A result file is strict JSON that says what was run, comes back whole, and is never half."""
+"""Result files: strict JSON, read back as written, never half-written or overwritten."""
 
 import json
 import math
@@ -32,7 +32,7 @@ from mfba_planner.swarm.bat_swarm import Algorithm, BatParams
 
 @pytest.fixture(scope="module")
 def episode() -> Episode:
-    """Return a run that is not the default one in any respect."""
+    """Return a run with non-default planner, sensor and seed."""
     return run(
         load_scenario("case2"),
         planner=PlannerParams(speed_mps=0.8, bat=BatParams(algorithm=Algorithm.BA)),
@@ -42,7 +42,7 @@ def episode() -> Episode:
 
 
 def strict(text: str) -> Any:
-    """Parse JSON as its standard has it: without NaN and Infinity."""
+    """Parse standard JSON: NaN and Infinity are refused."""
 
     def refuse(token: str) -> None:
         raise AssertionError(token)
@@ -50,7 +50,7 @@ def strict(text: str) -> Any:
     return json.loads(text, parse_constant=refuse)
 
 
-def test_it_says_what_was_run_and_what_came_of_it(episode: Episode) -> None:
+def test_a_result_has_the_run_and_its_metrics(episode: Episode) -> None:
     data = result_to_dict(episode, {"wall_s": 1.5})
     assert data["schema_version"] == 1
     assert (data["scenario"], data["seed"], data["driver"]) == ("case2", 7, "core")
@@ -64,20 +64,20 @@ def test_it_says_what_was_run_and_what_came_of_it(episode: Episode) -> None:
     assert data["result"]["encounters"] == list(result.encounters)
 
 
-def test_its_parameters_make_the_same_planner_and_sensor_again(episode: Episode) -> None:
+def test_the_parameters_give_the_same_planner_and_sensor(episode: Episode) -> None:
     parameters = strict(json.dumps(result_to_dict(episode)))["parameters"]
     assert override(PlannerParams(), parameters["planner"]) == episode.planner
     assert override(SensorParams(), parameters["sensor"]) == episode.sensor
 
 
-def test_it_comes_back_as_it_was_written(episode: Episode, tmp_path: Path) -> None:
+def test_a_result_is_read_back_as_written(episode: Episode, tmp_path: Path) -> None:
     data = result_to_dict(episode, {"bag": "runs/ü.mcap", "ticks_per_s": 12.5})
     write_result(tmp_path / "result.json", data)
     assert os.listdir(tmp_path) == ["result.json"]
     assert read_result(tmp_path / "result.json") == data
 
 
-def test_what_is_not_finite_is_null(tmp_path: Path) -> None:
+def test_non_finite_numbers_are_null(tmp_path: Path) -> None:
     empty = run(load_scenario("empty"))
     unmoved = replace(empty, ticks=empty.ticks[:1], outcome=Outcome.INTERRUPTED)
     extra = {"nan": math.nan, "deep": [{"inf": -math.inf}], "numpy": np.float32("inf")}
@@ -107,7 +107,7 @@ def test_extra_values_become_plain(episode: Episode) -> None:
     }
 
 
-def test_an_existing_result_stays_as_it_is(episode: Episode, tmp_path: Path) -> None:
+def test_an_existing_result_is_not_overwritten(episode: Episode, tmp_path: Path) -> None:
     path = tmp_path / "result.json"
     path.write_text("mine")
     with pytest.raises(OutputError, match="already exists"):
@@ -135,25 +135,25 @@ def test_a_file_that_appears_while_writing_is_not_overwritten(
 
 
 @pytest.mark.parametrize(
-    ("place", "reason"),
+    ("path", "reason"),
     [
         ("missing/result.json", "no such file or directory"),
         ("file/result.json", "not a directory"),
         ("x" * 300 + ".json", "file name too long"),
     ],
 )
-def test_where_nothing_can_be_written_one_line_says_why(
-    place: str, reason: str, tmp_path: Path
+def test_a_write_failure_gives_one_line_with_the_reason(
+    path: str, reason: str, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match=reason) as caught:
-        write_new(tmp_path / place, b"data")
+        write_new(tmp_path / path, b"data")
     assert len(str(caught.value).splitlines()) == 1
     assert os.listdir(tmp_path) == ["file"]
 
 
 @contextmanager
-def _room_for(size: int) -> Iterator[None]:
+def _file_size_limit(size: int) -> Iterator[None]:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -162,8 +162,8 @@ def _room_for(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def test_what_does_not_fit_leaves_nothing_behind(tmp_path: Path) -> None:
-    with _room_for(1000), pytest.raises(OutputError, match="file too large"):
+def test_a_file_that_is_too_large_leaves_nothing_behind(tmp_path: Path) -> None:
+    with _file_size_limit(1000), pytest.raises(OutputError, match="file too large"):
         write_new(tmp_path / "result.json", b"x" * 100_000)
     assert os.listdir(tmp_path) == []
 
@@ -175,7 +175,7 @@ def test_a_new_file_has_ordinary_permissions(tmp_path: Path) -> None:
 
 
 def refusal(path: Path) -> str:
-    """Return the one line with which a file is refused."""
+    """Return the message (one line) with which a file is refused."""
     with pytest.raises(InputError) as caught:
         read_result(path)
     (line,) = str(caught.value).splitlines()
@@ -184,7 +184,7 @@ def refusal(path: Path) -> str:
 
 
 @given(data=st.data())
-def test_no_part_of_a_result_is_taken_for_one(
+def test_a_truncated_result_is_refused(
     data: st.DataObject, episode: Episode, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     path = tmp_path_factory.mktemp("cut") / "result.json"
@@ -213,19 +213,17 @@ def test_any_bytes_are_refused_in_one_line(
         ('{"schema_version": true}', "schema_version is of type bool, not int"),
     ],
 )
-def test_what_is_no_result_is_refused(text: str, reason: str, tmp_path: Path) -> None:
+def test_anything_but_a_result_is_refused(text: str, reason: str, tmp_path: Path) -> None:
     (tmp_path / "r.json").write_text(text)
     assert reason in refusal(tmp_path / "r.json")
 
 
-def test_no_file_and_a_directory_are_refused(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_directory_are_refused(tmp_path: Path) -> None:
     assert "no such file" in refusal(tmp_path / "r.json")
     assert "is a directory" in refusal(tmp_path)
 
 
-def test_a_result_without_a_part_or_with_a_wrong_one_is_refused(
-    episode: Episode, tmp_path: Path
-) -> None:
+def test_a_result_with_a_missing_or_wrong_key_is_refused(episode: Episode, tmp_path: Path) -> None:
     good = result_to_dict(episode)
     path = tmp_path / "r.json"
     for key in good.keys() - {"world"}:  # the oldest results have none

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The result table says the same everywhere: terminal, log, narrow, without colour or UTF-8."""
+"""The result table: values and remarks; in terminals, logs, narrow, without colour or UTF-8."""
 
 import io
 import math
@@ -28,12 +28,12 @@ def episode() -> Episode:
 
 
 def rows(episode: Episode, result: Result | None = None, rate: float | None = None) -> Rows:
-    """Return {name: (figure, remark)}."""
+    """Return {name: (value, remark)}."""
     found = result_rows(episode, result or evaluate(episode), rate)
-    return {name: (figure, remark) for name, figure, remark in found}
+    return {name: (value, remark) for name, value, remark in found}
 
 
-def test_every_figure_has_its_line(episode: Episode) -> None:
+def test_every_value_has_its_line(episode: Episode) -> None:
     result = evaluate(episode)
     table = rows(episode, result, rate=1234.5)
     straight = math.sqrt(288.0)
@@ -51,18 +51,18 @@ def test_every_figure_has_its_line(episode: Episode) -> None:
     }
 
 
-def test_the_rate_is_told_only_when_it_is_known(episode: Episode) -> None:
+def test_the_rate_is_shown_only_if_known(episode: Episode) -> None:
     assert rows(episode)["ticks"] == (str(len(episode.ticks)), "")
 
 
-def test_an_unfinished_run_is_not_held_against_the_straight_line() -> None:
+def test_an_unfinished_run_is_not_compared_with_the_straight_line() -> None:
     stopped = run(replace(load_scenario("case2"), time_limit_s=5.0))
     table = rows(stopped)
     assert table["outcome"] == ("time limit", "")
     assert table["length"][1] == "straight line 16.971 m"
 
 
-def test_a_collision_on_the_way_to_the_goal_is_told() -> None:
+def test_a_collision_before_the_goal_is_reported() -> None:
     bullet = Obstacle(center_m=(11.0, 0.0), radius_m=0.3, speed_mps=1.5, heading_rad=math.pi)
     scenario = Scenario(name="hit", start_m=(0.0, 0.0), goal_m=(12.0, 0.0), obstacles=(bullet,))
     table = rows(run(scenario))
@@ -71,7 +71,7 @@ def test_a_collision_on_the_way_to_the_goal_is_told() -> None:
     assert table["min clearance"][0].startswith("-")
 
 
-def test_figures_that_do_not_exist_are_words() -> None:
+def test_values_that_do_not_exist_are_words() -> None:
     empty = run(load_scenario("empty"))
     table = rows(replace(empty, ticks=empty.ticks[:1], outcome=Outcome.INTERRUPTED))
     assert table["min clearance"] == ("no obstacle", "")
@@ -81,7 +81,7 @@ def test_figures_that_do_not_exist_are_words() -> None:
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 200])
-def test_plain_text_fits_and_holds_every_figure(episode: Episode, width: int) -> None:
+def test_plain_text_fits_and_has_every_value(episode: Episode, width: int) -> None:
     text = result_text(episode, evaluate(episode), 1234.5, width=width)
     assert text.isascii()
     assert text.replace("\n", "").isprintable()
@@ -89,12 +89,12 @@ def test_plain_text_fits_and_holds_every_figure(episode: Episode, width: int) ->
     assert lines[0] == "case2, mfba, seed 0, core driver"
     assert max(map(len, lines)) <= width
     assert [line for line in lines if line != line.rstrip()] == []
-    for name, (figure, _) in rows(episode).items():
-        assert re.search(rf"^ +{name} +{re.escape(figure)}( |$)", text, re.MULTILINE)
+    for name, (value, _) in rows(episode).items():
+        assert re.search(rf"^ +{name} +{re.escape(value)}( |$)", text, re.MULTILINE)
 
 
 def printed(episode: Episode, *, encoding: str = "utf-8", terminal: bool = False) -> str:
-    """Print to a stream of an encoding, a colour terminal or none."""
+    """Print to a stream of this encoding, with colours or without, and return the text."""
     raw = io.BytesIO()
     stream = io.TextIOWrapper(raw, encoding=encoding)
     console = Console(
@@ -114,7 +114,7 @@ def test_success_is_green_and_failure_red_in_a_terminal_only(episode: Episode) -
     assert "\x1b" not in printed(episode)
 
 
-def test_a_name_is_shown_as_text_in_any_encoding() -> None:
+def test_a_name_is_printed_as_text_in_any_encoding() -> None:
     name = "f\u00e4ll [red]\x1b[31m\nzwei \u8d70"
     episode = replace(
         run(load_scenario("empty")), scenario=replace(load_scenario("empty"), name=name)

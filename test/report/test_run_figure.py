@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of a run shows what the episode holds, whole, readable and always the same."""
+"""The picture of a run: its content, its layout, and the same bytes for the same episode."""
 
 import math
 import os
@@ -85,11 +85,11 @@ def _time_limit() -> Episode:
 
 
 def _stopped() -> Episode:
-    """Unusable input half-way, then a pose that is none, then on."""
+    """A run with unusable input at tick 10 and a pose that is NaN at tick 11."""
     ticks = run(load_scenario("case1")).ticks
-    lost = replace(ticks[11], mode=Mode.STOPPED, pose=Pose2D(math.nan, math.nan))
-    halt = replace(ticks[10], mode=Mode.STOPPED)
-    return replace(run(load_scenario("case1")), ticks=(*ticks[:10], halt, lost, *ticks[12:]))
+    no_pose = replace(ticks[11], mode=Mode.STOPPED, pose=Pose2D(math.nan, math.nan))
+    stopped = replace(ticks[10], mode=Mode.STOPPED)
+    return replace(run(load_scenario("case1")), ticks=(*ticks[:10], stopped, no_pose, *ticks[12:]))
 
 
 def _corridor() -> Episode:
@@ -170,7 +170,7 @@ def draw(episode: Episode) -> Figure:
 
 
 def artists(figure: Figure, kind: str) -> list[Any]:
-    """Return the artists of one kind in the order they were drawn."""
+    """Return the artists of one kind in the sequence in which they were drawn."""
     return [
         artist
         for artist in figure.axes[0].get_children()
@@ -179,12 +179,12 @@ def artists(figure: Figure, kind: str) -> list[Any]:
 
 
 def starts(episode: Episode, mode: Mode) -> list[int]:
-    """Return the ticks at which the planner changes into a mode."""
+    """Return the ticks at which a mode starts."""
     modes = [None, *(tick.mode for tick in episode.ticks)]
     return [i for i, (a, b) in enumerate(pairwise(modes)) if b is mode and a is not mode]
 
 
-def test_there_is_one_line_per_stretch_of_a_mode(episode: Episode, figure: Figure) -> None:
+def test_each_stretch_of_a_mode_is_one_line(episode: Episode, figure: Figure) -> None:
     drawn = {a.get_gid(): len(a.get_paths()) for a in artists(figure, "path")}
     counts = {f"path:{mode.value}": len(starts(episode, mode)) for mode in Mode}
     assert drawn == {gid: count for gid, count in counts.items() if count}
@@ -215,7 +215,7 @@ def test_a_step_has_the_colour_of_the_mode_that_chose_it() -> None:
         assert tuple(path.vertices[-1]) == after.pose.position
 
 
-def test_where_the_robot_stands_there_is_a_mark() -> None:
+def test_a_mark_shows_where_the_robot_stands_still() -> None:
     for name, mode in (("blocked", Mode.BLOCKED), ("stopped", Mode.STOPPED)):
         (mark,) = artists(figure_of(name), "standing")
         (first,) = starts(episode_of(name), mode)
@@ -223,9 +223,7 @@ def test_where_the_robot_stands_there_is_a_mark() -> None:
         assert (*mark.get_xdata(), *mark.get_ydata()) == episode_of(name).ticks[first].pose[:2]
 
 
-def test_there_is_one_ring_per_encounter_with_its_sectors(
-    episode: Episode, figure: Figure
-) -> None:
+def test_each_encounter_has_one_ring_with_its_sectors(episode: Episode, figure: Figure) -> None:
     rings = artists(figure, "ring")
     met = [episode.ticks[i] for i in starts(episode, Mode.OBSTACLE_AVOIDANCE)]
     assert [ring.center for ring in rings] == [tick.pose.position for tick in met]
@@ -233,11 +231,13 @@ def test_there_is_one_ring_per_encounter_with_its_sectors(
     for index, tick in enumerate(met):
         wedges = [w for w in artists(figure, "sector") if w.get_gid() == f"sector:{index}"]
         width = 360.0 / len(tick.vs)
-        lit = [any(w.theta1 < (i + 0.5) * width < w.theta2 for w in wedges) for i in range(12)]
-        assert lit == [bit == 1 for bit in tick.vs]
+        set_bits = [
+            any(w.theta1 < (i + 0.5) * width < w.theta2 for w in wedges) for i in range(12)
+        ]
+        assert set_bits == [bit == 1 for bit in tick.vs]
 
 
-def test_what_set_the_sectors_is_drawn_where_it_was() -> None:
+def test_sensed_obstacles_are_drawn_at_their_positions() -> None:
     episode, figure = episode_of("case1"), figure_of("case1")
     first, second = (episode.ticks[i] for i in starts(episode, Mode.OBSTACLE_AVOIDANCE))
     sensed = artists(figure, "sensed")
@@ -278,7 +278,7 @@ def test_tracks_turn_at_the_walls() -> None:
             assert touching == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_long_run_between_walls_shows_a_part_of_the_tracks_and_says_so() -> None:
+def test_a_long_run_between_walls_shows_tracks_near_the_passes_only() -> None:
     ticks = episode_of("one_tick").ticks
     late = replace(ticks[0], stamp_ns=ticks[0].stamp_ns + 3600 * 10**9)
     mover = Obstacle(center_m=(6.0, 6.0), radius_m=0.3, speed_mps=0.3, heading_rad=1.0)
@@ -288,9 +288,9 @@ def test_a_long_run_between_walls_shows_a_part_of_the_tracks_and_says_so() -> No
         walls=Walls(lower_m=(-1.0, -1.0), upper_m=(13.0, 13.0)),
     )
     figure = draw(replace(episode_of("one_tick"), scenario=scenario, ticks=(ticks[0], late)))
-    (part,) = artists(figure, "part")
+    (track,) = artists(figure, "track_near_pass")
     assert not artists(figure, "track")
-    assert len(part.get_xydata()) < 10
+    assert len(track.get_xydata()) < 10
     assert "obstacle's track near closest pass" in legend_labels(figure)
 
 
@@ -314,7 +314,7 @@ def test_the_closest_pass_is_the_smallest_clearance(name: str) -> None:
 
 
 @given(speed=st.floats(0.0, 3.0), heading=st.floats(0.0, 6.3), seed=st.integers(0, 20))
-def test_a_pass_is_a_moment_of_the_run(speed: float, heading: float, seed: int) -> None:
+def test_a_pass_lies_on_the_run(speed: float, heading: float, seed: int) -> None:
     mover = Obstacle(center_m=(4.0, 4.0), radius_m=0.3, speed_mps=speed, heading_rad=heading)
     scenario = replace(load_scenario("empty"), obstacles=(mover,), time_limit_s=6.0)
     episode = run(scenario, seed=seed)
@@ -325,7 +325,7 @@ def test_a_pass_is_a_moment_of_the_run(speed: float, heading: float, seed: int) 
     assert moment.gap_m >= evaluate(episode).min_clearance_m - 1e-9
 
 
-def test_only_encountered_obstacles_have_a_line_as_long_as_the_clearance(
+def test_encountered_obstacles_only_have_a_line_as_long_as_the_clearance(
     episode: Episode, figure: Figure
 ) -> None:
     lines = artists(figure, "pass")
@@ -339,11 +339,11 @@ def test_only_encountered_obstacles_have_a_line_as_long_as_the_clearance(
 
 
 def legend_labels(figure: Figure) -> list[str]:
-    """Return what the legend explains."""
+    """Return the labels of the legend."""
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_the_legend_explains_what_is_drawn_and_nothing_else() -> None:
+def test_the_legend_lists_what_is_drawn_and_nothing_else() -> None:
     assert legend_labels(figure_of("empty")) == ["start", "goal", "path generation"]
     walled = legend_labels(figure_of("walled"))
     assert {"wall", "obstacle's track", "sensing range SR at the switch"} <= set(walled)
@@ -354,7 +354,7 @@ def test_the_legend_explains_what_is_drawn_and_nothing_else() -> None:
 
 
 def texts(figure: Figure) -> list[Text]:
-    """Return every text that is written on the sheet."""
+    """Return every visible text of the figure."""
     undrawn = {
         tick.label1
         for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis)
@@ -365,7 +365,7 @@ def texts(figure: Figure) -> list[Text]:
     return [t for t in found if isinstance(t, Text) and t.get_visible() and t not in undrawn]
 
 
-def test_the_strip_tells_the_result(episode: Episode, figure: Figure) -> None:
+def test_the_strip_shows_the_result(episode: Episode, figure: Figure) -> None:
     result = evaluate(episode)
     written = {text.get_text() for text in texts(figure)}
     assert result.outcome.value.replace("_", " ") in written
@@ -374,7 +374,7 @@ def test_the_strip_tells_the_result(episode: Episode, figure: Figure) -> None:
         assert f"{result.length_m:.3f} m" in written
 
 
-def test_nothing_is_cut_and_no_texts_overlap(episode: Episode, figure: Figure) -> None:
+def test_no_text_is_cut_and_none_overlap(episode: Episode, figure: Figure) -> None:
     ax = figure.axes[0]
     boxes = {text: text.get_window_extent() for text in texts(figure)}
     for text, box in boxes.items():
@@ -406,20 +406,20 @@ def test_the_path_and_the_rings_are_inside_the_picture(episode: Episode, figure:
         assert bottom < y - r < y + r < top
 
 
-def test_obstacles_far_away_are_named_instead_of_shrinking_the_path() -> None:
+def test_distant_obstacles_are_listed_instead_of_shrinking_the_path() -> None:
     figure = figure_of("corridor")
     assert "outside the picture: 2" in {text.get_text() for text in texts(figure)}
     assert figure.axes[0].get_ylim()[0] > -20.0
 
 
 def png_size(data: bytes) -> tuple[int, int]:
-    """Return width and height, having walked over all chunks to the end."""
+    """Return width and height of a PNG, after a check of all its chunks."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    kinds, at = [], 8
-    while at < len(data):
-        (length,) = struct.unpack(">I", data[at : at + 4])
-        kinds.append(data[at + 4 : at + 8])
-        at += 12 + length
+    kinds, offset = [], 8
+    while offset < len(data):
+        (length,) = struct.unpack(">I", data[offset : offset + 4])
+        kinds.append(data[offset + 4 : offset + 8])
+        offset += 12 + length
     assert kinds[0] == b"IHDR"
     assert kinds[-1] == b"IEND"
     assert b"tEXt" not in kinds  # where dates and versions would be
@@ -438,7 +438,7 @@ def test_a_png_of_reasonable_size_is_written(episode: Episode, tmp_path: Path) -
     assert 20_000 < path.stat().st_size < 1_000_000
 
 
-def test_the_same_episode_gives_the_same_bytes_whatever_the_users_settings() -> None:
+def test_the_same_episode_gives_the_same_bytes_for_any_user_settings() -> None:
     plain = png_bytes(run(load_scenario("case1")))
     with matplotlib.rc_context({"font.size": 20.0, "axes.facecolor": "red", "text.usetex": True}):
         before = dict(matplotlib.rcParams)
@@ -455,7 +455,7 @@ def test_five_thousand_ticks_are_drawn() -> None:
     assert png_size(png_bytes(episode))[0] > 1000
 
 
-def test_an_existing_file_stays_as_it_is(tmp_path: Path) -> None:
+def test_an_existing_file_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "run.png"
     path.write_bytes(b"mine")
     with pytest.raises(OutputError, match="already exists") as caught:
@@ -473,17 +473,17 @@ def _modules_after(code: str) -> set[str]:
     return set(done.stdout.split())
 
 
-def test_matplotlib_is_loaded_for_figures_only_and_pyplot_never() -> None:
-    light = _modules_after(
+def test_matplotlib_is_imported_for_figures_only_and_pyplot_never() -> None:
+    without = _modules_after(
         "import mfba_planner.report.result_json, mfba_planner.report.result_table"
     )
-    assert "mfba_planner.report.result_table" in light
-    assert "matplotlib" not in light
-    heavy = _modules_after(
+    assert "mfba_planner.report.result_table" in without
+    assert "matplotlib" not in without
+    with_figure = _modules_after(
         "from mfba_planner.report.run_figure import png_bytes\n"
-        "from mfba_planner.simulation.episode import run\n"
+        "from mfba_planner.simulation.run_episode import run\n"
         "from mfba_planner.scenarios.scenario_files import load_scenario\n"
         "png_bytes(run(load_scenario('case1')))"
     )
-    assert "matplotlib.backends.backend_agg" in heavy
-    assert "matplotlib.pyplot" not in heavy
+    assert "matplotlib.backends.backend_agg" in with_figure
+    assert "matplotlib.pyplot" not in with_figure

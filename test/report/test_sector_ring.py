@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where bits lie around the robot."""
+"""The ring of sectors or headings around the robot, and its drawing."""
 
 import math
 from dataclasses import replace
@@ -24,7 +24,7 @@ def degrees(*angles: float) -> list[float]:
     return [math.degrees(angle) for angle in angles]
 
 
-def test_sectors_begin_at_plus_x_and_gaps_lead_where_the_rule_says() -> None:
+def test_sectors_start_at_plus_x_and_gap_headings_follow_the_rule() -> None:
     episode = run(load_scenario("case2"), seed=2)
     ring = ring_of(episode)
     assert (ring.count, ring.of_headings) == (12, False)
@@ -36,14 +36,14 @@ def test_sectors_begin_at_plus_x_and_gaps_lead_where_the_rule_says() -> None:
     assert ring_of(replace(episode, ticks=())) == ring
 
 
-def test_a_heading_is_in_the_middle_of_its_wedge() -> None:
+def test_a_heading_is_the_middle_of_its_wedge() -> None:
     ring = ring_of(run(load_scenario("empty"), seed=0), (1,) * 72)
     assert (ring.count, ring.of_headings) == (72, True)
     assert degrees(*ring.wedge(0)) == pytest.approx([2.5, 7.5])
     assert degrees(ring.gaps[0], ring.gaps[1]) == pytest.approx([5.0, 10.0])
 
 
-def test_pictures_show_headings_and_call_them_so() -> None:
+def test_pictures_show_headings_and_label_them() -> None:
     planner = preset(PlannerParams(method=Method.PREDICTIVE))
     episode = simulate(load_scenario("case2"), planner=planner, sensor=SensorParams(), seed=2)
     index = next(i for i, tick in enumerate(episode.ticks) if 0 < sum(tick.vs) < 72)
@@ -51,7 +51,7 @@ def test_pictures_show_headings_and_call_them_so() -> None:
     draw_snapshot(axes, episode, index)
     wedges = [patch for patch in axes.patches if isinstance(patch, Wedge)]
     assert {wedge.get_gid() for wedge in wedges} == {"closing"}
-    lit = [
+    set_bits = [
         any(
             wedge.theta1 < turned < wedge.theta2
             for wedge in wedges
@@ -59,5 +59,5 @@ def test_pictures_show_headings_and_call_them_so() -> None:
         )
         for angle in range(5, 361, 5)
     ]
-    assert lit == [bit == 1 for bit in episode.ticks[index].vs]
+    assert set_bits == [bit == 1 for bit in episode.ticks[index].vs]
     assert "headings to a contact" in [label for _, label in entries(axes)]

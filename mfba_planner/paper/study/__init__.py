@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The runs behind the tables: what to run, in parallel, resumable, the same for any workers."""
+"""The runs for the tables: plan, chunks, and computing them in parallel and resumably."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The unit of work: some seeds of one sample, computed anywhere with the same result."""
+"""The chunks of the paper's study: some seeds of one sample each, computed independently."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..functions import FUNCTIONS
 
 Columns = dict[str, list[float]]
 
-BENCHMARK_STREAM = 2  # spawn key of these runs' SeedSequence children, beside the planner's
+BENCHMARK_STREAM = 2  # spawn key of these runs' SeedSequence children; the planner has others
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +33,11 @@ class Benchmark:
 
     @property
     def cost(self) -> float:
-        """Time of a run, in about milliseconds."""
+        """Approximate time of a run (ms)."""
         return 4e-4 * self.bat.population * self.bat.iterations
 
     def facts(self) -> dict[str, Scalar]:
-        """What decides the numbers, as plain values."""
+        """Everything that the numbers depend on, as plain values."""
         return {"function": self.function, "dimension": self.dimension, **flatten(self.bat)}
 
     def run(self, seeds: Sequence[int]) -> Columns:
@@ -45,7 +45,7 @@ class Benchmark:
         return {"best": self.search(seeds).best_value.tolist()}
 
     def search(self, seeds: Sequence[int]) -> BatchResult:
-        """The runs themselves; the stream of each is named by seed, function and law."""
+        """The runs; each random stream depends on seed, function and law."""
         function = FUNCTIONS[self.function]
         key = (BENCHMARK_STREAM, int(self.function[1:]), _number(self.bat.algorithm.value))
         rngs = [
@@ -57,24 +57,24 @@ class Benchmark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trips:
-    """Episodes of Algorithm 1 in one scenario: as `mfba sim --planner paper`."""
+    """Episodes of Algorithm 1 in one scenario, as by `mfba sim --planner paper`."""
 
     scenario: Scenario
     planner: PlannerParams
 
     @property
     def cost(self) -> float:
-        """Time of a run, in about milliseconds."""
+        """Approximate time of a run (ms)."""
         return 25.0
 
     def facts(self) -> dict[str, Scalar]:
-        """What decides the numbers, as plain values."""
+        """Everything that the numbers depend on, as plain values."""
         return {"scenario": repr(self.scenario), **flatten(self.planner)}
 
     def run(self, seeds: Sequence[int]) -> Columns:
-        """Length, smallest gap, contacts, turning, whether the goal was reached, and whom it met.
+        """For each seed: length, clearance, contacts, goal reached or not, turning, encounters.
 
-        encounters is a whole number with the bit 2^i set for obstacle i.
+        encounters is an integer with bit 2^i set for obstacle i.
         """
         rows = [self._row(seed) for seed in seeds]
         return {name: [row[name] for row in rows] for name in rows[0]}
@@ -102,27 +102,27 @@ class SampleChunk:
 
     @property
     def name(self) -> str:
-        """Name of the chunk, fit for a file."""
+        """Name of the chunk, usable as a file name."""
         return f"{self.sample.replace('/', '-')}-{self.first}-{self.count}"
 
     @property
     def cost(self) -> float:
-        """Time it takes, in about milliseconds, for a progress bar."""
+        """Approximate computing time (ms), for a progress bar."""
         return self.count * self.work.cost
 
     def facts(self) -> Mapping[str, Any]:
-        """What decides the numbers, as plain values."""
+        """Everything that the numbers depend on, as plain values."""
         return {"sample": self.sample, **self.work.facts()}
 
     def run(self) -> Columns:
-        """Compute it."""
+        """Compute the chunk."""
         return self.work.run(range(self.first, self.first + self.count))
 
 
 def chunks(
     sample: str, work: Benchmark | Trips, first: int, runs: int, size: int
 ) -> list[SampleChunk]:
-    """A sample cut into chunks of that size."""
+    """A sample split into chunks of this size."""
     last = first + runs
     return [
         SampleChunk(sample=sample, work=work, first=start, count=min(size, last - start))
@@ -131,5 +131,5 @@ def chunks(
 
 
 def _number(name: str) -> int:
-    """A text as a whole number, for a spawn key."""
+    """A text as an integer, for a spawn key."""
     return int.from_bytes(name.encode(), "big")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is run for the tables: which samples, in which readings, how many seeds."""
+"""The plan of the runs for the tables: samples, readings and numbers of seeds."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Size:
 
 FULL = Size(
     trips=1000,
-    # On F1 and F4 the two laws are so close that it takes more runs to tell them apart.
+    # On F1 and F4 the two laws are so close that more runs are needed to distinguish them.
     benchmarks={
         "table3": 2000,
         "robust": 1500,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run a plan's chunks on any number of workers; the samples do not depend on how many."""
+"""Run a plan's chunks on any number of workers; the samples do not depend on the number."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from ...evaluation.study.chunk_store import Store
 from ...evaluation.study.compute_chunks import compute
 from .chunk import SampleChunk
 
-PACKAGES = ("core", "paper")  # their code decides the numbers
+# The numbers depend on the code in these folders of mfba_planner.
+PACKAGES = ("core", "swarm", "perception", "planning", "simulation", "evaluation", "paper")
 Sample = Mapping[str, NDArray[np.float64]]
 
 
 def open_store(directory: Path, plan: Sequence[SampleChunk], facts: Mapping[str, Any]) -> Store:
-    """The directory of a study of the paper. Raises OutputError as Store does."""
+    """Open the directory of a study of the paper. Raises OutputError as Store does."""
     return Store(directory, plan, facts, command="mfba tables", packages=PACKAGES)
 
 
@@ -34,13 +35,13 @@ def run_plan(
 ) -> dict[str, Sample]:
     """Compute (or read back) every chunk; {sample: {column: values by seed}}.
 
-    done, say and what is raised are those of study.compute.
+    The callbacks and the errors raised are those of evaluation.study.compute_chunks.compute.
     """
     return samples(plan, compute(plan, workers=workers, store=store, done=done, say=say))
 
 
 def samples(plan: Sequence[SampleChunk], found: Mapping[str, Columns]) -> dict[str, Sample]:
-    """The columns of all chunks, joined in the plan's order."""
+    """The columns of all chunks, joined in the sequence of the plan."""
     gathered: dict[str, dict[str, list[float]]] = {}
     for chunk in plan:
         sample = gathered.setdefault(chunk.sample, {})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Table 3: fifteen runs as the paper made it, thousands as it should be made."""
+"""Table 3: fifteen runs as in the paper, and thousands of runs with tests."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from .model import Cell, Entry, Grid, Ours, Section, Verdict, entry, inside
 
 Samples = Mapping[str, Sample]
 
-MEANT = "table3"  # the reading that is held against the printed numbers
+MEANT = "table3"  # the reading that is compared with the printed numbers
 SIGNIFICANT = 0.01
 DRAWS = 400  # of whole samples, for the intervals of means
-# A run that ends above this has stayed in a local minimum.
+# A run with a best value above this ended in a local minimum.
 TRAPPED_ABOVE = {"F3": 0.29, "F6": -1.5}
 SIGNS = {True: "+", False: ".", None: "-"}
 
 
 def benchmark_section(samples: Samples, seed: int) -> Section:
-    """Every number of Table 3, each row jointly, and what the samples really say."""
+    """Every number of Table 3, each row jointly, and the comparison of BA and MFBA."""
     draws = {
         (reading, row): _draws(samples, reading, row, number)
         for reading in SWARM_READINGS
@@ -125,7 +125,7 @@ def _joint(draws: Mapping[tuple[str, str], Array]) -> Grid:
 
 
 def consistent_rows(joint: Grid, reading: str = MEANT) -> int:
-    """How many of the twelve printed rows are consistent with a reading."""
+    """Number of the twelve printed rows that are consistent with a reading."""
     column = joint.head.index(f"p, {reading}")
     return sum(float(str(row[column])) >= 1.0 - stats.LEVEL for row in joint.rows)
 
@@ -161,12 +161,12 @@ def _signs(
             for reading in SWARM_READINGS
         ]
         same = [o.reading for o in ours if o.value == printed.text]
-        told = f"same in {' and '.join(same)}" if same else "in none of our readings"
+        same_in = f"same in {' and '.join(same)}" if same else "in none of our readings"
         yield entry(
             printed,
             ours,
             Verdict.REPRODUCED if MEANT in same else Verdict.DIFFERS,
-            f"{told}; Mann-Whitney, Holm over six, p < {SIGNIFICANT:g}",
+            f"{same_in}; Mann-Whitney, Holm over six, p < {SIGNIFICANT:g}",
         )
 
 
@@ -191,7 +191,7 @@ def _as_made(samples: Samples, draws: Mapping[tuple[str, str], Array]) -> Grid:
 
 
 def plus_chance(draws: Mapping[tuple[str, str], Array], reading: str, function: str) -> float:
-    """Chance that fifteen runs each give MFBA the lower mean."""
+    """Chance that MFBA has the lower mean with fifteen runs of each law."""
     means = [draws[reading, f"{function} {law}"][:, 2] for law in ("MFBA", "BA")]
     return float(np.mean(means[0] < means[1]))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From scenarios, sizes and a seed to sections: what to run, and what to make of it."""
+"""Build the sections of tables: which runs they need, and the sections from their samples."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TRIPS = {"5": ("case1",), "7": ("case2",), "claims": ("case1", "case2")}
 
 
 def check_sections(wanted: Sequence[str]) -> tuple[str, ...]:
-    """The wanted sections in the paper's order, all for none; ConfigError for an unknown one."""
+    """The wanted sections in the paper's sequence, all if none; ConfigError for an unknown one."""
     for name in wanted:
         if name not in SECTIONS:
             raise ConfigError(f"{name}: unknown table; {did_you_mean(name, list(SECTIONS))}")
@@ -33,7 +33,7 @@ def check_sections(wanted: Sequence[str]) -> tuple[str, ...]:
 def plan(
     sections: Sequence[str], scenarios: Mapping[str, Scenario], size: Size, seed: int
 ) -> list[SampleChunk]:
-    """All that these sections need to be run; scenarios are case1 and case2."""
+    """The runs that these sections need, as chunks; scenarios: case1 and case2."""
     found = benchmark_plan(size, seed) if "3" in sections else []
     cases = {case for name in sections for case in _TRIPS.get(name, ())}
     for case in sorted(cases):
@@ -47,7 +47,7 @@ def build(
     samples: Mapping[str, Sample],
     seed: int,
 ) -> list[Section]:
-    """The sections, from samples that were run by plan()."""
+    """The sections, from the samples of plan()."""
     makers: dict[str, Callable[[], Section]] = {
         "1": gap_section,
         "2": function_section,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The claims of the abstract and the conclusion, each with what our runs say of it."""
+"""The claims of the paper's abstract, each compared with our runs."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from .trips import fitting_columns, ten_runs
 Samples = Mapping[str, Sample]
 CASES = tuple(published.TRIP_TABLES)
 SIGNIFICANT = 0.01
-# Less than the width of a pencil line on a map of 12 m: statistically real, practically nothing.
+# Smaller differences do not count, even if they are significant.
 NOTICEABLE = {"length_m": 0.05, "clearance_m": 0.01, "turning_rad": np.radians(5.0)}
 
 
 def claim_section(samples: Samples, scenarios: Mapping[str, Scenario]) -> Section:
-    """Collision-free, shorter, safer, smoother, faster: by thousands of runs."""
+    """Collision-free, shorter, safer, smoother, faster: judged by thousands of runs."""
     return Section(
         key="claims",
         title="Claims. What the abstract claims",
@@ -52,7 +52,7 @@ def claim_section(samples: Samples, scenarios: Mapping[str, Scenario]) -> Sectio
 
 
 def _columns(samples: Samples) -> str:
-    """Which printed columns of lengths each reading holds."""
+    """The printed columns of lengths that each reading contains."""
     fits = {case: fitting_columns(ten_runs(case, samples)) for case in CASES}
     held = {
         reading: [
@@ -63,11 +63,11 @@ def _columns(samples: Samples) -> str:
         ]
         for reading in PLANNER_READINGS
     }
-    told = "; ".join(f"{reading} holds {', '.join(x) or 'none'}" for reading, x in held.items())
+    columns = "; ".join(f"{reading} holds {', '.join(x) or 'none'}" for reading, x in held.items())
     whole = [reading for reading, x in held.items() if len(x) == len(CASES) * len(LAWS)]
     return (
         "Printed columns of Tables 5 and 7 whose best, mean and worst length all lie inside our "
-        f"intervals of ten runs: {told}. All four at once: {', '.join(whole) or 'no reading'}."
+        f"intervals of ten runs: {columns}. All four at once: {', '.join(whole) or 'no reading'}."
     )
 
 
@@ -94,21 +94,21 @@ def _collision_free(samples: Samples) -> Entry:
 
 
 def _shortest(samples: Samples, scenarios: Mapping[str, Scenario]) -> Entry:
-    """Against the straight line, where driving it at the same speed touches nothing."""
+    """Compare with the straight line, if driving it at the same speed is collision-free."""
     clear = []
     ours = []
     for reading in PLANNER_READINGS:
-        told = []
+        excesses = []
         for case in CASES:
             task, speed = scenarios[case], PLANNERS[reading].speed_mps
             straight = distance(task.start_m, task.goal_m)
             gaps = step_clearances(task, 0.0, straight / speed, task.start_m, task.goal_m)
             lengths = samples[trip_sample(reading, case, "mfba")]["length_m"]
             excess = 100.0 * (float(lengths.mean()) / straight - 1.0)
-            told.append(f"{case} {excess:+.2g} % over the straight line")
+            excesses.append(f"{case} {excess:+.2g} % over the straight line")
             if min(gaps) > 0.0:
                 clear.append(f"{case}, {speed:g} m/s, {min(gaps):.2g} m to spare")
-        ours.append(Ours(reading=reading, value=", ".join(told)))
+        ours.append(Ours(reading=reading, value=", ".join(excesses)))
     found = "; ".join(dict.fromkeys(clear))
     return _claim(
         "the shortest path",
@@ -123,7 +123,7 @@ def _shortest(samples: Samples, scenarios: Mapping[str, Scenario]) -> Entry:
 def _compared(
     samples: Samples, claim: str, what: str, column: str, unit: str, better: float
 ) -> Entry:
-    """Differences MFBA - BA by case and reading; better is the sign of an improvement's loss."""
+    """Differences MFBA - BA by case and reading; better: 1.0 if less is better, else -1.0."""
     found: list[tuple[str, str, Array, Comparison]] = []
     for reading in PLANNER_READINGS:
         for case in CASES:
@@ -134,14 +134,14 @@ def _compared(
     corrected = stats.holm([comparison.p for *_, comparison in found])
     ours, supported = [], []
     for reading in PLANNER_READINGS:
-        told = []
+        means = []
         for (which, case, difference, _), p in zip(found, corrected):
             if which != reading:
                 continue
             mean = stats.estimate(difference, lambda x: x.mean(1), stats.generator(8))
-            told.append(f"{case} {better * mean.middle:+.3g} {unit} (p {p:.2g})")
+            means.append(f"{case} {better * mean.middle:+.3g} {unit} (p {p:.2g})")
             supported.append(p < SIGNIFICANT and mean.middle <= -NOTICEABLE[column])
-        ours.append(Ours(reading=reading, value=", ".join(told)))
+        ours.append(Ours(reading=reading, value=", ".join(means)))
     names = [f"{reading} {case}" for reading, case, *_ in found]
     fits = [name for name, holds in zip(names, supported) if holds]
     return _claim(
@@ -160,12 +160,12 @@ def _run_time() -> Entry:
         ]
         for case in ("case 1", "case 2")
     }
-    told = ", ".join(f"{case} {mfba:g} s against {ba:g} s" for case, (mfba, ba) in times.items())
+    pairs = ", ".join(f"{case} {mfba:g} s against {ba:g} s" for case, (mfba, ba) in times.items())
     return _claim(
         "shortest time",
         [],
         Verdict.NOT_STATED,
-        f"the printed run times (MFBA against BA) are {told}: computing times, of one run each",
+        f"the printed run times (MFBA against BA) are {pairs}: computing times, of one run each",
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables 1, 2, 4 and 6 and the constants: what the paper gives, held against what we run."""
+"""Tables 1, 2, 4 and 6 and the constants: the paper's values compared with ours."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def function_section() -> Section:
             entries.append(_minimum(printed, function.minimum(DIMENSION)))
             continue
         if printed.column == "formula":
-            # Text against text proves nothing: the tests hold the values.
+            # Comparing texts proves nothing: the tests compare the values.
             ours = Ours(reading="functions", value=function.formula)
             why = "values are tested against independent ones"
             entries.append(entry(printed, [ours], Verdict.REPRODUCED, why))
@@ -100,7 +100,7 @@ def obstacle_section(case: str, scenario: Scenario) -> Section:
 
 
 def constant_section(scenario: Scenario) -> Section:
-    """The constants that the text gives, and those that it does not."""
+    """The constants that the text states, and those that it does not."""
     return Section(
         key="constants",
         title="Constants. What the paper states, and what it does not",

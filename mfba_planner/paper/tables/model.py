@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a reproduced table is made of, before anybody renders it."""
+"""The data model of a reproduced table: sections, entries, grids and verdicts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Cell = str | int | float | Interval | None
 
 
 class Verdict(Enum):
-    """What a printed number is worth."""
+    """The verdict on a printed number."""
 
     REPRODUCED = "reproduced"
     DIFFERS = "differs"
@@ -26,7 +26,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ours:
-    """What one of our readings gives for a printed number; seeds says from which runs."""
+    """The value of one of our readings for a printed number; seeds: those of its runs."""
 
     reading: str
     value: Cell
@@ -35,7 +35,7 @@ class Ours:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """A printed number (or a gap in the paper), ours, the verdict and the reason for it."""
+    """A printed number (or a value that the paper lacks), our values, verdict and reason."""
 
     place: str
     row: str
@@ -48,7 +48,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """A table of our own; key is its name in the data, digits those of some of its columns."""
+    """A table of our own; key: its name in the data; digits: {column: significant digits}."""
 
     key: str
     title: str
@@ -60,7 +60,7 @@ class Grid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A table of the paper, reproduced; digits is how many significant ones are shown."""
+    """A reproduced table of the paper; digits: number of significant digits shown."""
 
     key: str
     title: str
@@ -71,7 +71,7 @@ class Section:
 
 
 def entry(printed: Printed, ours: Sequence[Ours], verdict: Verdict, why: str) -> Entry:
-    """An Entry of a printed number; what contradicts another printed number is said too."""
+    """An Entry of a printed number; a contradiction to another printed number is added to why."""
     contradiction = doubts.CONTRADICTED.get(printed.key, "")
     return Entry(
         place=printed.place,
@@ -80,7 +80,7 @@ def entry(printed: Printed, ours: Sequence[Ours], verdict: Verdict, why: str) ->
         printed=printed.text,
         ours=tuple(ours),
         verdict=verdict,
-        why="; ".join(part for part in (why, contradiction) if part),
+        why="; ".join(reason for reason in (why, contradiction) if reason),
     )
 
 
@@ -92,19 +92,19 @@ def compare_exactly(printed: Printed, reading: str, ours: Cell, why: str = "") -
 
 
 def inside(printed: Printed, ours: Sequence[Ours], meant: str) -> Entry:
-    """Reproduced when the reading that is meant has the printed value in its 95 % interval.
+    """Reproduced when the printed value lies in the 95 % interval of the reading `meant`.
 
-    What another reading gives is told, not counted.
+    Other readings are listed in the reason only.
     """
     value = math.nan if printed.value is None else printed.value
     fits = [o.reading for o in ours if isinstance(o.value, Interval) and value in o.value]
     fails = [o.reading for o in ours if o.reading not in fits]
-    told = []
+    positions = []
     if fits:
-        told.append(f"in the 95 % interval of {' and '.join(fits)}")
+        positions.append(f"in the 95 % interval of {' and '.join(fits)}")
     if fails:
-        told.append(f"outside that of {' and '.join(fails)}")
-    why = ", ".join(told)
+        positions.append(f"outside that of {' and '.join(fails)}")
+    why = ", ".join(positions)
     if printed.key in doubts.IMPOSSIBLE:
         return entry(
             printed, ours, Verdict.IMPOSSIBLE, f"{doubts.IMPOSSIBLE[printed.key]} ({why})"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables 5 and 7 and what the text says of them: ten runs, and a thousand seeds."""
+"""Tables 5 and 7 and the numbers of the text on them: ten runs, and a thousand seeds."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Draws = Mapping[tuple[str, str], Array]
 
 LENGTH_COLUMNS = ("best", "mean", "worst")
 SHOWN_ENCOUNTERS = 4
-# Which reading of section 6.2 is meant to give which column of the tables.
+# {law: the reading of section 6.2 whose intervals decide the verdicts of its column}
 MEANT = {"mfba": "section6", "ba": "fig1"}
 
 
@@ -52,14 +52,14 @@ def trip_section(case: str, samples: Samples, seed: int) -> Section:
 
 
 def ten_runs(case: str, samples: Samples) -> Grid:
-    """The lengths of ten runs against those printed."""
+    """The lengths of ten runs compared with the printed ones."""
     return _ten_runs(case, _draws(case, samples))
 
 
 def _draws(case: str, samples: Samples) -> Draws:
-    """Lengths of ten runs, many times over: {(reading, law): (count, 10)}.
+    """Lengths of ten runs, resampled: {(reading, law): (count, 10)}.
 
-    The draws are the same for all: what differs between two is not the resampling.
+    All pairs use the same draws, so differences between them do not come from the resampling.
     """
     return {
         (reading, law): stats.resample(
@@ -75,7 +75,7 @@ def _column(samples: Samples, case: str, reading: str, law: str, column: str) ->
 
 
 def _statistics(draws: Array) -> dict[str, Array]:
-    """The four columns of the tables, for each row of ten values; SD over n - 1 as MATLAB's."""
+    """The four columns of the tables for each row of ten values; SD over n - 1, as MATLAB's."""
     return {
         "minimum": draws.min(1),
         "maximum": draws.max(1),
@@ -85,7 +85,7 @@ def _statistics(draws: Array) -> dict[str, Array]:
 
 
 def _ours(draws: Draws, law: str, column: str, seeds: str) -> list[Ours]:
-    """The readings' intervals of a statistic of ten runs."""
+    """The interval of a statistic of ten runs, for each reading."""
     return [
         Ours(
             reading=reading,
@@ -119,7 +119,7 @@ def _text(case: str, samples: Samples, lengths: Draws, seeds: str) -> Iterator[E
 
 
 def _experiment(printed: Printed, case: str, samples: Samples) -> Entry:
-    """Which of ten runs was the best: each is as likely."""
+    """The number of the best of ten runs: pure chance."""
     ours = [
         Ours(
             reading=reading,
@@ -136,7 +136,7 @@ def _experiment(printed: Printed, case: str, samples: Samples) -> Entry:
 
 
 def printed_lengths(case: str, law: str) -> dict[str, float]:
-    """Best, mean and worst length that the printed fitness means; the mean by 1 / mean fitness."""
+    """Best, mean and worst length from the printed fitness; the mean is 1 / mean fitness."""
     values = published.values(TRIP_TABLES[case], law.upper())
     return {
         "best": 1.0 / values["maximum"],
@@ -271,7 +271,7 @@ def _obstacles(mask: int) -> str:
 
 
 def fitting_columns(ten: Grid) -> dict[str, list[str]]:
-    """{law: readings whose ten runs hold printed best, mean and worst}."""
+    """{law: readings whose intervals contain printed best, mean and worst}."""
     fits: dict[str, list[str]] = {}
     for law in LAWS:
         fits[law] = [
@@ -286,7 +286,7 @@ def _notes(ten: Grid) -> tuple[str, ...]:
     s, f = PLANNERS["section6"], PLANNERS["fig1"]
     fits = fitting_columns(ten)
     both = [reading for reading in PLANNER_READINGS if all(reading in x for x in fits.values())]
-    told = "; ".join(
+    columns = "; ".join(
         f"{law.upper()}'s printed best, mean and worst lie inside the intervals of "
         f"{' and '.join(readings) if readings else 'no reading'}"
         for law, readings in fits.items()
@@ -296,6 +296,6 @@ def _notes(ten: Grid) -> tuple[str, ...]:
         f"{s.step_length_m:g} m and {s.bat.iterations} bat iterations per step; fig1 has speed "
         f"{f.speed_mps:g} m/s, steps of {f.step_length_m:g} m and {f.bat.iterations} iteration of "
         "one lasting swarm per step.",
-        f"{told}.",
+        f"{columns}.",
         f"Readings that give both columns of this table: {' and '.join(both) or 'none found'}.",
     )

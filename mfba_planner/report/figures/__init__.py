@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's figures again, one module each; they eat Episodes, or the core's own functions."""
+"""The paper's figures again, one module each, drawn from Episodes or from computed values."""

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from mfba_planner.swarm.bat_swarm import BatParams, BatSwarm, Box, Schedule
 
 from .. import style
-from ..figure_canvas import EDGE, Sheet
+from ..figure_sheet import EDGE, Sheet
 
 RHOS = (0.01, 0.5, 1.0, 3.0)
 HORIZON = 50
@@ -45,7 +45,7 @@ def draw() -> Figure:
     sheet = Sheet(left + 2 * _WIDTH + 2 * _GAP, bottom + _HEIGHT + 1.15)
     sheet.head(
         "Fig. 2: the frequency law of MFBA",
-        "eq. 10 puts an increasing function of the iteration t in the place of BA's random β",
+        "eq. 10 replaces BA's random β by an increasing function of the iteration t",
     )
     panels = (
         (Schedule.RAW, "as printed: β = t · exp(-ρ r)"),

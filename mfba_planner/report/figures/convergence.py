@@ -18,7 +18,7 @@ from mfba_planner.paper.study.plan import SWARM_READINGS
 from mfba_planner.swarm.bat_swarm import Algorithm
 
 from .. import style
-from ..figure_canvas import EDGE, Sheet
+from ..figure_sheet import EDGE, Sheet
 
 LAWS: dict[Algorithm, style.Looks] = {
     Algorithm.BA: {"color": style.VERMILLION, "linestyle": (0, (4, 1.5))},
@@ -26,7 +26,7 @@ LAWS: dict[Algorithm, style.Looks] = {
 }
 _WIDTH, _HEIGHT, _GAP, _ROW = 2.75, 2.0, 0.65, 2.85  # inches
 _COLUMNS = 3
-_FLOOR = 1e-16  # a minimum met exactly has no logarithm
+_FLOOR = 1e-16  # smallest distance drawn: 0 has no logarithm
 
 
 def draw() -> Figure:
@@ -41,8 +41,8 @@ def draw() -> Figure:
         f"best value so far minus minimum, {RUNS} runs each, reading {READING}, "
         f"{bat.population} bats, T = {bat.iterations}, d = 2",
     )
-    for place, (key, function) in enumerate(FUNCTIONS.items()):
-        row, column = divmod(place, _COLUMNS)
+    for index, (key, function) in enumerate(FUNCTIONS.items()):
+        row, column = divmod(index, _COLUMNS)
         x, top = left + column * (_WIDTH + _GAP), height - 1.15 - row * _ROW
         ax = sheet.axes(x, top - _HEIGHT, _WIDTH, _HEIGHT)
         _panel(ax, curves(key))

@@ -13,7 +13,7 @@ from mfba_planner.simulation.scenario import Scenario
 
 from .. import style
 from ..draw_scene import Z_MARK, line, patch
-from ..figure_canvas import EDGE, Sheet
+from ..figure_sheet import EDGE, Sheet
 from .sketch import draw_obstacle, write
 
 WORLD = Scenario(
@@ -26,14 +26,14 @@ _WIDTH, _HEIGHT, _GAP = 4.0, 2.5, 0.5  # inches
 
 
 def draw() -> Figure:
-    """Draw the world as it is, and as the planner sees it."""
+    """Draw the world, and the enlarged obstacles that the planner gets."""
     sheet = Sheet(2 * EDGE + 2 * _WIDTH + _GAP, _HEIGHT + 1.45)
     (obstacle,) = WORLD.obstacles
     sheet.head(
         "Fig. 4: enlarging the obstacles",
         "the robot's radius is added to every obstacle's; the robot itself becomes a point",
     )
-    captions = ("the world", "what the planner sees")
+    captions = ("the world", "the planner's input")
     axes = []
     for column, caption in enumerate(captions):
         x = EDGE + column * (_WIDTH + _GAP)
@@ -64,7 +64,7 @@ def _frame(ax: Axes) -> None:
 
 
 def _radius(ax: Axes, center: Point, radius: float, label: str) -> None:
-    """A measuring arrow from the centre upwards, its meaning above the circle."""
+    """A measuring arrow from the centre upwards, with its label above the circle."""
     x, y = center
     ax.annotate("", (x, y + radius), (x, y), zorder=Z_MARK,
                 arrowprops={**style.MEASURE, "shrinkA": 0.0, "shrinkB": 0.0})  # fmt: skip

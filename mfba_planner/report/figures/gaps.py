@@ -14,16 +14,16 @@ from mfba_planner.planning.gap_vector import gap_heading, gap_vector, nearest_fr
 
 from .. import style
 from ..draw_scene import Z_MARK, Z_PATH, line, patch
-from ..figure_canvas import EDGE, Sheet
+from ..figure_sheet import EDGE, Sheet
 from ..legend import Entry
-from .sketch import EXAMPLE, HERE, bare, draw_ring, example_vs, write
+from .sketch import EXAMPLE, ORIGIN, draw_ring, example_vs, hide_axes, write
 
 _SIDE, _STRIP, _TALL = 4.2, 5.6, 2.0  # inches
 _INNER, _OUTER, _GOAL, _REACH = 0.82, 1.35, 1.6, 1.72  # metres
 
 
 def draw() -> Figure:
-    """Draw how Vs becomes Vg, and which gap the robot takes."""
+    """Draw how Vs gives Vg, and which gap the robot chooses."""
     vs = example_vs()
     vg = gap_vector(vs)
     sheet = Sheet(EDGE + _STRIP + 0.3 + _SIDE + EDGE, _SIDE + 1.05)
@@ -40,7 +40,7 @@ def draw() -> Figure:
 
 
 def _strip(ax: Axes, vs: Bits, vg: Bits) -> None:
-    """Two rows of cells, joined as Table 1 joins them; the first bit again at the end."""
+    """Two rows of cells, joined as in Table 1; the first bit is repeated at the end."""
     n = len(vs)
     ax.set_xlim(-1.3, n + 1.1)
     ax.set_ylim(-0.75, 3.9)
@@ -48,49 +48,49 @@ def _strip(ax: Axes, vs: Bits, vg: Bits) -> None:
     write(ax, (-0.75, 3.0), "Vs", fontsize=style.NORMAL + 1, fontweight="bold")
     write(ax, (-0.75, 0.5), "Vg", fontsize=style.NORMAL + 1, fontweight="bold")
     for i in range(n + 1):
-        again = i == n
-        _cell(ax, i, 2.5, str(vs[i % n]), style.SET_CELL if vs[i % n] else style.CELL, again)
-        write(ax, (i + 0.5, 3.75), f"S{i % n + 1}", color=style.FAINT if again else style.QUIET)
+        repeated = i == n
+        _cell(ax, i, 2.5, str(vs[i % n]), style.SET_CELL if vs[i % n] else style.CELL, repeated)
+        write(ax, (i + 0.5, 3.75), f"S{i % n + 1}", color=style.FAINT if repeated else style.QUIET)
     for i, closed in enumerate(vg):
         looks = style.SET_CELL if closed else style.FREE_CELL
-        _cell(ax, i + 0.5, 0.0, str(closed), looks, again=False)
+        _cell(ax, i + 0.5, 0.0, str(closed), looks, repeated=False)
         write(ax, (i + 1.0, -0.35), str(i + 1), color=style.QUIET)
         for source in (i + 0.5, i + 1.5):
             line(ax, [(source, 2.45), (i + 1.0, 1.05)], "join", zorder=1.5, **style.JOIN)
 
 
-def _cell(ax: Axes, x: float, y: float, text: str, looks: style.Looks, again: bool) -> None:
-    edge = {**looks, "linestyle": (0, (1, 1.8)) if again else "-"}
+def _cell(ax: Axes, x: float, y: float, text: str, looks: style.Looks, repeated: bool) -> None:
+    edge = {**looks, "linestyle": (0, (1, 1.8)) if repeated else "-"}
     patch(ax, Rectangle((x + 0.06, y), 0.88, 1.0, zorder=2.0, **edge), "cell")
     ax.text(x + 0.5, y + 0.48, text, ha="center", va="center", zorder=Z_MARK,
-            color=style.QUIET if again else style.INK)  # fmt: skip
+            color=style.QUIET if repeated else style.INK)  # fmt: skip
 
 
 def _ring(ax: Axes, vs: Bits, vg: Bits) -> None:
-    """The gaps as directions; the one nearest to the goal is taken."""
-    bare(ax, _REACH)
+    """The gaps as directions; the free one nearest to the goal is chosen."""
+    hide_axes(ax, _REACH)
     draw_ring(ax, vs, _INNER)
-    goal = bearing(HERE, EXAMPLE.goal_m)
+    goal = bearing(ORIGIN, EXAMPLE.goal_m)
     chosen = nearest_free_gap(vg, goal)
     for gap, closed in enumerate(vg, start=1):
         heading = gap_heading(gap, len(vg))
-        tip = towards(HERE, heading, _OUTER)
+        tip = towards(ORIGIN, heading, _OUTER)
         looks = style.TAKEN if gap == chosen else style.CLOSED_GAP if closed else style.FREE_GAP
         if closed:
-            line(ax, [towards(HERE, heading, _INNER), tip], f"gap:{gap}", zorder=Z_PATH, **looks)
+            line(ax, [towards(ORIGIN, heading, _INNER), tip], f"gap:{gap}", zorder=Z_PATH, **looks)
         else:
-            arrow = FancyArrowPatch(HERE if gap == chosen else towards(HERE, heading, _INNER),
+            arrow = FancyArrowPatch(ORIGIN if gap == chosen else towards(ORIGIN, heading, _INNER),
                                     tip, zorder=Z_PATH, **looks)  # fmt: skip
             patch(ax, arrow, f"gap:{gap}")
-        write(ax, towards(HERE, heading, _OUTER + 0.14), str(gap),
+        write(ax, towards(ORIGIN, heading, _OUTER + 0.14), str(gap),
               fontweight="bold" if gap == chosen else "normal")  # fmt: skip
-    star = towards(HERE, goal, _GOAL)
-    line(ax, [towards(HERE, goal, _INNER), star], "to goal", zorder=1.6, **style.TRACK)
+    star = towards(ORIGIN, goal, _GOAL)
+    line(ax, [towards(ORIGIN, goal, _INNER), star], "to goal", zorder=1.6, **style.TRACK)
     line(ax, [star], "goal", zorder=Z_MARK, **style.GOAL)
 
 
 def _entries() -> list[Entry]:
-    """What the colours and arrows mean."""
+    """The legend of colours and arrows."""
 
     def arrow(looks: style.Looks) -> Line2D:
         width = looks["linewidth"]
@@ -99,6 +99,6 @@ def _entries() -> list[Entry]:
     return [
         (arrow(style.FREE_GAP), "free gap"),
         (Line2D([], [], **style.CLOSED_GAP), "closed gap"),
-        (arrow(style.TAKEN), "free gap nearest to the goal: taken"),
+        (arrow(style.TAKEN), "free gap nearest to the goal: chosen"),
         (Line2D([], [], **style.GOAL), "direction of the goal"),
     ]

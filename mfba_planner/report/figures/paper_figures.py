@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's figures by name: what each shows, the run it shows, and its bytes."""
+"""The paper's figures by name: description, the run that is shown, and the file's bytes."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _TITLES = {
     "fig7": "Fig. 7: case study 1",
     "fig8": "Fig. 8: case study 2",
 }
-_CHOICE = "of 1000 runs that which comes nearest to the printed length and meets as told"
+_CHOICE = "of 1000 runs the one nearest to the printed length with the figure's encounters"
 FORMATS = ("svg", "png")
 
 
 def render(name: str, forms: tuple[str, ...] = FORMATS) -> dict[str, bytes]:
     """One figure in several formats, {format: bytes}."""
     from .. import style
-    from ..figure_canvas import to_bytes
+    from ..figure_sheet import to_bytes
 
     with style.context():
         figure = _draw(name)

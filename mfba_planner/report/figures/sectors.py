@@ -14,15 +14,15 @@ from mfba_planner.perception.sensory_vector import sense_circles, sensory_vector
 
 from .. import legend, style
 from ..draw_scene import Z_TRACK, line
-from ..figure_canvas import EDGE, Sheet
-from .sketch import EXAMPLE, HERE, SENSOR, bare, draw_obstacle, draw_ring, example_vs, write
+from ..figure_sheet import EDGE, Sheet
+from .sketch import EXAMPLE, ORIGIN, SENSOR, draw_obstacle, draw_ring, example_vs, hide_axes, write
 
 _SIDE, _PANEL = 5.8, 2.7  # inches
 _REACH, _SPOKE, _BITS = 2.4, 2.05, 2.25  # metres
 
 
 def draw() -> Figure:
-    """Draw the ring among the example's obstacles."""
+    """Draw the ring of sectors and the example's obstacles."""
     sheet = Sheet(EDGE + _SIDE + _PANEL + EDGE, _SIDE + 1.0)
     bits = example_vs()
     sheet.head(
@@ -30,10 +30,10 @@ def draw() -> Figure:
         f"Vs = {{{' '.join(map(str, bits))}}}, computed from the obstacles drawn here",
     )
     ax = sheet.axes(EDGE, EDGE / 2, _SIDE, _SIDE)
-    bare(ax, _REACH)
+    hide_axes(ax, _REACH)
     draw_ring(ax, bits, _SPOKE, _BITS)
     for number, (center, radius) in enumerate(EXAMPLE.enlarged(0.0), start=1):
-        sensed = distance(HERE, center) - radius <= SENSOR.sensing_range_m
+        sensed = distance(ORIGIN, center) - radius <= SENSOR.sensing_range_m
         body = EXAMPLE.obstacles[number - 1].radius_m
         draw_obstacle(ax, center, body, radius, sensed)
         write(ax, center, f"Obs{number}")
@@ -51,18 +51,18 @@ def draw() -> Figure:
 
 def _set_by(number: int) -> str:
     """The sectors that one obstacle of the example sets."""
-    alone = sense_circles(HERE, [EXAMPLE.enlarged(0.0)[number - 1]], SENSOR)
-    names = [f"S{i}" for i, bit in enumerate(sensory_vector(alone), start=1) if bit]
+    detections = sense_circles(ORIGIN, [EXAMPLE.enlarged(0.0)[number - 1]], SENSOR)
+    names = [f"S{i}" for i, bit in enumerate(sensory_vector(detections), start=1) if bit]
     return ", ".join(names) or "none: out of range"
 
 
 def _tangents(ax: Axes, center: Point, radius: float) -> None:
     """Both tangents from the robot, out to where they touch the enlarged circle."""
-    d, heading = distance(HERE, center), bearing(HERE, center)
+    d, heading = distance(ORIGIN, center), bearing(ORIGIN, center)
     half = tangent_half_angle(d, radius)
     reach = math.sqrt(d * d - radius * radius)
     for side in (-half, half):
-        ends = [HERE, towards(HERE, heading + side, reach)]
+        ends = [ORIGIN, towards(ORIGIN, heading + side, reach)]
         line(ax, ends, "tangent", zorder=Z_TRACK, **style.TANGENT)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sensitivity study as a heat-map: our lengths minus the printed ones, reading by reading."""
+"""The sensitivity study as a heat-map: our lengths minus the printed ones, for each reading."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from matplotlib.patches import Patch, Rectangle
 from mfba_planner.paper.sensitivity import CASES, LAWS, STATISTICS, Row
 
 from .. import style
-from ..figure_canvas import EDGE, Sheet
+from ..figure_sheet import EDGE, Sheet
 from ..sensitivity_table import pairs
 
 # inches
 _WIDE, _TALL, _GAP, _LABELS, _HEAD, _FOOT = 0.45, 0.24, 0.18, 3.35, 1.5, 0.75
-_FULL_CM = 60.0  # deviation of the deepest colour
+_FULL_CM = 60.0  # deviation with the darkest colour
 _OFF = LinearSegmentedColormap.from_list("off", [style.BLUE, style.PAPER, style.VERMILLION])
-_TOLD = LinearSegmentedColormap.from_list("told", [style.PAPER, style.GREEN])
+_ENCOUNTERS = LinearSegmentedColormap.from_list("encounters", [style.PAPER, style.GREEN])
 _CONTACTS = LinearSegmentedColormap.from_list("contacts", [style.PAPER, style.PURPLE])
 
 
@@ -41,14 +41,14 @@ class _Block:
 
 
 def draw(rows: Sequence[Row]) -> Figure:
-    """Draw a line per reading: deviations in cm, encounters and contacts in per cent."""
+    """Draw one line per reading: deviations (cm), encounters and contacts (per cent)."""
     lines = list(pairs(rows))
     blocks = _blocks(lines)
     width = sum(_WIDE * len(block.columns) + _GAP for block in blocks)
     top = _FOOT + len(lines) * _TALL
     sheet = Sheet(EDGE + _LABELS + width + EDGE - _GAP, top + _HEAD)
     sheet.head(
-        "What the paper does not say",
+        "What the paper does not state",
         "median of ten runs minus printed length, in cm; each line differs from the first in "
         "what it names",
     )
@@ -87,12 +87,12 @@ def _blocks(lines: Sequence[tuple[Row, ...]]) -> list[_Block]:
                 )
             )
     names = tuple(f"case {case[-1]}" for case in CASES)
-    told = np.array([[row.told for row in group] for group in lines])
+    as_figure = np.array([[row.as_figure for row in group] for group in lines])
     contacts = np.array([[row.contacts for row in group] for group in lines])
-    as_told = np.array([[row.as_told for row in group] for group in lines])
+    mostly_as_figure = np.array([[row.mostly_as_figure for row in group] for group in lines])
     for title, share, framed, colours in (
-        ("meets as told\n(%)", told, as_told, _TOLD),
-        ("in contact\n(%)", contacts, np.zeros_like(as_told), _CONTACTS),
+        ("meets as in\nFig. 7, 8 (%)", as_figure, mostly_as_figure, _ENCOUNTERS),
+        ("in contact\n(%)", contacts, np.zeros_like(mostly_as_figure), _CONTACTS),
     ):
         found.append(
             _Block(
@@ -117,7 +117,7 @@ def _cells(ax: Axes, block: _Block, breaks: Sequence[int]) -> None:
             shade = block.colours(float(block.shades[i, j]))
             ax.add_patch(Rectangle((j, i), 1, 1, facecolor=shade, **_CELL))
             text = f"{block.values[i, j]:+.0f}" if block.signed else f"{block.values[i, j]:.0f}"
-            # of colours as deep as these only white can be read
+            # white on dark colours
             ink = style.PAPER if sum(shade[:3]) < 1.35 else style.INK
             ax.text(j + 0.5, i + 0.53, "0" if text in ("+0", "-0") else text, color=ink, **_NUMBER)
     for i, j in zip(*np.nonzero(block.framed)):
@@ -137,21 +137,21 @@ _LAW_COLOURS = dict(zip(LAWS, (style.BLUE, style.VERMILLION)))
 
 
 def _breaks(lines: Sequence[tuple[Row, ...]]) -> list[int]:
-    """Where another group begins."""
+    """Lines at which another group starts."""
     groups = [group[0].reading.group for group in lines]
     return [i for i in range(1, len(groups)) if groups[i] != groups[i - 1]]
 
 
 def _labels(sheet: Sheet, lines: Sequence[tuple[Row, ...]], top: float) -> None:
-    """Group, reading, and a mark for each printed row that it gives in both cases."""
+    """Group, reading, and a mark for each printed row that it reproduces in both cases."""
     ax = sheet.axes(EDGE, _FOOT, _LABELS - 0.1, top - _FOOT)
     ax.set_xlim(0, _LABELS - 0.1)
     ax.set_ylim(len(lines), 0)
     ax.set_axis_off()
-    begins = [0, *_breaks(lines)]
+    starts = [0, *_breaks(lines)]
     for i, group in enumerate(lines):
         reading = group[0].reading
-        if i in begins:
+        if i in starts:
             ax.text(0, i + 0.53, reading.group, va="center", fontsize=style.SMALL,
                     fontweight="bold")  # fmt: skip
         ax.text(0.95, i + 0.53, reading.label, va="center", fontsize=style.SMALL)
@@ -159,7 +159,7 @@ def _labels(sheet: Sheet, lines: Sequence[tuple[Row, ...]], top: float) -> None:
             if all(law in row.reproduces for row in group):
                 looks = {**_ROW_MARK, "color": _LAW_COLOURS[law]}
                 ax.plot([_LABELS - 0.2 - 0.14 * k], [i + 0.5], **looks)
-    for i in begins[1:]:
+    for i in starts[1:]:
         ax.plot([0, _LABELS - 0.1], [i, i], **_BREAK)
 
 
@@ -173,6 +173,6 @@ def _entries() -> list[tuple[Line2D | Patch, str]]:
     ]
     frame = Patch(facecolor="none", edgecolor=style.INK, linewidth=1.3)
     return [
-        (frame, "printed value within our 95 % of ten runs; told by most runs"),
+        (frame, "printed value within our 95 % of ten runs; most runs meet as in Fig. 7, 8"),
         *marks,
     ]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fig. 7 and 8: a run at its moments - free, obstacles sensed, back to normal, at the goal."""
+"""Fig. 7 and 8: snapshots of a run - free, obstacles sensed, path generation again, goal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mfba_planner.simulation.episode import Episode
 
 from .. import format_values, legend, style
 from ..draw_tick import draw_snapshot
-from ..figure_canvas import EDGE, Sheet
+from ..figure_sheet import EDGE, Sheet
 from ..run_events import closest_passes
 from ..view_bounds import View, choose_view
 
@@ -29,19 +29,19 @@ _ROW = _TITLE + _SIDE + 0.55
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
-    """A tick of a run (from 0) and what happens there."""
+class Snapshot:
+    """A tick of a run (index from 0) and its caption."""
 
     index: int
     caption: str
 
 
-def scenes(episode: Episode) -> list[Scene]:
-    """The paper's moments of a run.
+def snapshots(episode: Episode) -> list[Snapshot]:
+    """The snapshots that the paper shows of a run.
 
-    Free; whenever more obstacles than before in the same stretch of avoidance come within SR;
-    the first tick of path generation after the first avoidance; the last tick. Raises
-    InputError for a run that avoids nothing.
+    A tick before the first avoidance; each tick of the first avoidance with more obstacles within
+    SR than before; the first tick of path generation after it; the last tick. Raises InputError
+    for a run without obstacle avoidance.
     """
     modes = [tick.mode for tick in episode.ticks]
     if Mode.OBSTACLE_AVOIDANCE not in modes:
@@ -50,17 +50,17 @@ def scenes(episode: Episode) -> list[Scene]:
         )
     first = modes.index(Mode.OBSTACLE_AVOIDANCE)
     length = sum(1 for _ in takewhile(lambda m: m is Mode.OBSTACLE_AVOIDANCE, modes[first:]))
-    found = [Scene(first // 2, "nothing within SR")]
+    found = [Snapshot(first // 2, "nothing within SR")]
     most = 0
     for index in range(first, first + length):
         near = within_range(episode, episode.ticks[index])
         if len(near) > most:
             most = len(near)
-            found.append(Scene(index, f"{_obstacles(near)} within SR"))
+            found.append(Snapshot(index, f"{_obstacles(near)} within SR"))
     after = first + length
     if after < len(modes) - 1:
-        found.append(Scene(after, "back to path generation"))
-    return [*found, Scene(len(modes) - 1, format_values.outcome(evaluate(episode)))]
+        found.append(Snapshot(after, "back to path generation"))
+    return [*found, Snapshot(len(modes) - 1, format_values.outcome(evaluate(episode)))]
 
 
 def _obstacles(numbers: Sequence[int]) -> str:
@@ -69,10 +69,10 @@ def _obstacles(numbers: Sequence[int]) -> str:
 
 
 def draw(episode: Episode, title: str, note: str = "") -> Figure:
-    """Draw the moments side by side, legend and result in the last place."""
-    moments = scenes(episode)
-    columns = 2 if len(moments) < 5 else 3
-    rows = -(-len(moments) // columns)
+    """Draw the snapshots side by side, then legend and result."""
+    shown = snapshots(episode)
+    columns = 2 if len(shown) < 5 else 3
+    rows = -(-len(shown) // columns)
     height = _HEAD + rows * _ROW + EDGE / 2
     corners = [
         (EDGE + _AXIS + column * (_SIDE + _GAP), height - _HEAD - _TITLE - row * _ROW)
@@ -80,20 +80,20 @@ def draw(episode: Episode, title: str, note: str = "") -> Figure:
         for column in range(columns)
     ]
     width = corners[-1][0] + _SIDE + EDGE
-    if len(moments) == len(corners):  # the legend needs a column of its own
+    if len(shown) == len(corners):  # the legend needs a column of its own
         corners.append((width, corners[0][1]))
         width += _LEGEND + EDGE
     sheet = Sheet(width, height)
     sheet.head(title, "; ".join(filter(None, [_subtitle(episode), note])))
     view = _view(episode)
     axes = []
-    for letter, moment, (left, top) in zip("abcdefgh", moments, corners):
+    for label, snapshot, (left, top) in zip("abcdefgh", shown, corners):
         ax = sheet.axes(left, top - _SIDE, _SIDE, _SIDE)
         axes.append(ax)
-        draw_snapshot(ax, episode, moment.index)
-        _rule(ax, view, first=left == corners[0][0])
-        _caption(sheet, left, top + 0.12, letter, moment, episode)
-    left, top = corners[len(moments)]
+        draw_snapshot(ax, episode, snapshot.index)
+        _set_limits(ax, view, first=left == corners[0][0])
+        _caption(sheet, left, top + 0.12, label, snapshot, episode)
+    left, top = corners[len(shown)]
     below = sheet.legend(legend.entries(*axes), left, top, labelspacing=0.9)
     _facts(sheet, left, below, evaluate(episode))
     return sheet.figure
@@ -105,14 +105,14 @@ def _subtitle(episode: Episode) -> str:
 
 
 def _view(episode: Episode) -> View:
-    """A square that holds the run, and the sensing range at its end."""
+    """A square that holds the run, and the sensing range at the last tick."""
     view, _ = choose_view(episode, closest_passes(episode))
     view = view.around(episode.ticks[-1].pose.position, 1.1 * episode.sensor.sensing_range_m)
     side = max(view.width, view.height)
     return view.grown((side - view.width) / 2.0, (side - view.height) / 2.0)
 
 
-def _rule(ax: Axes, view: View, first: bool) -> None:
+def _set_limits(ax: Axes, view: View, first: bool) -> None:
     ax.set_xlim(view.left, view.right)
     ax.set_ylim(view.bottom, view.top)
     for axis in (ax.xaxis, ax.yaxis):
@@ -124,11 +124,11 @@ def _rule(ax: Axes, view: View, first: bool) -> None:
 
 
 def _caption(
-    sheet: Sheet, left: float, y: float, letter: str, moment: Scene, episode: Episode
+    sheet: Sheet, left: float, y: float, label: str, snapshot: Snapshot, episode: Episode
 ) -> None:
-    time_s = episode.time_s(episode.ticks[moment.index].stamp_ns)
-    sheet.text(left, y, f"({letter})", fontweight="bold")
-    sheet.text(left + 0.3, y, moment.caption)
+    time_s = episode.time_s(episode.ticks[snapshot.index].stamp_ns)
+    sheet.text(left, y, f"({label})", fontweight="bold")
+    sheet.text(left + 0.3, y, snapshot.caption)
     right = left + _SIDE
     sheet.text(right, y, format_values.number(time_s, 1, "s"), ha="right", color=style.QUIET)
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clearance and speed over time: drawn by matplotlib for several widths; here the one that fits is
-// shown, with a cursor where the clock stands. Press or drag on it to move the clock.
+// Charts of clearance and speed over time. matplotlib drew them for several widths; this shows the
+// one that fits, with a cursor at the clock's time. Press or drag on it to move the clock.
 
 class Charts {
   constructor(sheets, clock) {
@@ -9,7 +9,7 @@ class Charts {
     this.element = html("div", {
       id: "charts",
       role: "img",
-      "aria-label": "Clearance and speed over time; the figures of a tick stand beside its world",
+      "aria-label": "Clearance and speed over time; the values of a tick are beside its world",
     });
     this.cursor = svg("path", { class: "cursor" });
     for (const type of ["pointerdown", "pointermove"]) {
@@ -36,7 +36,7 @@ class Charts {
     this.show();
   }
 
-  /** Let the line of one run stand out. */
+  /** Highlight the line of one run. */
   choose(number) {
     this.chosen = number;
     this.highlight();
@@ -51,17 +51,17 @@ class Charts {
 
   show() {
     if (!this.sheet) return;
-    const { begin, end, left, right } = this.sheet;
+    const { start, end, left, right } = this.sheet;
     const time = this.clock.instants[this.clock.index];
-    const x = this.size.w * (left + ((time - begin) / (end - begin)) * (right - left));
+    const x = this.size.w * (left + ((time - start) / (end - start)) * (right - left));
     set(this.cursor, { d: `M${x.toFixed(2)} 16V${this.size.h - 22}` });
   }
 
   onPointer(event) {
     if (!this.sheet || !(event.buttons & 1)) return;
-    const { begin, end, left, right } = this.sheet;
+    const { start, end, left, right } = this.sheet;
     const box = this.element.getBoundingClientRect();
-    const part = ((event.clientX - box.left) / box.width - left) / (right - left);
-    this.clock.restAt(begin + part * (end - begin));
+    const fraction = ((event.clientX - box.left) / box.width - left) / (right - left);
+    this.clock.seekTime(start + fraction * (end - start));
   }
 }

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run as plain JSON values, column by column: all that the page knows of it.
+"""The data of an HTML page: runs as plain JSON values, one list per column of the ticks.
 
-Lengths in metres, times in seconds; null stands for a number that is not finite. What a reader
-is shown as a figure keeps every bit; what is only drawn is rounded to a tenth of a millimetre.
+Lengths in metres, times in seconds; null stands for a number that is not finite. Values shown as
+text are exact; values that are only drawn are rounded to 0.1 mm.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.obstacle_motion import velocity_at
 
 MOST_RUNS = 6  # side by side
-MOST_ROBOTS = 36  # of a fleet in one scene: as many lines can be told apart
-MOST_TICKS = 20_000  # in all: beyond that a browser takes long to open the page
+MOST_ROBOTS = 36  # of a fleet in one scene: colours and dashes distinguish 36 lines
+MOST_TICKS = 20_000  # of all runs: with more a browser opens the page slowly
 
 Plain = dict[str, Any]
 _MODES = list(Mode)
 
 
-def pages_data(
+def page_data(
     runs: Sequence[tuple[str, Episode]], version: str, roster: Sequence[str] = ()
 ) -> Plain:
-    """What the page of these named runs holds; runs in equal worlds share one view.
+    """The data of the page of some named runs; runs in equal worlds share one view.
 
-    roster names the fleet that the runs are of: all of them are one scene.
+    roster: the names of all robots of the fleet, if the runs are of one; they share a scene.
     """
     is_fleet = in_one_scene(runs, roster)
     views = [choose_view(episode, closest_passes(episode))[0] for _, episode in runs]
@@ -54,7 +54,7 @@ def pages_data(
         )
         for _, episode in runs
     ]
-    # In a fleet's scene the others go on when one has arrived.
+    # In a fleet's scene the other robots continue after one has arrived.
     longest = max((episode for _, episode in runs), key=lambda episode: len(episode.ticks))
     times_s = [longest.time_s(tick.stamp_ns) for tick in longest.ticks] if is_fleet else None
     return {
@@ -69,18 +69,18 @@ def pages_data(
 
 
 def in_one_scene(runs: Sequence[tuple[str, Episode]], roster: Sequence[str]) -> bool:
-    """Whether the runs are all robots of a fleet, which shared a world."""
+    """Whether the runs are those of all robots of a fleet, which share a world."""
     return len(runs) == len(roster) > 1
 
 
 def world_name(name: str, episode: Episode, roster: Sequence[str]) -> str:
-    """The world's name; of a fleet it is that of all, without the robot's."""
+    """The world's name; of a fleet the common name, without the robot's."""
     scenario = episode.scenario.name
     return scenario.removesuffix(f".{name}") if roster else scenario
 
 
 def obstacle_names(name: str, episode: Episode, roster: Sequence[str]) -> list[str]:
-    """What a run's obstacles are called: by number, and other robots of its fleet by name."""
+    """Names of a run's obstacles: numbers, then the names of the other robots of its fleet."""
     others = [other for other in roster if other != name]
     own = len(episode.scenario.obstacles) - len(others)
     return [*(str(number) for number in range(1, own + 1)), *others]
@@ -93,9 +93,9 @@ def run_data(
     names: Sequence[str],
     times_s: Sequence[float] | None = None,
 ) -> Plain:
-    """One run, drawn within a view of its world, with its obstacles' names.
+    """The data of one run in a view of its world; names: those of the obstacles.
 
-    times_s are those at which obstacles are shown, if not those of the run's ticks.
+    times_s: the times at which obstacles are shown, if not those of the run's ticks.
     """
     result = evaluate(episode)
     reasons = list(dict.fromkeys(tick.reason for tick in episode.ticks))
@@ -184,7 +184,7 @@ def _obstacles(
 
 
 def clearances(episode: Episode) -> list[float]:
-    """The smallest gap (m) from each tick to the next, over which Result takes its least.
+    """The smallest clearance (m) from each tick to the next; their minimum is that of Result.
 
     inf after the last tick, and while the robot is carried off.
     """
@@ -195,12 +195,12 @@ def clearances(episode: Episode) -> list[float]:
 
 
 def speeds(episode: Episode) -> list[float]:
-    """The speed (m/s) that was decided at each tick."""
+    """The speed (m/s) decided at each tick."""
     return [math.hypot(*tick.velocity) for tick in episode.ticks]
 
 
 def _configuration(episode: Episode) -> list[list[Any]]:
-    """(name, value, unit, is the default) of every option, the run's own figures first."""
+    """(name, value, unit, is the default) of every option, after seed, driver and tick."""
     rows: list[list[Any]] = [
         ["seed", str(episode.seed), "", True],
         ["driver", episode.driver, "", True],

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Elements, numbers in words, and the data. Names from bags only ever become text or attributes.
+// Make elements, format numbers, read the data. Names from bags become text or attributes only.
 
 const DATA = JSON.parse(document.getElementById("data").textContent);
 const SVG = "http://www.w3.org/2000/svg";
 
-/** An HTML element; children are elements or text, attributes that are null are left out. */
+/** Make an HTML element; children: elements or text; attributes that are null are left out. */
 function html(tag, attributes = {}, ...children) {
   return filled(document.createElement(tag), attributes, children);
 }
@@ -27,12 +27,12 @@ function set(element, attributes) {
   }
 }
 
-/** Change a text only where it differs: readers of the screen are told of every change. */
-function say(element, text) {
+/** Set a text only if it differs: screen readers announce every change. */
+function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** A figure with its unit, or a dash for one that does not exist. */
+/** A number with its unit, or a dash for null. */
 function figure(value, digits, unit) {
   return value === null || value === undefined ? "–" : `${value.toFixed(digits)} ${unit}`;
 }
@@ -41,7 +41,7 @@ function point(x, y, digits) {
   return x === null || y === null ? "–" : `(${x.toFixed(digits)}, ${y.toFixed(digits)}) m`;
 }
 
-/** What a CSS variable stands for now. */
+/** The current value of a CSS colour variable. */
 function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Put the page together and keep everything where the clock stands.
+// Build the page, and update all of it when the clock changes.
 
 const { runs } = DATA;
 const root = document.documentElement;
 const clock = new Clock(runs);
-const calm = matchMedia("(prefers-reduced-motion: reduce)");
+const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
 const views = runs.map((run) => ({ run, scene: new Scene(run), readout: new Readout(run) }));
 const charts = new Charts(DATA.charts, clock);
 const transport = new Transport(runs, clock, () =>
-  inSight().map(({ run, readout }) => readout.sentence(tickOf(run))).join("; "),
+  visibleViews().map(({ run, readout }) => readout.sentence(tickOf(run))).join("; "),
 );
-let chosen = 0; // of a fleet, the robot that is looked at
+let chosen = 0; // in a fleet: number of the robot that is shown
 
-/** A fleet is one scene, seen with one robot's eyes; other runs stand side by side. */
-function inSight() {
+/** Of a fleet the scene of the chosen robot; otherwise all runs, side by side. */
+function visibleViews() {
   return DATA.fleet ? [views[chosen]] : views;
 }
 
@@ -22,13 +22,13 @@ function tickOf(run) {
 }
 
 function show() {
-  for (const { run, scene, readout } of inSight()) {
+  for (const { run, scene, readout } of visibleViews()) {
     const { times } = scene;
     const k = tickOf(run);
     const now = indexAt(times, clock.time);
     const span = now + 1 < times.length ? times[now + 1] - times[now] : 0;
-    const part = span > 0 && !calm.matches ? (clock.time - times[now]) / span : 0;
-    scene.show(k, now, Math.max(0, Math.min(1, part)));
+    const fraction = span > 0 && !reducedMotion.matches ? (clock.time - times[now]) / span : 0;
+    scene.show(k, now, Math.max(0, Math.min(1, fraction)));
     readout.show(k);
   }
   transport.show();
@@ -46,7 +46,7 @@ function card({ run, scene, readout }, number) {
   );
 }
 
-/** Who of a fleet is looked at: by this list, or by pressing another robot in the scene. */
+/** Choose the robot of a fleet: from this list, or by pressing another robot in the scene. */
 function robotChoice() {
   const select = html(
     "select",
@@ -78,22 +78,22 @@ function legend() {
     entry("obstacle, and its edge enlarged by the robot",
       svg("circle", { cx: 11, cy: 8, r: 7, class: "enlarged" }),
       svg("circle", { cx: 11, cy: 8, r: 4, class: "body" })),
-    entry(`how far it goes in ${AHEAD} s`, svg("path", { d: "M1 8H20M14 4L20 8L14 12", class: "motion" })),
+    entry(`its motion in ${AHEAD} s`, svg("path", { d: "M1 8H20M14 4L20 8L14 12", class: "motion" })),
     entry("sensing range, sector or heading that is set",
-      svg("path", { d: "M2 14A18 18 0 0 1 20 14L11 2Z", class: "sector lit" }),
+      svg("path", { d: "M2 14A18 18 0 0 1 20 14L11 2Z", class: "sector set" }),
       svg("path", { d: "M1 14A18 18 0 0 1 21 14", class: "ring" })),
-    entry("gap: open, closed, taken",
+    entry("gap: open, closed, chosen",
       svg("path", { d: "M3 3V13", class: "gap open" }),
       svg("path", { d: "M11 3V13", class: "gap closed" }),
-      svg("path", { d: "M19 1V15", class: "taken" })),
-    entry("bats, and the waypoint chosen",
+      svg("path", { d: "M19 1V15", class: "chosen-gap" })),
+    entry("bats, and the chosen waypoint",
       svg("g", { class: "bats" }, svg("circle", { cx: 4, cy: 5, r: 2 }), svg("circle", { cx: 7, cy: 12, r: 2 })),
       svg("path", { d: "M16 3L21 8L16 13L11 8Z", class: "waypoint" })),
   );
   return html("ul", { class: "legend", "aria-label": "Legend" }, ...items);
 }
 
-/** Whose line is whose, where there are several. */
+/** The legend of the charts, if there are several runs. */
 function chartKey() {
   if (runs.length === 1) return [];
   const entries = runs.map((run, number) => {
@@ -140,14 +140,14 @@ document.getElementById("app").append(
   ),
   transport.element,
   html("footer", {},
-    html("p", { class: "keys" }, "Keys: space plays and pauses; ← → step, with shift by ten; Home and End; + and − change the speed."),
+    html("p", { class: "keys" }, "Keys: space plays and pauses; ← → move by one tick, with shift by ten; Home and End; + and − change the speed."),
     html("p", {}, `mfba_planner ${DATA.version}`)),
 );
 root.dataset.runs = runs.length;
-root.dataset.count = inSight().length;
+root.dataset.count = visibleViews().length;
 root.style.setProperty("--rows", Math.min(runs.length, 6));
 if (runs.length === 1) views[0].readout.element.append(legend());
-clock.listeners.push(show);
+clock.callbacks.push(show);
 if (choice) choice.choose(0);
 show();
 charts.fit();

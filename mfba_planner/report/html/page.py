@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page: one HTML file with style, script, data and charts inside; it asks for nothing else."""
+"""Write runs as one HTML page with style, script, data and charts inside; it loads nothing."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from mfba_planner.report import format_values
 from mfba_planner.simulation.episode import Episode
 
 from .charts import charts, look
-from .data import MOST_ROBOTS, MOST_RUNS, MOST_TICKS, in_one_scene, pages_data, world_name
+from .data import MOST_ROBOTS, MOST_RUNS, MOST_TICKS, in_one_scene, page_data, world_name
 
-# One script in the page; each file uses only what stands before it.
+# Joined to one script in this sequence; each file uses only what the files before it define.
 _SCRIPTS = ("dom", "clock", "scene", "readout", "charts", "tables", "transport", "main")
 
 
@@ -30,7 +30,7 @@ def write_page(
 ) -> None:
     """Write the page of some named runs; the same runs give the same bytes.
 
-    roster names the robots of the fleet that the runs are of, if they are: all are one scene.
+    roster: the names of all robots of the fleet, if the runs are of one; they share a scene.
     Raises InputError for too many runs or ticks, OutputError when path exists already or cannot
     be written.
     """
@@ -51,7 +51,7 @@ def page(runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = ()) -> str
         style=_own("page.css"),
         data=as_json(
             {
-                **pages_data(runs, __version__, roster),
+                **page_data(runs, __version__, roster),
                 "worlds": names,
                 "charts": charts(episodes),
                 "looks": [look(number) for number in range(len(runs))],
@@ -65,11 +65,11 @@ def check_size(runs: int, ticks: int = 0, *, is_fleet: bool = False) -> None:
     """Raise InputError for more than a page can show."""
     if is_fleet and runs > MOST_ROBOTS:
         raise InputError(
-            f"{runs} robots: too many for one scene, where {MOST_ROBOTS} fit; name up to "
+            f"{runs} robots: too many for one scene ({MOST_ROBOTS} at most); name up to "
             f"{MOST_RUNS} with --robot"
         )
     if runs > MOST_RUNS and not is_fleet:
-        raise InputError(f"{runs} runs: too many to stand side by side; give {MOST_RUNS} at most")
+        raise InputError(f"{runs} runs: too many to show side by side; give {MOST_RUNS} at most")
     if ticks > MOST_TICKS:
         raise InputError(
             f"{ticks} ticks: too many for a page; give {MOST_TICKS} at most, or see `mfba export`"
@@ -77,15 +77,15 @@ def check_size(runs: int, ticks: int = 0, *, is_fleet: bool = False) -> None:
 
 
 def as_json(data: object) -> str:
-    """JSON that may stand inside a script element: nothing in it ends that, or opens another."""
+    """JSON for the inside of a script element: <, > and & are escaped, so it cannot end it."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
-    for sign in "<>&":
-        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    for character in "<>&":
+        text = text.replace(character, f"\\u{ord(character):04x}")
     return text
 
 
 def _policy(script: str) -> str:
-    """A content security policy: this script and no other, and not a single request."""
+    """A content security policy that allows this script only, and no request."""
     allowed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return (
         f"default-src 'none'; script-src 'sha256-{allowed}'; style-src 'unsafe-inline'; "

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one run knew and decided at a tick, in words and figures.
+// The decision of one run at a tick, as text: mode, reason, Vs, Vg and values.
 
 const MOST_CELLS = 36; // more bits than this are shown as digits only
 
@@ -42,11 +42,11 @@ class Readout {
     const { ticks, reasons } = this.run;
     const mode = DATA.modes[ticks.mode[k]];
     set(this.element, { "data-mode": mode.key });
-    say(this.mode, mode.label);
-    say(this.reason, reasons[ticks.reason[k]]);
+    setText(this.mode, mode.label);
+    setText(this.reason, reasons[ticks.reason[k]]);
     this.vs.show(ticks.vs[k], 0);
     this.vg.show(ticks.vg[k], ticks.gap[k]);
-    const told = {
+    const texts = {
       tick: `${k} of ${ticks.time.length - 1}`,
       time: figure(ticks.time[k], 3, "s"),
       position: point(ticks.x[k], ticks.y[k], 3),
@@ -55,10 +55,10 @@ class Readout {
       clearance: figure(ticks.clearance[k], 3, "m"),
       near: this.named(ticks.near[k]),
     };
-    for (const [key, text] of Object.entries(told)) say(this.fields[key], text);
+    for (const [key, text] of Object.entries(texts)) setText(this.fields[key], text);
   }
 
-  /** Who is near, obstacles by number and robots by name. */
+  /** What is within sensing range: obstacles by number, robots by name. */
   named(numbers) {
     const names = numbers.map((number) => this.run.world.obstacles[number - 1].name);
     const isNumber = (name) => /^\d+$/.test(name);
@@ -67,7 +67,7 @@ class Readout {
     return [...(obstacles ? [`obstacle ${obstacles}`] : []), ...robots].join(", ") || "nothing";
   }
 
-  /** The same in one sentence, for those who hear the page. */
+  /** The same in one sentence, for screen readers. */
   sentence(k) {
     const { ticks, reasons } = this.run;
     const mode = DATA.modes[ticks.mode[k]].label;
@@ -102,6 +102,6 @@ class Bits {
       cell.classList.toggle("set", bits[i] === "1");
       cell.classList.toggle("chosen", i + 1 === chosen);
     });
-    if (!this.cells.length) say(this.row, (bits.match(/.{1,12}/g) || []).join(" "));
+    if (!this.cells.length) setText(this.row, (bits.match(/.{1,12}/g) || []).join(" "));
   }
 }

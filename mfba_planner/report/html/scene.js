@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The world of one run, drawn to scale as SVG: metres are its units, y points up by its sign.
+// The world of one run, drawn to scale as SVG in metres. SVG's y points down, so y changes its sign.
 
-const AHEAD = 2; // s: how far an arrow shows where something would go
-const BEHIND = 4; // s: how long an obstacle's wake lasts
+const AHEAD = 2; // s: an arrow shows the motion over this time
+const BEHIND = 4; // s: an obstacle's trail shows its motion over this time
 const STAR = starPoints(9, 3.8);
 
 class Scene {
   constructor(run) {
     this.run = run;
     const { world } = run;
-    this.times = world.times ?? run.ticks.time; // of what is around
+    this.times = world.times ?? run.ticks.time; // of the obstacles
     const [left, bottom, right, top] = world.view;
     this.width = right - left;
     this.element = svg("svg", {
@@ -18,10 +18,10 @@ class Scene {
       role: "img",
       "aria-label": `${run.title}: the world to scale`,
     });
-    const grain = this.width / 1500; // m: what is nearer than this is one point of a line
+    const grain = this.width / 1500; // m: smallest distance of two points of a line
     this.kept = thinned(run.ticks.x, run.ticks.y, grain);
     this.keptOf = world.obstacles.map(({ x, y }) => thinned(x, y, grain));
-    this.fixed = []; // [element, x, y]: what keeps its size on the screen
+    this.fixed = []; // [element, x, y]: elements with a constant size in pixels
     this.drawGround(world);
     this.drawObstacles(world);
     this.drawSensors();
@@ -38,7 +38,7 @@ class Scene {
     return element;
   }
 
-  /** A grid of round steps, its numbers, and the walls. */
+  /** The grid with a round spacing, its numbers, and the walls. */
   drawGround(world) {
     const [left, bottom, right, top] = world.view;
     const step = roundStep(Math.max(right - left, top - bottom) / 8);
@@ -52,7 +52,7 @@ class Scene {
     for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
       lines.push(`M${left} ${-y}H${right}`);
       const unit = y + step > top ? " m" : "";
-      const dy = y + 0.03 * this.width < top ? -4 : 13; // below its line where it would be cut
+      const dy = y + 0.03 * this.width < top ? -4 : 13; // below its line if it would be cut off above
       this.label(`${round(y)}${unit}`, left, y, { class: "axis", dx: 3, dy });
     }
     this.element.prepend(svg("path", { class: "grid", d: lines.join("") }));
@@ -67,7 +67,7 @@ class Scene {
     return element;
   }
 
-  /** Place an element that is drawn in pixels around the origin; measure() scales it. */
+  /** Put an element drawn in pixels around the origin at (x, y); measure() scales it. */
   keepSize(x, y, element) {
     const group = this.add("g", {}, element);
     this.fixed.push([group, x, y]);
@@ -75,7 +75,7 @@ class Scene {
   }
 
   drawObstacles(world) {
-    this.wakes = world.obstacles.map(() => this.add("path", { class: "wake" }));
+    this.trails = world.obstacles.map(() => this.add("path", { class: "trail" }));
     const robots = new Set(DATA.runs.map(({ name }) => name));
     this.obstacles = world.obstacles.map((obstacle) => {
       const { name } = obstacle;
@@ -95,7 +95,7 @@ class Scene {
     });
   }
 
-  /** Call back with the name of another robot of the fleet when it is pressed. */
+  /** Call act with the name of another robot of the fleet when that is pressed. */
   onPress(act) {
     this.element.addEventListener("click", ({ target }) => {
       const other = target.closest(".other");
@@ -103,11 +103,11 @@ class Scene {
     });
   }
 
-  /** The ring of sensors around the robot: sectors (or headings) and gaps. */
+  /** The ring around the robot: sectors (or headings) and gaps. */
   drawSensors() {
     const { wedges, reach, gap_headings: headings } = this.run;
     this.sensors = this.add("g", { class: "sensors" });
-    this.lights = wedges.map(([from, to]) => {
+    this.sectors = wedges.map(([from, to]) => {
       const [[x0, y0], [x1, y1]] = [polar(reach, from), polar(reach, to)];
       const wedge = `M0 0L${x0} ${y0}A${reach} ${reach} 0 0 0 ${x1} ${y1}Z`;
       return svg("path", { class: "sector", d: wedge });
@@ -116,15 +116,15 @@ class Scene {
       const [x, y] = polar(reach, heading);
       return svg("path", { class: "gap", d: `M${0.86 * x} ${0.86 * y}L${x} ${y}` });
     });
-    this.taken = svg("path", { class: "taken" });
+    this.chosenGap = svg("path", { class: "chosen-gap" });
     const ring = svg("circle", { class: "ring", r: reach });
-    this.sensors.append(...this.lights, ring, ...this.gaps, this.taken);
+    this.sensors.append(...this.sectors, ring, ...this.gaps, this.chosenGap);
   }
 
-  /** The whole way, faint, and on top the part that lies behind, coloured by mode. */
+  /** The whole path, faint, and on top the path so far, coloured by mode. */
   drawPath() {
     const { x, y, mode } = this.run.ticks;
-    this.whole = this.add("path", { class: "way", d: line(x, y, this.kept, 0, x.length - 1) });
+    this.add("path", { class: "whole-path", d: line(x, y, this.kept, 0, x.length - 1) });
     this.stretches = [];
     for (let first = 0, k = 1; k <= mode.length; k++) {
       if (k < mode.length && mode[k] === mode[first]) continue;
@@ -142,17 +142,17 @@ class Scene {
 
   drawRobot(world) {
     this.bats = this.add("g", { class: "bats" });
-    this.step = this.add("path", { class: "step" });
+    this.velocity = this.add("path", { class: "velocity" });
     this.robot = this.add(
       "g",
       { class: "robot" },
-      svg("circle", { class: "hull", r: world.robot_radius }),
-      svg("circle", { class: "heart", r: 0.16 * world.robot_radius }),
+      svg("circle", { class: "outline", r: world.robot_radius }),
+      svg("circle", { class: "center", r: 0.16 * world.robot_radius }),
     );
     this.waypoint = this.add("g", {}, svg("path", { class: "waypoint", d: "M0-5L5 0L0 5L-5 0Z" }));
   }
 
-  /** How large a pixel is decides the size of letters and marks. */
+  /** Measure a pixel (m) and scale texts and marks with it. */
   measure() {
     const scale = this.element.getScreenCTM();
     if (!scale || !scale.a) return;
@@ -163,20 +163,20 @@ class Scene {
     if (this.shown) this.show(...this.shown);
   }
 
-  /** Show tick k of the robot, and where things are a part (0 to 1) on from what is now. */
-  show(k, now, part) {
+  /** Show tick k, with positions interpolated by a fraction (0 to 1) from times[now] to the next. */
+  show(k, now, fraction) {
     const { ticks, world } = this.run;
     const isNew = !this.shown || this.shown[0] !== k || this.drawn !== this.pixel;
-    this.shown = [k, now, part];
+    this.shown = [k, now, fraction];
     this.drawn = this.pixel;
     const at = (values, from) =>
-      between(values[from], values[Math.min(from + 1, values.length - 1)], part);
+      between(values[from], values[Math.min(from + 1, values.length - 1)], fraction);
     const x = at(ticks.x, k);
     const y = at(ticks.y, k);
-    this.place(this.robot, x, y);
-    // What was sensed and decided belongs to the tick, not to the way to the next.
+    this.moveTo(this.robot, x, y);
+    // Sectors, gaps and waypoint are those of the tick: they are not interpolated.
     if (isNew) this.showDecision(k);
-    this.place(this.sensors, x, y);
+    this.moveTo(this.sensors, x, y);
     world.obstacles.forEach((obstacle, i) => this.showObstacle(i, obstacle, k, now, at));
     for (const { first, end, element } of this.stretches) {
       const until = Math.min(k, end);
@@ -185,7 +185,7 @@ class Scene {
     }
   }
 
-  place(element, x, y) {
+  moveTo(element, x, y) {
     const hidden = x === null || y === null;
     set(element, {
       transform: hidden ? null : `translate(${x} ${-y})`,
@@ -197,10 +197,10 @@ class Scene {
     const { group, motion } = this.obstacles[i];
     const x = at(obstacle.x, now);
     const y = at(obstacle.y, now);
-    this.place(group, x, y);
+    this.moveTo(group, x, y);
     const first = indexAt(this.times, this.times[now] - BEHIND);
-    const wake = line(obstacle.x, obstacle.y, this.keptOf[i], first, now);
-    set(this.wakes[i], { d: `${wake}L${x} ${-y}` });
+    const trail = line(obstacle.x, obstacle.y, this.keptOf[i], first, now);
+    set(this.trails[i], { d: `${trail}L${x} ${-y}` });
     const [vx, vy] = [obstacle.vx[now], obstacle.vy[now]];
     const edge = obstacle.radius / (Math.hypot(vx, vy) || 1);
     set(motion, { d: this.arrow(edge * vx, edge * vy, AHEAD * vx, AHEAD * vy) });
@@ -211,19 +211,19 @@ class Scene {
     const { ticks } = this.run;
     const mode = DATA.modes[ticks.mode[k]].key;
     set(this.element, { "data-mode": mode, "data-tick": k });
-    const isLit = ticks.vs[k].includes("1");
-    this.lights.forEach((light, i) => light.classList.toggle("lit", ticks.vs[k][i] === "1"));
+    const isAnySet = ticks.vs[k].includes("1");
+    this.sectors.forEach((sector, i) => sector.classList.toggle("set", ticks.vs[k][i] === "1"));
     this.gaps.forEach((gap, i) => {
-      gap.classList.toggle("open", isLit && ticks.vg[k][i] === "0");
-      gap.classList.toggle("closed", isLit && ticks.vg[k][i] === "1");
+      gap.classList.toggle("open", isAnySet && ticks.vg[k][i] === "0");
+      gap.classList.toggle("closed", isAnySet && ticks.vg[k][i] === "1");
     });
     const chosen = ticks.gap[k];
     const ray = chosen ? polar(this.run.reach, this.run.gap_headings[chosen - 1]) : null;
-    set(this.taken, { d: ray ? `M0 0L${ray[0]} ${ray[1]}` : "" });
+    set(this.chosenGap, { d: ray ? `M0 0L${ray[0]} ${ray[1]}` : "" });
     const [x, y] = [ticks.x[k], ticks.y[k]];
     const [wx, wy] = [ticks.waypoint_x[k], ticks.waypoint_y[k]];
     const moves = x !== null && wx !== null && (wx !== x || wy !== y);
-    set(this.step, { d: moves ? this.arrow(x, y, AHEAD * ticks.vx[k], AHEAD * ticks.vy[k]) : "" });
+    set(this.velocity, { d: moves ? this.arrow(x, y, AHEAD * ticks.vx[k], AHEAD * ticks.vy[k]) : "" });
     set(this.waypoint, {
       transform: moves ? `translate(${wx} ${-wy}) scale(${this.pixel})` : null,
       visibility: moves ? null : "hidden",
@@ -251,16 +251,16 @@ class Scene {
   }
 }
 
-function between(a, b, part) {
-  return a === null || b === null ? a : a + part * (b - a);
+function between(a, b, fraction) {
+  return a === null || b === null ? a : a + fraction * (b - a);
 }
 
-/** In the coordinates of the drawing, where y points down. */
+/** The point at radius and angle, in drawing coordinates (y points down). */
 function polar(radius, angle) {
   return [radius * Math.cos(angle), -radius * Math.sin(angle)];
 }
 
-/** Numbers of the points that a line needs: those that are known, and apart by a grain. */
+/** Indices of the points that a line needs: known ones, at least a grain (m) apart. */
 function thinned(x, y, grain) {
   const kept = [];
   let [ax, ay] = [Infinity, Infinity];
@@ -273,18 +273,18 @@ function thinned(x, y, grain) {
   return kept;
 }
 
-/** The path through points first to last, by way of those that are kept. */
+/** An SVG path from point first to point last through the kept points between. */
 function line(x, y, kept, first, last) {
-  const parts = [];
+  const commands = [];
   const add = (k) => {
-    if (x[k] !== null && y[k] !== null) parts.push(`${parts.length ? "L" : "M"}${x[k]} ${-y[k]}`);
+    if (x[k] !== null && y[k] !== null) commands.push(`${commands.length ? "L" : "M"}${x[k]} ${-y[k]}`);
   };
   add(first);
   for (let i = indexAt(kept, first); i < kept.length && kept[i] < last; i++) {
     if (kept[i] > first) add(kept[i]);
   }
   if (last > first) add(last);
-  return parts.join("");
+  return commands.join("");
 }
 
 function roundStep(rough) {

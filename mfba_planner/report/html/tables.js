@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Result, configuration and digest: a column per run.
+// The tables of result, configuration and digest, with a column per run.
 
 function resultTable(runs) {
   const rows = runs[0].result.map(([name], i) => [name, runs.map((run) => run.result[i])]);
@@ -42,12 +42,12 @@ function configurationTable(runs) {
   );
   const changed = rows.filter(({ values }) => values.some(([, , , isDefault]) => !isDefault));
   const differing = rows.filter(({ differs }) => differs).length;
-  const told = [`${changed.length} of ${rows.length} not at their default`];
-  if (runs.length > 1) told.push(`${differing} not the same in all runs`);
+  const remarks = [`${changed.length} of ${rows.length} not at their default`];
+  if (runs.length > 1) remarks.push(`${differing} not the same in all runs`);
   return html(
     "details",
     {},
-    html("summary", {}, html("h2", {}, "Configuration"), html("span", {}, told.join(", "))),
+    html("summary", {}, html("h2", {}, "Configuration"), html("span", {}, remarks.join(", "))),
     table("Configuration", runs, body),
   );
 }
@@ -67,14 +67,14 @@ function digestTable(runs) {
 function table(caption, runs, body) {
   const heads = runs.map((run, i) => html("th", { scope: "col" }, runName(run, i)));
   const head = html("thead", {}, html("tr", {}, html("td"), ...heads));
-  const parts = [html("caption", { class: "unseen" }, caption)];
-  if (runs.length > 1) parts.push(head);
-  parts.push(html("tbody", {}, ...body));
-  // Wide tables scroll by themselves; the page never does. Focus makes that work by keyboard.
+  const children = [html("caption", { class: "visually-hidden" }, caption)];
+  if (runs.length > 1) children.push(head);
+  children.push(html("tbody", {}, ...body));
+  // A wide table scrolls inside its own box; tabindex lets the keyboard scroll it.
   return html(
     "div",
     { class: "scroll", tabindex: "0", role: "region", "aria-label": caption },
-    html("table", {}, ...parts),
+    html("table", {}, ...children),
   );
 }
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Play, pause, step, speed and the time line; the same by keyboard.
+// The replay controls: play, pause, one tick, speed and the time line; also by keyboard.
 
 const KEYS = {
   " ": (clock) => (clock.playing ? clock.pause() : clock.play()),
-  ArrowLeft: (clock, far) => clock.rest(clock.index - (far ? 10 : 1)),
-  ArrowRight: (clock, far) => clock.rest(clock.index + (far ? 10 : 1)),
-  Home: (clock) => clock.rest(0),
-  End: (clock) => clock.rest(clock.last),
-  "+": (clock) => clock.faster(1),
-  "=": (clock) => clock.faster(1), // + without shift
-  "-": (clock) => clock.faster(-1),
+  ArrowLeft: (clock, far) => clock.seek(clock.index - (far ? 10 : 1)),
+  ArrowRight: (clock, far) => clock.seek(clock.index + (far ? 10 : 1)),
+  Home: (clock) => clock.seek(0),
+  End: (clock) => clock.seek(clock.last),
+  "+": (clock) => clock.changeSpeed(1),
+  "=": (clock) => clock.changeSpeed(1), // + without shift
+  "-": (clock) => clock.changeSpeed(-1),
 };
 
 class Transport {
@@ -21,7 +21,7 @@ class Transport {
       type: "range", id: "time", min: 0, max: clock.last, step: 1, value: 0,
       "aria-label": "Time", "aria-keyshortcuts": "ArrowLeft ArrowRight Home End",
     });
-    this.slider.addEventListener("input", () => clock.rest(Number(this.slider.value)));
+    this.slider.addEventListener("input", () => clock.seek(Number(this.slider.value)));
     this.play = button("play", "Play", "Space", () => KEYS[" "](clock));
     this.speed = html(
       "select",
@@ -32,7 +32,7 @@ class Transport {
       clock.speed = Number(this.speed.value);
     });
     this.now = html("output", { id: "now", for: "time" });
-    this.heard = html("p", { class: "unseen", "aria-live": "polite" });
+    this.announcement = html("p", { class: "visually-hidden", "aria-live": "polite" });
     this.element = html(
       "div",
       { class: "transport", role: "group", "aria-label": "Replay" },
@@ -40,15 +40,15 @@ class Transport {
       html(
         "div",
         { class: "buttons" },
-        button("first", "To the start", "Home", () => clock.rest(0)),
-        button("back", "One tick back", "ArrowLeft", () => clock.rest(clock.index - 1)),
+        button("first", "To the start", "Home", () => clock.seek(0)),
+        button("back", "One tick back", "ArrowLeft", () => clock.seek(clock.index - 1)),
         this.play,
-        button("next", "One tick on", "ArrowRight", () => clock.rest(clock.index + 1)),
-        button("last", "To the end", "End", () => clock.rest(clock.last)),
+        button("next", "One tick on", "ArrowRight", () => clock.seek(clock.index + 1)),
+        button("last", "To the end", "End", () => clock.seek(clock.last)),
         this.speed,
         this.now,
       ),
-      this.heard,
+      this.announcement,
     );
     document.addEventListener("keydown", (event) => this.onKey(event));
   }
@@ -58,7 +58,7 @@ class Transport {
     const { target } = event;
     if (target instanceof HTMLSelectElement) return;
     const presses = target instanceof HTMLButtonElement || target.tagName === "SUMMARY";
-    if (event.key === " " && presses) return; // the browser presses what has the focus
+    if (event.key === " " && presses) return; // the browser presses the focused control
     const scrolls = target.classList && target.classList.contains("scroll");
     if (scrolls && event.key.startsWith("Arrow")) return;
     const act = KEYS[event.key];
@@ -74,10 +74,10 @@ class Transport {
     this.slider.value = clock.index;
     this.speed.value = clock.speed;
     const time = clock.instants[clock.index];
-    say(this.now, `${time.toFixed(2)} s`);
+    setText(this.now, `${time.toFixed(2)} s`);
     const sentence = this.describe();
     set(this.slider, { "aria-valuetext": sentence });
-    if (!clock.playing) say(this.heard, sentence);
+    if (!clock.playing) setText(this.announcement, sentence);
   }
 }
 
@@ -90,7 +90,7 @@ function button(icon, text, key, act) {
   return element;
 }
 
-/** Each run's modes along the time line, one ribbon above the other. */
+/** The modes of each run along the time line, one row per run. */
 function ribbons(runs, clock) {
   const drawn = svg("svg", {
     class: "ribbons", viewBox: `0 0 ${Math.max(1, clock.last)} ${runs.length}`,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reproduced tables as data: JSON with everything, CSV with one line per number and reading."""
+"""Reproduced tables as data: JSON of everything, CSV with one line per number and reading."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CSV_HEAD = (
 
 
 def to_json(sections: Sequence[Section], origin: Origin) -> str:
-    """Everything, in plain JSON; an interval is a mapping of middle, low and high."""
+    """Everything as JSON; an interval is a mapping of middle, low and high."""
     data = {
         "schema_version": SCHEMA_VERSION,
         "origin": asdict(origin),
@@ -64,14 +64,14 @@ def _section(section: Section) -> dict[str, Any]:
 
 def _plain(value: Cell) -> Any:
     if isinstance(value, Interval):
-        return {name: _plain(part) for name, part in asdict(value).items()}
+        return {name: _plain(item) for name, item in asdict(value).items()}
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
 
 
 def to_csv(sections: Sequence[Section]) -> str:
-    """One line per printed number and reading, numbers with all their digits."""
+    """One line per printed number and reading, numbers with all digits."""
     sink = io.StringIO()
     writer = csv.writer(sink, lineterminator="\n")
     writer.writerow(CSV_HEAD)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reproduced tables as one HTML page that needs nothing else: style and figures are inside."""
+"""Reproduced tables as one HTML page with style and figures inside."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mfba_planner.report import style
 from . import markdown, text
 from .text import Origin
 
-# Colour is not all: each verdict has its sign.
+# Each verdict has a sign too, for readers who cannot tell the colours apart.
 SIGNS = {
     Verdict.REPRODUCED: ("✓", style.GREEN),
     Verdict.DIFFERS: ("≠", style.VERMILLION),
@@ -51,7 +51,7 @@ def page(sections: Sequence[Section], origin: Origin, pictures: Sequence[Picture
     links = [f'<a href="#s-{escape(s.key)}">{escape(s.title.split(".")[0])}</a>' for s in sections]
     links += ['<a href="#figures">Figures</a>'] if pictures else []
     head, rows = markdown.summary(sections)
-    parts = [
+    blocks = [
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>The paper's tables again</title><style>{_CSS}</style></head><body>",
@@ -62,21 +62,21 @@ def page(sections: Sequence[Section], origin: Origin, pictures: Sequence[Picture
         _figures(pictures),
         "</body></html>",
     ]
-    return "\n".join(part for part in parts if part) + "\n"
+    return "\n".join(block for block in blocks if block) + "\n"
 
 
 def _section(section: Section) -> str:
-    parts = [f'<h2 id="s-{escape(section.key)}">{escape(section.title)}</h2>']
+    blocks = [f'<h2 id="s-{escape(section.key)}">{escape(section.title)}</h2>']
     if section.entries:
         names = text.readings(section)
         head = ("number", "printed", *names, "verdict", "why")
-        parts.append(_table(head, (_entry(e, names, section.digits) for e in section.entries)))
-    if told := text.seeds(section):
-        parts.append(f'<p class="note">{escape(told)}</p>')
-    parts += [_grid(grid, section.digits) for grid in section.grids]
+        blocks.append(_table(head, (_entry(e, names, section.digits) for e in section.entries)))
+    if seeds := text.seeds(section):
+        blocks.append(f'<p class="note">{escape(seeds)}</p>')
+    blocks += [_grid(grid, section.digits) for grid in section.grids]
     if section.notes:
-        parts.append(f"<ul>{''.join(f'<li>{escape(note)}</li>' for note in section.notes)}</ul>")
-    return "\n".join(parts)
+        blocks.append(f"<ul>{''.join(f'<li>{escape(note)}</li>' for note in section.notes)}</ul>")
+    return "\n".join(blocks)
 
 
 def _entry(e: Entry, names: Sequence[str], digits: int) -> Iterable[str]:
@@ -105,7 +105,7 @@ def _table(head: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
 def _figures(pictures: Sequence[Picture]) -> str:
     if not pictures:
         return ""
-    # As images: the ids inside one SVG must not meet those of another.
+    # As images: ids of different SVGs must not clash.
     shown = (
         f"<figure><figcaption><h3>{escape(p.title)}</h3></figcaption><img "
         f'alt="{escape(p.title)}" src="data:image/svg+xml;base64,'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reproduced tables as Markdown, and generated blocks inside a page written by hand."""
+"""Reproduced tables as Markdown, and as generated blocks inside a hand-written page."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from .text import Origin
 
 def page(sections: Sequence[Section], origin: Origin) -> str:
     """All sections as one page."""
-    parts = ["# The paper's tables again", origin.line(), _table(*summary(sections))]
-    parts += [f"## {section.title}\n\n{body(section)}" for section in sections]
-    return "\n\n".join(parts) + "\n"
+    blocks = ["# The paper's tables again", origin.line(), _table(*summary(sections))]
+    blocks += [f"## {section.title}\n\n{body(section)}" for section in sections]
+    return "\n\n".join(blocks) + "\n"
 
 
 def blocks(sections: Sequence[Section], origin: Origin) -> dict[str, str]:
-    """{name: Markdown} of what a page may hold between markers."""
+    """{name: Markdown} of the blocks that a page may hold between markers."""
     content = [origin.line(), _table(*summary(sections)), *map(body, sections)]
     return dict(zip(block_names([section.key for section in sections]), content))
 
 
 def block_names(keys: Iterable[str]) -> list[str]:
-    """Names of the blocks that the sections of these keys fill."""
+    """Names of the blocks of the sections with these keys."""
     return ["origin", "summary", *(f"section {key}" for key in keys)]
 
 
 def fill(page_text: str, generated: Mapping[str, str]) -> str:
-    """The page with its generated blocks made anew; InputError when one has no place in it."""
+    """The page with its generated blocks replaced; InputError when its markers are missing."""
     for name, content in generated.items():
-        begin, end = f"<!-- begin generated: {name} -->", f"<!-- end generated: {name} -->"
-        pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
+        start, end = f"<!-- begin generated: {name} -->", f"<!-- end generated: {name} -->"
+        pattern = re.compile(re.escape(start) + ".*?" + re.escape(end), re.DOTALL)
         if not pattern.search(page_text):
-            raise InputError(f"no place for {name!r}: put the lines {begin} and {end} there")
-        whole = f"{begin}\n{content}\n{end}".replace("\\", r"\\")
+            raise InputError(f"no block {name!r} in the page: add the lines {start} and {end}")
+        whole = f"{start}\n{content}\n{end}".replace("\\", r"\\")
         page_text = pattern.sub(whole, page_text)
     return page_text
 
 
 def summary(sections: Sequence[Section]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Head and rows: how many numbers of each section got which verdict."""
+    """Head and rows: the number of each verdict in each section."""
     head = ("", *(verdict.value for verdict in Verdict))
     rows = [
         (title, *(str(found[verdict] or "") for verdict in Verdict))
@@ -55,7 +55,7 @@ def summary(sections: Sequence[Section]) -> tuple[tuple[str, ...], list[tuple[st
 
 def body(section: Section) -> str:
     """A section without its title."""
-    parts = []
+    blocks = []
     if section.entries:
         names = text.readings(section)
         shown = [
@@ -68,18 +68,18 @@ def body(section: Section) -> str:
             )
             for e in section.entries
         ]
-        parts.append(_table(("number", "printed", *names, "verdict", "why"), shown))
-    if told := text.seeds(section):
-        parts.append(told)
-    parts += [_grid(grid, section.digits) for grid in section.grids]
+        blocks.append(_table(("number", "printed", *names, "verdict", "why"), shown))
+    if seeds := text.seeds(section):
+        blocks.append(seeds)
+    blocks += [_grid(grid, section.digits) for grid in section.grids]
     if section.notes:
-        parts.append("\n".join(f"- {note}" for note in section.notes))
-    return "\n\n".join(parts)
+        blocks.append("\n".join(f"- {note}" for note in section.notes))
+    return "\n\n".join(blocks)
 
 
 def _grid(grid: Grid, digits: int) -> str:
-    parts = [f"**{grid.title}**", _table(grid.head, text.rows(grid, digits))]
-    return "\n\n".join([*parts, grid.note] if grid.note else parts)
+    blocks = [f"**{grid.title}**", _table(grid.head, text.rows(grid, digits))]
+    return "\n\n".join([*blocks, grid.note] if grid.note else blocks)
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

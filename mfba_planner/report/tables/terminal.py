@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reproduced tables for the eyes: rich tables that fit the terminal's width."""
+"""Reproduced tables in the terminal: rich tables that fit its width."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STYLES = {
 
 
 def show(console: Console, sections: Sequence[Section], origin: Origin) -> None:
-    """Print all sections, the summary last, where the eyes are."""
+    """Print all sections, then the summary."""
     print_encodable(console, lambda encodable: _print(encodable, sections, origin))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cells, entries and headings as text: the same words in every form."""
+"""Cells, entries and headings of reproduced tables as text, shared by all output forms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NOTHING = "–"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """What the numbers come from; command is what makes them again."""
+    """The origin of the numbers: command, seed and versions; command makes them again."""
 
     command: str
     seed: int
@@ -38,7 +38,7 @@ class Origin:
 
 
 def cell(value: Cell, digits: int) -> str:
-    """A cell with so many significant digits; an interval as middle [low, high]."""
+    """A cell with this number of significant digits; an interval as middle [low, high]."""
     if value is None:
         return ""
     if isinstance(value, Interval):
@@ -50,43 +50,43 @@ def cell(value: Cell, digits: int) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """Trailing zeros are kept where an interval has them; no minus before zero."""
+    """Format a bound of an interval: trailing zeros are kept, zero has no minus."""
     return f"{value:#.{digits}g}".rstrip(".") if value else "0"
 
 
 def rows(grid: Grid, digits: int) -> Iterator[list[str]]:
-    """The rows of a grid; columns without digits of their own have those of the section."""
+    """The rows of a grid; `digits` holds for columns that are not in grid.digits."""
     shown = [grid.digits.get(name, digits) for name in grid.head]
     for row in grid.rows:
         yield [cell(value, count) for value, count in zip(row, shown)]
 
 
 def readings(section: Section) -> tuple[str, ...]:
-    """Names of the readings that a section's entries show, in order of first appearance."""
+    """Names of the readings in a section's entries, sorted by first appearance."""
     return tuple(dict.fromkeys(o.reading for e in section.entries for o in e.ours))
 
 
 def label(entry: Entry) -> str:
-    """What an entry is, within its section; some columns go without saying."""
+    """Name of an entry within its section: its row, and its column where that is needed."""
     return entry.row if entry.column in ("claim", "value") else f"{entry.row}, {entry.column}"
 
 
 def ours(entry: Entry, reading: str, digits: int) -> str:
-    """What a reading gives for an entry."""
+    """The value of a reading for an entry."""
     found = [cell(o.value, digits) for o in entry.ours if o.reading == reading]
     return found[0] if found else NOTHING
 
 
 def seeds(section: Section) -> str:
-    """Which seeds the entries come from, "" where there are none."""
-    told = dict.fromkeys(
+    """The seeds of the entries, "" if there are none."""
+    found = dict.fromkeys(
         f"{o.reading} {o.seeds}" for e in section.entries for o in e.ours if o.seeds
     )
-    return f"Seeds: {', '.join(told)}." if told else ""
+    return f"Seeds: {', '.join(found)}." if found else ""
 
 
 def counts(sections: Sequence[Section]) -> list[tuple[str, dict[Verdict, int]]]:
-    """(title, {verdict: how many}) of each section."""
+    """(title, {verdict: number of entries}) of each section."""
     return [
         (
             section.title.split(".")[0],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sheet of paper in inches from its lower left corner: head, texts, axes, legend, bytes."""
+"""A figure laid out in inches from its lower left corner: head, texts, axes, legend, bytes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .format_values import one_line
 from .legend import Entry
 
 EDGE = 0.3
-# neither date nor version: the same figure gives the same bytes
+# No date and no version: the same figure gives the same bytes.
 _PLAIN: dict[str, dict[str, None]] = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None, "Format": None, "Type": None},
@@ -26,47 +26,47 @@ _PLAIN: dict[str, dict[str, None]] = {
 
 
 class Sheet:
-    """A figure whose parts are placed in inches; to be used and saved within style.context()."""
+    """A figure with positions in inches; use and save it within style.context()."""
 
     def __init__(self, width: float, height: float) -> None:
-        """Cut the sheet; resize() may change it until something has been placed."""
+        """Make an empty figure; call resize() only before texts and legends are added."""
         self.width, self.height = width, height
         self.figure = Figure(figsize=(width, height))
         self._canvas = FigureCanvasAgg(self.figure)
 
     def resize(self, width: float, height: float) -> None:
-        """Cut it anew."""
+        """Change width and height (inches)."""
         self.width, self.height = width, height
         self.figure.set_size_inches(width, height)
 
     @property
     def renderer(self) -> RendererAgg:
-        """What measures texts."""
+        """The renderer that measures texts."""
         return self._canvas.get_renderer()
 
     def axes(self, left: float, bottom: float, width: float, height: float) -> Axes:
-        """Axes whose frame has this corner and size."""
-        return self.figure.add_axes(self._share(left, bottom, width, height))
+        """Add axes whose frame has this corner and size (inches)."""
+        return self.figure.add_axes(self._fractions(left, bottom, width, height))
 
-    def place(self, ax: Axes, left: float, bottom: float, width: float, height: float) -> None:
-        """Move axes."""
-        ax.set_position(self._share(left, bottom, width, height))
+    def move_axes(self, ax: Axes, left: float, bottom: float, width: float, height: float) -> None:
+        """Move axes to this corner and size (inches)."""
+        ax.set_position(self._fractions(left, bottom, width, height))
 
-    def _share(self, *box: float) -> tuple[float, float, float, float]:
-        """Left, bottom, width, height as shares of the sheet."""
+    def _fractions(self, *box: float) -> tuple[float, float, float, float]:
+        """Left, bottom, width and height as fractions of the figure."""
         left, bottom, width, height = box
         return left / self.width, bottom / self.height, width / self.width, height / self.height
 
     def text(self, x: float, y: float, text: str, **looks: Any) -> Text:
-        """Write a text; letters that the font does not have become question marks."""
+        """Write a text; characters that the font lacks become question marks."""
         return self.figure.text(x / self.width, y / self.height, drawable(text), **looks)
 
     def size(self, text: Text) -> float:
-        """Width of a text in inches."""
+        """Width of a text (inches)."""
         return text.get_window_extent(self.renderer).width / style.DPI
 
     def head(self, title: str, subtitle: str, left: float = EDGE) -> None:
-        """Write the title and, below it, a subtitle; each is cut where the sheet ends."""
+        """Write the title and, below it, a subtitle; each is cut at the figure's edge."""
         room = self.width - left - EDGE
         top = self.height - 0.3
         for text, y, looks in (
@@ -80,7 +80,7 @@ class Sheet:
                 label.set_text(drawable(words))
 
     def legend(self, entries: Sequence[Entry], x: float, top: float, **looks: Any) -> float:
-        """Put a legend with its upper left corner there; return where it ends below."""
+        """Put a legend with its upper left corner at (x, top); return its lower edge (inches)."""
         legend = self.figure.legend(
             [handle for handle, _ in entries],
             [label for _, label in entries],
@@ -100,6 +100,6 @@ def to_bytes(figure: Figure, form: str) -> bytes:
 
 
 def drawable(text: str) -> str:
-    """Text with a question mark for each letter that the house font does not have."""
+    """Text with a question mark for each character that the figures' font lacks."""
     known = get_font(findfont("DejaVu Sans")).get_charmap()
     return "".join(c if c == "\n" or ord(c) in known else "?" for c in text)
