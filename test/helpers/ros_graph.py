@@ -13,7 +13,8 @@ from rclpy.qos import QoSProfile
 from waiting import spin_until
 
 from mfba_planner.ros.interface.topics import Topic
-from mfba_planner.ros.runtime.node_runtime import GraphNode, make_executor
+from mfba_planner.ros.runtime.graph_node import GraphNode
+from mfba_planner.ros.runtime.spin_node import make_executor
 
 N = TypeVar("N", bound=GraphNode)
 SETTLE_TURNS = 40  # delivery within a process is synchronous: two turns bring one message

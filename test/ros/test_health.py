@@ -4,11 +4,11 @@
 import pytest
 
 from mfba_planner.planning.recovery import Phase
-from mfba_planner.ros.interface.health import Health, InputRate, Level, driving
+from mfba_planner.ros.interface.health import InputHealth, InputRate, Level, driving_status
 from mfba_planner.ros.node_parameters import WorldSimSettings
 from mfba_planner.ros.runtime.command_timeout import CommandTimeout
 from mfba_planner.ros.runtime.goal_queue import GoalQueue
-from mfba_planner.ros.runtime.stale_inputs import watch_period_s
+from mfba_planner.ros.runtime.planner_inputs import watch_period_s
 
 
 def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
@@ -25,16 +25,16 @@ def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
 
 
 def test_inputs_are_sound_stale_or_refused() -> None:
-    health = Health(("odom", "sectors"))
-    assert health.inputs(0.0, 1.0, {}).level is Level.STALE
-    health.heard("odom", 1, 0.0)
-    health.heard("sectors", 1, 0.5)
-    sound = health.inputs(1.0, 1.0, {})
+    health = InputHealth(("odom", "sectors"))
+    assert health.status(0.0, 1.0, {}).level is Level.STALE
+    health.received("odom", 1, 0.0)
+    health.received("sectors", 1, 0.5)
+    sound = health.status(1.0, 1.0, {})
     assert (sound.level, sound.message) == (Level.OK, "odom and sectors are sound")
-    stale = health.inputs(1.25, 1.0, {})
+    stale = health.status(1.25, 1.0, {})
     assert stale.message == "odom stale for 1.25 s (input_timeout_s=1)"
-    health.judged("odom", "odom is in frame")
-    refused = health.inputs(1.25, 1.0, {"odom: frame": 2, "odom: value": 3})
+    health.set_fault("odom", "odom is in frame")
+    refused = health.status(1.25, 1.0, {"odom: frame": 2, "odom: value": 3})
     assert refused.level is Level.ERROR
     assert refused.message.startswith("refused: odom is in frame; odom stale for")
     assert refused.values["refused"] == "5"
@@ -42,7 +42,7 @@ def test_inputs_are_sound_stale_or_refused() -> None:
 
 
 def test_a_planner_that_is_not_active_is_in_order_and_says_so() -> None:
-    status = driving(None, Phase.FREE, "inactive", {})
+    status = driving_status(None, Phase.FREE, "inactive", {})
     assert (status.level, status.message) == (Level.OK, "inactive: commands nothing")
 
 
@@ -51,43 +51,43 @@ A, B, C = (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)
 
 def test_goals_are_visited_in_their_order() -> None:
     goal_queue = GoalQueue()
-    assert (goal_queue.goal, goal_queue.leg) == (None, "")
-    assert goal_queue.order((A, B, C), over=False)
-    assert (goal_queue.goal, goal_queue.leg, goal_queue.number) == (A, "1 of 3", 1)
-    assert goal_queue.pass_by((0.5, 0.0), 0.1) == 0
-    assert goal_queue.pass_by((0.95, 0.0), 0.1) == 1
-    assert (goal_queue.goal, goal_queue.leg, goal_queue.number) == (B, "2 of 3", 1)
-    assert goal_queue.pass_by(B, 0.1) == 1
-    assert goal_queue.pass_by(C, 0.1) == 0, "the last one is for the planner to reach"
+    assert (goal_queue.goal, goal_queue.goal_index) == (None, "")
+    assert goal_queue.set_goals((A, B, C), finished=False)
+    assert (goal_queue.goal, goal_queue.goal_index, goal_queue.goal_id) == (A, "1 of 3", 1)
+    assert goal_queue.advance((0.5, 0.0), 0.1) == 0
+    assert goal_queue.advance((0.95, 0.0), 0.1) == 1
+    assert (goal_queue.goal, goal_queue.goal_index, goal_queue.goal_id) == (B, "2 of 3", 1)
+    assert goal_queue.advance(B, 0.1) == 1
+    assert goal_queue.advance(C, 0.1) == 0, "the last one is for the planner to reach"
     assert goal_queue.goal == C
 
 
 def test_goals_at_one_place_are_passed_at_once() -> None:
     goal_queue = GoalQueue()
-    goal_queue.order((A, A, A, B), over=False)
-    assert goal_queue.pass_by(A, 0.1) == 3
+    goal_queue.set_goals((A, A, A, B), finished=False)
+    assert goal_queue.advance(A, 0.1) == 3
 
 
 def test_the_same_order_is_none_unless_the_last_is_over() -> None:
     goal_queue = GoalQueue()
-    goal_queue.order((A, B), over=False)
-    goal_queue.pass_by(A, 0.1)
-    assert not goal_queue.order((A, B), over=False)
-    assert (goal_queue.goal, goal_queue.number) == (B, 1)
-    assert goal_queue.order((A, B), over=True)
-    assert (goal_queue.goal, goal_queue.number) == (A, 2)
-    assert goal_queue.order((B,), over=False)
-    assert goal_queue.leg == "1 of 1"
+    goal_queue.set_goals((A, B), finished=False)
+    goal_queue.advance(A, 0.1)
+    assert not goal_queue.set_goals((A, B), finished=False)
+    assert (goal_queue.goal, goal_queue.goal_id) == (B, 1)
+    assert goal_queue.set_goals((A, B), finished=True)
+    assert (goal_queue.goal, goal_queue.goal_id) == (A, 2)
+    assert goal_queue.set_goals((B,), finished=False)
+    assert goal_queue.goal_index == "1 of 1"
 
 
 def test_cancelled_there_is_no_goal_and_the_same_may_be_ordered_anew() -> None:
     goal_queue = GoalQueue()
     assert goal_queue.cancel() is None
-    goal_queue.order((A,), over=False)
+    goal_queue.set_goals((A,), finished=False)
     assert goal_queue.cancel() == A
-    assert (goal_queue.goal, goal_queue.number) == (None, 2)
+    assert (goal_queue.goal, goal_queue.goal_id) == (None, 2)
     assert goal_queue.cancel() is None
-    assert goal_queue.order((A,), over=False)
+    assert goal_queue.set_goals((A,), finished=False)
 
 
 def test_a_twist_holds_for_the_timeout_but_never_less_than_its_tick() -> None:
@@ -97,7 +97,7 @@ def test_a_twist_holds_for_the_timeout_but_never_less_than_its_tick() -> None:
                 cmd_vel_timeout_s=timeout_s, tick_ns=round(tick_s * 1e9), speed_factor=factor
             )
         )
-        command_timeout.heard(100.0)
+        command_timeout.received(100.0)
         return not command_timeout.has_expired(100.0 + after_s)
 
     assert holds(0.5, 0.49)

@@ -252,7 +252,7 @@ def test_an_episode_in_real_time_keeps_the_decision_not_the_stops_after_it(
         planner := graph.start(PlannerNode, {"input_timeout_s": 0.1, "seed": 2}),
     ]
     recorder = record(graph, tmp_path / "bag")
-    recorder.explain({node.get_name(): params.values(node) for node in nodes})
+    recorder.attach_parameters({node.get_name(): params.values(node) for node in nodes})
     outcomes = graph.hear(topics.DECISION)
     graph.until(lambda: planner.goals.goal_queue.goal is not None)
     for _ in range(2):

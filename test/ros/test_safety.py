@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool
 from mfba_planner.core.options import flatten
 from mfba_planner.planning.recovery import RecoveryParams, longest_s
 from mfba_planner.recording.from_messages import stamp_ns
-from mfba_planner.ros.endpoints.diagnostics_publisher import DiagnosticTopic
+from mfba_planner.ros.endpoints.diagnostics_publisher import DiagnosticsPublisher
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import pose_stamped_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
@@ -199,13 +199,13 @@ def test_as_long_as_inputs_are_stale_diagnostics_go_on_once_a_period(graph: Grap
 
 def test_a_stamp_that_is_told_again_does_not_hold_up_diagnostics(graph: Graph) -> None:
     node = graph.start(PlannerNode, {"diagnostics_period_s": 1.0})
-    topic = DiagnosticTopic(node, node.settings)
-    topic.at(10**9, 0.0)
-    topic.publish([], 0.0, news=False)
+    topic = DiagnosticsPublisher(node, node.settings)
+    topic.set_time(10**9, 0.0)
+    topic.publish([], 0.0, changed=False)
     assert not topic.is_due(0.5)
-    topic.at(10**9, 0.9)
+    topic.set_time(10**9, 0.9)
     assert topic.is_due(1.5)
-    topic.at(2 * 10**9 - 1, 1.5)
+    topic.set_time(2 * 10**9 - 1, 1.5)
     assert not topic.is_due(1.5)
 
 

@@ -55,8 +55,8 @@ def test_a_part_that_never_comes_holds_nothing_up(
 
 @pytest.mark.parametrize("again", [False, True])
 @pytest.mark.parametrize("side", ["a", "b"])
-def test_a_stamp_that_goes_back_is_refused(side: str, again: bool) -> None:
-    pairs = Pairs(again=again)
+def test_a_stamp_that_goes_back_is_refused(side: str, repeat: bool) -> None:
+    pairs = Pairs(repeat=repeat)
     add(pairs, "a", 10)
     assert add(pairs, "b", 10) == ("a10", "b10")
     for old in (9, 0, -1):
@@ -77,7 +77,7 @@ def test_a_repeated_stamp_is_refused(side: str) -> None:
 
 
 def test_a_pair_that_comes_again_as_a_whole_is_answered_again_where_that_is_wanted() -> None:
-    pairs = Pairs(again=True)
+    pairs = Pairs(repeat=True)
     answers = [add(pairs, side, stamp) for side, stamp in zip("abbaab", [7] * 6)]
     assert answers == [None, ("a7", "b7"), None, ("a7", "b7"), None, ("a7", "b7")]
     assert add(pairs, "a", 8) is None

@@ -122,7 +122,7 @@ def test_radii_that_do_not_fit_make_it_blind(graph: Graph) -> None:
     assert is_blind(sensor.answer(odom(1), obstacles(1, (1.0, 0.0))))
     assert is_blind(sensor.answer(odom(2), obstacles(2)))
     assert not is_blind(sensor.answer(odom(3), obstacles(3, (1.0, 0.0), (2.0, 0.0))))
-    assert sensor.node._refusals.count == 2
+    assert sensor.node._refused_inputs.count == 2
 
 
 @pytest.mark.parametrize("bad", [math.nan, INF, -INF])
@@ -138,7 +138,7 @@ def test_a_bad_number_blinds_it_for_one_tick(graph: Graph, bad: float) -> None:
         assert is_blind(sensor.answer(*pair))
     assert not sensor.vectors, "a blind sensor has no bits to show"
     assert ranges_of(sensor.answer(odom(5), obstacles(5))) == (INF,) * 12
-    assert sensor.node._refusals.count == 4
+    assert sensor.node._refused_inputs.count == 4
 
 
 def test_each_pair_is_answered_when_it_is_whole(graph: Graph) -> None:
@@ -147,7 +147,7 @@ def test_each_pair_is_answered_when_it_is_whole(graph: Graph) -> None:
     assert [stamp_ns(m.header.stamp) for m in sensor.answers(obstacles(2), obstacles(3))] == [2, 3]
     assert not sensor.answers(obstacles(1)), "backwards"
     assert not sensor.answers(odom(1))
-    assert sensor.node._refusals.count == 2
+    assert sensor.node._refused_inputs.count == 2
 
 
 def test_a_tick_that_is_published_again_is_answered_again(graph: Graph) -> None:
@@ -207,8 +207,8 @@ def test_a_scan_in_another_frame_blinds_and_both_are_named(graph: Graph) -> None
     other = scan(1)
     other.header.frame_id = "rear"
     assert all(map(math.isnan, sensor.answer(odom(1), other).ranges))
-    assert sensor.node._refusals.by_kind == {"scan: frame": 1}
-    assert sensor.node._refusals.last == (
+    assert sensor.node._refused_inputs.by_kind == {"scan: frame": 1}
+    assert sensor.node._refused_inputs.last == (
         "scan is in frame 'rear', not 'base_scan'; transform it, or set scan_frame"
     )
     assert not any(map(math.isnan, sensor.answer(odom(2), scan(2)).ranges))
@@ -259,7 +259,7 @@ def test_a_scan_that_says_nothing_blinds_it(graph: Graph, message: LaserScan) ->
     sensor = Sensor(graph, LOCKSTEP_SCAN)
     assert is_blind(sensor.answer(odom(1), message))
     assert not sensor.vectors
-    assert sensor.node._refusals.count == 1
+    assert sensor.node._refused_inputs.count == 1
     assert not is_blind(sensor.answer(odom(2), scan(2)))
 
 

@@ -169,7 +169,7 @@ def test_the_robot_stands_on_a_twist_that_is_not_finite(driver: Driver, bad: flo
     for message in (twist(bad), twist(0.0, bad), Twist(angular=Vector3(z=bad))):
         driver.answer(message)
     assert len(set(driver.positions[1:])) == 1
-    assert driver.world._refusals.count == 3
+    assert driver.world._refused_inputs.count == 3
 
 
 def test_an_unanswered_tick_is_published_again_and_then_given_up(graph: Graph) -> None:
@@ -297,7 +297,7 @@ def test_an_initialpose_that_is_not_finite_is_refused(driver: Driver) -> None:
     driver.graph.settle()
     driver.answer(twist())
     assert driver.positions == [(0.0, 0.0)] * 2
-    assert driver.world._refusals.count == 1
+    assert driver.world._refused_inputs.count == 1
 
 
 def ends(driver: Driver) -> list[tuple[str, str]]:
