@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rates, ages, levels, orders and the deadman: what needs no ROS to be checked."""
+"""Input health, goal queue and command timeout, without ROS."""
 
 import pytest
 
@@ -11,7 +11,7 @@ from mfba_planner.ros.runtime.goal_queue import GoalQueue
 from mfba_planner.ros.runtime.planner_inputs import watch_period_s
 
 
-def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
+def test_a_rate_is_that_of_the_last_messages_and_falls_without_any() -> None:
     rate = InputRate()
     assert (rate.age_s(5.0), rate.rate_hz(5.0)) == (None, 0.0)
     for k in range(100):
@@ -20,7 +20,7 @@ def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
     assert round(rate.age_s(10.9) or 0.0, 6) == 1.0
     assert 6.0 < rate.rate_hz(10.9) < 7.0
     rate.add(99, 11.0)
-    assert rate.age_s(11.0) is not None, "the same stamp is no news"
+    assert rate.age_s(11.0) is not None, "the same stamp does not count"
     assert round(rate.age_s(11.0) or 0.0, 6) == 1.1
 
 
@@ -41,7 +41,7 @@ def test_inputs_are_sound_stale_or_refused() -> None:
     assert refused.values["refused odom: frame"] == "2"
 
 
-def test_a_planner_that_is_not_active_is_in_order_and_says_so() -> None:
+def test_a_planner_that_is_not_active_is_ok() -> None:
     status = driving_status(None, Phase.FREE, "inactive", {})
     assert (status.level, status.message) == (Level.OK, "inactive: commands nothing")
 
@@ -49,7 +49,7 @@ def test_a_planner_that_is_not_active_is_in_order_and_says_so() -> None:
 A, B, C = (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)
 
 
-def test_goals_are_visited_in_their_order() -> None:
+def test_goals_are_visited_in_sequence() -> None:
     goal_queue = GoalQueue()
     assert (goal_queue.goal, goal_queue.goal_index) == (None, "")
     assert goal_queue.set_goals((A, B, C), finished=False)
@@ -58,17 +58,17 @@ def test_goals_are_visited_in_their_order() -> None:
     assert goal_queue.advance((0.95, 0.0), 0.1) == 1
     assert (goal_queue.goal, goal_queue.goal_index, goal_queue.goal_id) == (B, "2 of 3", 1)
     assert goal_queue.advance(B, 0.1) == 1
-    assert goal_queue.advance(C, 0.1) == 0, "the last one is for the planner to reach"
+    assert goal_queue.advance(C, 0.1) == 0, "the planner itself decides on the last one"
     assert goal_queue.goal == C
 
 
-def test_goals_at_one_place_are_passed_at_once() -> None:
+def test_goals_at_one_position_are_reached_together() -> None:
     goal_queue = GoalQueue()
     goal_queue.set_goals((A, A, A, B), finished=False)
     assert goal_queue.advance(A, 0.1) == 3
 
 
-def test_the_same_order_is_none_unless_the_last_is_over() -> None:
+def test_the_same_goals_again_are_ignored_unless_finished() -> None:
     goal_queue = GoalQueue()
     goal_queue.set_goals((A, B), finished=False)
     goal_queue.advance(A, 0.1)
@@ -80,7 +80,7 @@ def test_the_same_order_is_none_unless_the_last_is_over() -> None:
     assert goal_queue.goal_index == "1 of 1"
 
 
-def test_cancelled_there_is_no_goal_and_the_same_may_be_ordered_anew() -> None:
+def test_after_cancel_there_is_no_goal_and_the_same_may_be_set_again() -> None:
     goal_queue = GoalQueue()
     assert goal_queue.cancel() is None
     goal_queue.set_goals((A,), finished=False)
@@ -111,6 +111,8 @@ def test_a_twist_holds_for_the_timeout_but_never_less_than_its_tick() -> None:
 @pytest.mark.parametrize(
     ("timeout_s", "period_s"), [(0.25, 0.0625), (1.0, 0.25), (60.0, 0.25), (0.001, 0.02)]
 )
-def test_silence_is_looked_for_well_within_its_timeout(timeout_s: float, period_s: float) -> None:
+def test_stale_inputs_are_checked_several_times_per_timeout(
+    timeout_s: float, period_s: float
+) -> None:
     assert watch_period_s(timeout_s, lockstep=False) == period_s
     assert watch_period_s(timeout_s, lockstep=True) == 0.5

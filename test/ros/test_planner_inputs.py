@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a planner decides on in lockstep and in real time, stale and backward inputs included."""
+"""Pairing of odom and sectors in lockstep and in real time, with stale and backward stamps."""
 
 import math
 
@@ -13,7 +13,7 @@ POSE, OTHER_POSE = Pose2D(1.0, 2.0), Pose2D(3.0, 4.0)
 FREE = (math.inf,) * 12
 
 
-def test_lockstep_answers_pairs_of_one_stamp() -> None:
+def test_lockstep_returns_pairs_of_one_stamp() -> None:
     inputs = LockstepInputs()
     assert inputs.add_odom(1, POSE, 0.0) is None
     assert inputs.add_odom(2, OTHER_POSE, 0.0) is None
@@ -23,20 +23,20 @@ def test_lockstep_answers_pairs_of_one_stamp() -> None:
             add(1, POSE, 0.0)  # type: ignore[operator]
 
 
-def test_lockstep_takes_the_last_pair_once_more_when_both_parts_come_again() -> None:
+def test_lockstep_returns_the_last_pair_again_when_both_messages_are_repeated() -> None:
     inputs = LockstepInputs()
     for _ in range(3):
         assert inputs.add_odom(2, OTHER_POSE, 0.0) is None
         assert inputs.add_sectors(2, FREE, 99.0) == Inputs(2, OTHER_POSE, FREE, 0.0)
 
 
-def test_a_refused_part_travels_as_its_reason() -> None:
+def test_a_refused_message_is_its_reason() -> None:
     inputs = LockstepInputs()
     inputs.add_sectors(1, "sector 3 holds nan", 0.0)
     assert inputs.add_odom(1, POSE, 0.0) == Inputs(1, POSE, "sector 3 holds nan", 0.0)
 
 
-def test_real_time_answers_every_sectors_with_the_newest_odom_and_its_age() -> None:
+def test_real_time_returns_every_sectors_with_the_newest_odom_and_its_age() -> None:
     inputs = NewestInputs()
     assert inputs.add_odom(10, POSE, 100.0) is None
     assert inputs.add_odom(11, OTHER_POSE, 101.0) is None
@@ -44,7 +44,7 @@ def test_real_time_answers_every_sectors_with_the_newest_odom_and_its_age() -> N
     assert inputs.add_sectors(6, FREE, 103.0) == Inputs(6, OTHER_POSE, FREE, 2.0)
 
 
-def test_real_time_without_odom_says_so() -> None:
+def test_real_time_without_odom_returns_the_reason() -> None:
     assert NewestInputs().add_sectors(5, FREE, 1e6) == Inputs(5, "no odom yet", FREE, 0.0)
 
 
@@ -62,7 +62,7 @@ def test_real_time_refuses_sectors_that_do_not_rise_and_odom_that_goes_back() ->
 
 
 def test_the_same_stamp_once_more_does_not_make_odom_younger() -> None:
-    """As a driver does that repeats its last message when its hardware has gone."""
+    """As from a driver that repeats its last message after its hardware has failed."""
     inputs = NewestInputs()
     inputs.add_odom(10, POSE, 0.0)
     inputs.add_sectors(10, FREE, 0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Letterboxes over real subscriptions: order, and what falls in while they are emptied."""
+"""Polled subscriptions over DDS: sequence of delivery, and messages sent during a poll."""
 
 import time
 from collections.abc import Callable
@@ -23,7 +23,7 @@ def received() -> list[str]:
 
 @pytest.fixture
 def polled(graph: Graph, received: list[str]) -> PolledSubscriptions:
-    """Two topics, late and early; the box of late is looked into first."""
+    """Two topics, late and early; late is polled first."""
     made = PolledSubscriptions()
 
     def deliver(message: Any) -> None:
@@ -50,7 +50,7 @@ def poll_until(polled: PolledSubscriptions, received: list[str], count: int) -> 
         polled.poll()
 
 
-def test_letters_are_handed_on_as_they_were_sent(
+def test_messages_are_delivered_sorted_by_send_time(
     polled: PolledSubscriptions, received: list[str], publish: Publish
 ) -> None:
     for number in range(6):
@@ -59,13 +59,13 @@ def test_letters_are_handed_on_as_they_were_sent(
     assert received == list("012345")
 
 
-def test_what_was_sent_after_a_round_began_waits_for_the_next(
+def test_what_was_sent_after_a_poll_started_waits_for_the_next(
     polled: PolledSubscriptions,
     received: list[str],
     publish: Publish,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The clock says when a round begins: long before the letters were sent, here."""
+    """The patched clock starts the poll long before the messages were sent."""
     publish("early", "first")
     poll_until(polled, received, 1)
     publish("early", "second")
