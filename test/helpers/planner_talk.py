@@ -48,7 +48,7 @@ class PlannerHarness:
         self.waypoints = graph.writer(topics.WAYPOINTS)
         self.decisions = graph.hear(topics.DECISION)
         self.plans = graph.hear(topics.PLAN)
-        self.steps = graph.hear(topics.GOAL_STEP)
+        self.goal_steps = graph.hear(topics.GOAL_STEP)
         stamped = parameters.get("enable_stamped_cmd_vel")
         self.cmd_vel = graph.hear(topics.CMD_VEL, TwistStamped if stamped else None)
         if at:

@@ -118,7 +118,7 @@ def test_after_cancel_it_rests_until_the_next_goal(graph: Graph) -> None:
     harness = PlannerHarness(graph, LOCKSTEP)
     assert mode(harness.decide(odom(1), sectors(1))) is Mode.PATH_GENERATION
     done = graph.call(Trigger, "planner/cancel")
-    assert (done.success, done.message) == (True, "no longer on the way to (10.0, 5.0)")
+    assert (done.success, done.message) == (True, "no longer driving to (10.0, 5.0)")
     idle = harness.decide(odom(2), sectors(2))
     assert (mode(idle), fields(idle)["goal_id"]) == (Mode.IDLE, "2")
     assert harness.velocity == (0.0, 0.0)

@@ -77,15 +77,17 @@ def test_deactivated_it_commands_rest_once_and_nothing_more(graph: Graph) -> Non
     graph.settle()
     assert len(harness.cmd_vel) == 2
     assert harness.velocity == (0.0, 0.0)
-    position = harness.steps[-1].pose.position
+    position = harness.goal_steps[-1].pose.position
     assert (position.x, position.y) == (0.0, 0.0), "where the robot is"
-    counts = [len(x) for x in (harness.cmd_vel, harness.steps, harness.plans, harness.decisions)]
+    counts = [
+        len(x) for x in (harness.cmd_vel, harness.goal_steps, harness.plans, harness.decisions)
+    ]
     for stamp in (2, 3):
         harness.odom.publish(odom(stamp))
         harness.sectors.publish(sectors(stamp))
     graph.settle()
     assert [
-        len(x) for x in (harness.cmd_vel, harness.steps, harness.plans, harness.decisions)
+        len(x) for x in (harness.cmd_vel, harness.goal_steps, harness.plans, harness.decisions)
     ] == counts
 
 

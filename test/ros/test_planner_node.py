@@ -95,7 +95,7 @@ def test_decisions_are_the_cores_and_are_published_in_full(
 
 def check_outputs(harness: PlannerHarness, decision: Decision) -> None:
     """Plan, goal step and Twist agree with the decision and have its stamp."""
-    plan, step = harness.plans[-1], harness.steps[-1]
+    plan, step = harness.plans[-1], harness.goal_steps[-1]
     assert stamp_ns(plan.header.stamp) == stamp_ns(step.header.stamp) == decision.stamp_ns
     assert plan.header.frame_id == step.header.frame_id == "odom"
     corners = [(p.pose.position.x, p.pose.position.y) for p in plan.poses]
@@ -150,7 +150,7 @@ def test_a_repeated_pair_repeats_the_command_without_a_new_decision(graph: Graph
     graph.until(lambda: len(harness.cmd_vel) == 2)
     graph.settle()
     assert len(harness.decisions) == 1
-    assert harness.steps[0] == harness.steps[1]
+    assert harness.goal_steps[0] == harness.goal_steps[1]
     assert harness.cmd_vel[0] == harness.cmd_vel[1]
 
 
@@ -360,7 +360,7 @@ def test_it_starts_afresh_when_time_is_set_back(graph: Graph, parameters: dict[s
     assert not harness.decide_all(sectors(6))
 
 
-def test_stamped_twists_where_they_are_asked_for(graph: Graph) -> None:
+def test_stamped_twists_where_enabled(graph: Graph) -> None:
     harness = PlannerHarness(
         graph, {**LOCKSTEP, "enable_stamped_cmd_vel": True, "base_frame": "base"}
     )

@@ -182,7 +182,7 @@ def test_diagnostics_come_once_a_period_and_at_once_when_a_level_changes(graph: 
     assert len(relayed.diagnostics()) <= count + 3
 
 
-def test_as_long_as_inputs_are_stale_diagnostics_go_on_once_a_period(graph: Graph) -> None:
+def test_while_inputs_are_stale_diagnostics_continue_once_a_period(graph: Graph) -> None:
     relayed = RelayedGraph(graph, FAR, diagnostics_period_s=1.0)
     relayed.drive()
     relayed.tamper["sectors"] = lost

@@ -29,7 +29,7 @@ def test_during_a_pause_the_commands_are_kept() -> None:
     control = tick_control()
     control.open_tick(0.0)
     control.paused = True
-    assert control.step_refusal() == "refused: the planner has not answered the present tick yet"
+    assert control.step_refusal() == "refused: the present tick has no command yet"
     control.close_tick()
     assert not control.may_advance()
     assert control.step_refusal() == ""

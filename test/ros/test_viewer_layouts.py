@@ -107,7 +107,7 @@ def test_foxglove_topics_and_fields_exist(foxglove: Any) -> None:
     assert len(used) >= 10
 
 
-def test_foxglove_places_every_panel_once_and_knows_their_kinds(foxglove: Any) -> None:
+def test_foxglove_lays_out_every_panel_once_and_their_types_exist(foxglove: Any) -> None:
     def leaves(node: Any) -> list[str]:
         if isinstance(node, str):
             return [node]
@@ -122,7 +122,7 @@ def test_foxglove_places_every_panel_once_and_knows_their_kinds(foxglove: Any) -
     assert {"globalVariables", "userNodes", "playbackConfig"} <= set(foxglove)
 
 
-def test_the_service_that_foxglove_calls_is_there(graph: Graph, foxglove: Any) -> None:
+def test_the_service_that_foxglove_calls_exists(graph: Graph, foxglove: Any) -> None:
     panel = foxglove["configById"]["CallService!cancel"]
     PlannerHarness(graph, LOCKSTEP)
     assert json.loads(panel["requestPayload"]) == {}

@@ -232,7 +232,7 @@ def test_step_is_one_tick(driver: Driver) -> None:
     driver.pause(True)
     refused = driver.trigger("step")
     assert not refused.success
-    assert refused.message == "refused: the planner has not answered the present tick yet"
+    assert refused.message == "refused: the present tick has no command yet"
     for tick in range(1, 4):
         driver.command(twist(0.1))
         driver.graph.settle()

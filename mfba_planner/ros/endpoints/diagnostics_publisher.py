@@ -40,7 +40,7 @@ class DiagnosticsPublisher:
         return not 0 <= self._last_ns <= stamp_ns < self._last_ns + self._period_ns
 
     def publish(self, statuses: list[Status], now_s: float, *, changed: bool) -> None:
-        """Publish if a period has passed, a level has changed, or the caller says changed."""
+        """Publish if a period has passed, a level has changed, or `changed` is True."""
         summary = [status.summary for status in statuses]
         if changed or summary != self._last_summary or self.is_due(now_s):
             self._last_summary, self._last_ns = summary, self._stamp(now_s)

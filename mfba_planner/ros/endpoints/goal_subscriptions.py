@@ -83,6 +83,6 @@ class GoalSubscriptions:
     def _on_cancel(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         goal = self.goal_queue.cancel()
         response.success = goal is not None
-        response.message = f"no longer on the way to {goal}" if goal else "there was no goal"
+        response.message = f"no longer driving to {goal}" if goal else "there was no goal"
         self._log(f"cancel: {response.message}")
         return response

@@ -104,7 +104,7 @@ def declare_radii(node: Node, default: list[float]) -> list[float]:
     """Declare obstacle_radii_m, the one parameter that is a list; ConfigError if unusable."""
     name = "obstacle_radii_m"
     descriptor = ParameterDescriptor(
-        description="radius per obstacle, in the order of obstacles; one stands for all [m]",
+        description="radius per obstacle, as obstacles lists them; a single one holds for all [m]",
         read_only=True,
     )
     try:

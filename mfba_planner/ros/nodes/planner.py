@@ -96,7 +96,7 @@ class PlannerNode(ManagedNode):
         return arrived or self.path_planner.phase is Phase.GIVEN_UP
 
     def _on_time_set_back(self) -> None:
-        self.get_logger().warning("time was set back: starting afresh")
+        self.get_logger().warning("time was set back: reset")
         self._reset()
 
     def _on_timer(self) -> None:

@@ -111,8 +111,8 @@ class WorldSim(GraphNode):
             if control.may_advance() and fleet.have_subscribers and not self.missing():
                 self._publish_tick()
         elif control.must_repeat(time.monotonic(), fleet.tick):
-            by = f" by {robots}" if (robots := fleet.without_command()) else ""
-            self.get_logger().warning(f"tick {fleet.tick} unanswered{by}: published again")
+            of = f" of {robots}" if (robots := fleet.without_command()) else ""
+            self.get_logger().warning(f"tick {fleet.tick}: no command{of}; published again")
             fleet.repeat_tick(self.stamp_ns)
 
     def _on_initialpose(self, message: PoseWithCovarianceStamped) -> None:

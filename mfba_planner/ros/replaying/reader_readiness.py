@@ -60,7 +60,7 @@ class _ReadyCall:
                 return "it does not run"
             self._future = self._client.call_async(Trigger.Request())
         if not self._future.done():
-            return "it does not answer"
+            return "it does not respond"
         response = self._future.result()
         if not response.success:
             self._future = None

@@ -89,7 +89,7 @@ def parse(args: list[str]) -> ReplaySettings:
     """Settings from a command line without ROS arguments. Raises ConfigError."""
     parser = Parser(
         prog="replay",
-        description="Play a bag: a directory or a .mcap file, ours or rosbag2's.",
+        description="Play a bag: a directory or a .mcap file of this package or of rosbag2.",
         epilog=_EPILOG,
     )
     parser.add_argument("bag", metavar="BAG", help="bag directory or .mcap file")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keep receiving before the end: messages may be on their way, and senders may be far ahead."""
+"""Keep receiving before the end: messages may be in transit, and senders may be far ahead."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class TickControl:
         if not self.paused:
             return "refused: not paused; pause first"
         if self.is_open:
-            return "refused: the planner has not answered the present tick yet"
+            return "refused: the present tick has no command yet"
         return ""
 
     def must_repeat(self, now_s: float, tick: int) -> bool:
