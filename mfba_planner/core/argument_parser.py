@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""argparse with our manners: a mistake is one ConfigError, and names the nearest option."""
+"""The command line parser: argparse, but a mistake raises a one-line ConfigError."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from .options import did_you_mean
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that raises ConfigError, in one line, instead of printing its usage and 2."""
+    """A parser that raises a one-line ConfigError instead of printing its usage and exiting."""
 
     def __init__(self, **kwargs: Any) -> None:
-        """Take argparse's keywords; abbreviations are off: they would hide typing errors."""
+        """Take argparse's keywords; abbreviations are off, as they would hide typing errors."""
         super().__init__(
             allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs
         )
 
     def add_bag(self, name: str = "bag") -> None:
-        """A bag to read: outputs.bag_in finds it in a run directory."""
+        """Add the argument for a bag to read; outputs.bag_in finds it in a run directory."""
         self.add_argument(name, type=Path, metavar="BAG", help="run or bag directory, or .mcap")
 
     def add_robots(self) -> None:
-        """Which robots of a fleet's bag are meant; recording.robots.chosen finds them."""
+        """Add --robot, which selects robots of a fleet's bag."""
         self.add_argument(
             "--robot",
             dest="robots",
@@ -37,18 +37,18 @@ class Parser(argparse.ArgumentParser):
         )
 
     def parse(self, args: Sequence[str]) -> argparse.Namespace:
-        """Parse all of args; ConfigError for whatever is unknown, missing or refused."""
+        """Parse all of args; ConfigError for an argument that is unknown, missing or refused."""
         found, unknown = self.parse_known_args(args)
         if unknown:
             known = [name for name in self._option_string_actions if name.startswith("--")]
             word = unknown[0].partition("=")[0]
-            hint = did_you_mean(word, known) if word.startswith("-") else self._see()
+            hint = did_you_mean(word, known) if word.startswith("-") else self._help_hint()
             raise ConfigError(f"{unknown[0]}: unknown argument; {hint}")
         return found
 
     def error(self, message: str) -> NoReturn:
         """Raise ConfigError."""
-        raise ConfigError(f"{message.removeprefix('argument ')}; {self._see()}")
+        raise ConfigError(f"{message.removeprefix('argument ')}; {self._help_hint()}")
 
-    def _see(self) -> str:
+    def _help_hint(self) -> str:
         return f"see `{self.prog} --help`"

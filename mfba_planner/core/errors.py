@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The errors a user can cause; each message is one line: value, reason, remedy."""
+"""The errors that a user can cause. Each message is one line: value, reason, remedy."""
 
 
 class MfbaError(Exception):
-    """Anything the user can mend; entry_points.py turns it into one line and exit code 1."""
+    """An error the user can fix; entry_points.py prints it as one line and exits with code 1."""
 
 
 class ConfigError(MfbaError):
@@ -11,24 +11,24 @@ class ConfigError(MfbaError):
 
 
 class InputError(MfbaError):
-    """A message or measurement that cannot be used (NaN, wrong size, out of order)."""
+    """A message or measurement that cannot be used (NaN, wrong size, stamps not rising)."""
 
 
 class FrameError(InputError):
-    """A message in another frame than the one that was agreed on."""
+    """A message in another frame than the expected one."""
 
 
 class StampError(InputError):
-    """A stamp that was answered before, or goes back."""
+    """A stamp that repeats or goes back."""
 
 
 class BagError(MfbaError):
-    """A recording that cannot be read as what it claims to be."""
+    """A recording that cannot be read."""
 
 
 class OutputError(MfbaError):
-    """A place that cannot be written to, or must not be overwritten."""
+    """A path that cannot be written to, or must not be overwritten."""
 
 
 class GraphError(MfbaError):
-    """The running graph failed: a node died, or an answer never came."""
+    """The running ROS graph failed: a node ended, or a response did not arrive in time."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Angles and distances in the plane; the one home of angle arithmetic."""
+"""Plane geometry: poses, angles, yaw and quaternion, distances, tangents and rays to circles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Pose2D(NamedTuple):
 
 
 def wrap_angle(angle_rad: float) -> float:
-    """Bring an angle into (-pi, pi]."""
+    """The same angle in (-pi, pi]."""
     wrapped = math.remainder(angle_rad, 2.0 * math.pi)
     return math.pi if wrapped == -math.pi else wrapped
 
@@ -34,13 +34,13 @@ def half_turn(yaw_rad: float) -> Point:
 
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float:
-    """Yaw of a quaternion that need not be a unit one, but must not be 0."""
+    """Yaw of a quaternion that must not be 0, but need not be normalized."""
     norm = x * x + y * y + z * z + w * w
     return math.atan2(2.0 * (w * z + x * y) / norm, 1.0 - 2.0 * (y * y + z * z) / norm)
 
 
 def carried(pose: Pose2D) -> Pose2D:
-    """The pose as a message carries it, yaw as a quaternion: not the last bit is the same."""
+    """The pose after yaw -> quaternion -> yaw, as in a message: the last bit may differ."""
     return Pose2D(pose.x, pose.y, yaw_of(0.0, 0.0, *half_turn(pose.yaw))) if pose.yaw else pose
 
 
@@ -56,15 +56,14 @@ def bearing(a: Point, b: Point) -> float:
 
 
 def towards(a: Point, heading_rad: float, length_m: float) -> Point:
-    """The point length_m from a along a heading."""
+    """The point at length_m from a along the heading."""
     return (a[0] + length_m * math.cos(heading_rad), a[1] + length_m * math.sin(heading_rad))
 
 
 def tangent_half_angle(distance_m: float, radius_m: float) -> float:
     """Half the angle between the two tangents from a point to a circle (Fig. 5).
 
-    On or inside the circle there are no tangents: the limit, pi/2, is returned (every
-    direction that leads further in).
+    On or inside the circle there are no tangents; the limit pi/2 is returned.
     """
     if distance_m <= radius_m:
         return math.pi / 2.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options with a unit, a range and a sentence: declared, checked and documented from here."""
+"""Options as dataclass fields with type, range, unit and help text; checking and overriding."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Scalar = bool | int | float | str
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spec:
-    """What a value may be: a sentence, a unit and an inclusive range."""
+    """Help text, unit and inclusive range of an option."""
 
     doc: str
     unit: str = ""
@@ -40,7 +40,7 @@ def option(
 
 
 def check(instance: Any) -> None:
-    """Hold every option of a dataclass against its Spec; call it from __post_init__.
+    """Check every option of a dataclass against its Spec; call it from __post_init__.
 
     Integers given for a float become floats and names given for an Enum become members.
     Raises ConfigError naming the option, the value and the remedy.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where results go: whole or not at all, and never over what is there."""
+"""Writing results: atomic, never overwriting; run directories and the bags in them."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from .errors import OutputError
 
 
 def new_run_directory(root: Path = Path("runs"), stem: str = "run") -> Path:
-    """Name (not make) a directory below root that is not there yet: run-001, run-002, ..."""
+    """A directory name below root that is not in use, not created: run-001, run-002, ..."""
     ends = [p.name[len(stem) + 1 :] for p in root.glob(f"{stem}-*")]
     taken = [int(end) for end in ends if end.isdigit()]
     return root / f"{stem}-{max(taken, default=0) + 1:03d}"
 
 
 def refuse_existing(path: Path) -> Path:
-    """Return path, or raise OutputError if something is there."""
+    """Return path, or raise OutputError if it exists."""
     if path.exists() or path.is_symlink():
         raise OutputError(f"{path}: exists and is never overwritten; choose another --out")
     return path
 
 
 def bag_in(path: Path) -> Path:
-    """The bag of a run directory; anything else is taken for a bag itself."""
+    """The bag of a run directory; any other path is returned as the bag itself."""
     bag = path / "bag"
     return bag if bag.is_dir() and not any(path.glob("*.mcap")) else path
 
@@ -40,17 +40,16 @@ def write_new(path: Path, data: bytes) -> None:
 
 
 def write_same(path: Path, data: bytes) -> None:
-    """Write a file, unless it is there and holds just that; OutputError as new_file."""
+    """Write a file, unless it exists with exactly this content; OutputError as new_file."""
     if not (path.is_file() and path.read_bytes() == data):
         write_new(path, data)
 
 
 @contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that must not exist yet; it gets its name when all has been written.
+    """Open a file that must not exist yet; it gets its name after all has been written.
 
-    Raises OutputError when path exists or cannot be written; nothing is left behind then, nor
-    after any other error.
+    Raises OutputError when path exists or cannot be written. No file remains after any error.
     """
     if os.path.lexists(path):
         raise _exists(path)

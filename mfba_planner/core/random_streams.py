@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random streams: children of one seed, named by what they are for and by when."""
+"""Random streams of decisions: children of one seed, keyed by purpose and stamp."""
 
 from __future__ import annotations
 
 import numpy as np
 
 PLANNER_STREAM = 1  # spawn key of the planner's SeedSequence child; one number per purpose
-_WORD = 2**32  # what fits into a word of SeedSequence is below
+_WORD = 2**32  # numbers below it fit into one word of SeedSequence
 
 
 def stream(seed: int, stamp_ns: int) -> np.random.Generator:
-    """The random stream of one decision: a child of the seed named by purpose and stamp.
+    """The random stream of one decision: a child of the seed, keyed by purpose and stamp.
 
-    It is that of SeedSequence(seed, spawn_key=(PLANNER_STREAM, stamp_ns)), given the 32-bit words
-    that SeedSequence makes of these, in half the time.
+    It equals SeedSequence(seed, spawn_key=(PLANNER_STREAM, stamp_ns)). Passing the 32-bit words
+    that SeedSequence derives from these takes half the time.
     """
     high, low = divmod(stamp_ns, _WORD)
     if 0 <= seed < _WORD and 0 < high < _WORD:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the shipped files lie: config/, launch/ and layout/, installed or in a checkout."""
+"""Paths of the shipped files (config/, launch/, layout/), installed or in a checkout."""
 
 from functools import cache
 from pathlib import Path
@@ -11,22 +11,22 @@ from mfba_planner.core.errors import InputError
 def share_dir() -> Path:
     """Return the folder that holds config/; InputError when the installation lacks it.
 
-    The nearest one above this package counts: PREFIX/share/mfba_planner after pip or colcon,
-    the checkout itself in a source tree, an editable install or a symlink install.
+    It is the nearest one above this package: PREFIX/share/mfba_planner after pip or colcon, the
+    checkout in a source tree, an editable install or a symlink install.
     """
-    here = Path(__file__).absolute()
-    for above in (*here.parents, *here.resolve().parents):
+    file = Path(__file__).absolute()
+    for above in (*file.parents, *file.resolve().parents):
         for candidate in (above / "share" / "mfba_planner", above):
             if (candidate / "package.xml").is_file() and (candidate / "config").is_dir():
                 return candidate
     raise InputError(
-        f"{here.parent}: no share/mfba_planner above it, so no config/; "
+        f"{file.parent}: no share/mfba_planner above it, so no config/; "
         "install with pip or colcon, or run from a checkout"
     )
 
 
 def config_path(name: str) -> Path:
-    """Return a file below config/, such as 'planner.yaml'; InputError when it is not there."""
+    """Return a file below config/, such as 'planner.yaml'; InputError when it is missing."""
     path = share_dir() / "config" / name
     if not path.is_file():
         raise InputError(f"{name}: not a shipped file; see {path.parent}")

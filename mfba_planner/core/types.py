@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rooms hand to each other: scan, circle, observation, decision; the planner interface."""
+"""Shared types: Scan, Circle, Mode, Observation, Decision, and the PathPlanner interface."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import numpy as np
 from .geometry import Point, Pose2D
 
 NANO = 1e-9  # seconds in a nanosecond
-ROBOT_RADIUS_M = 0.3  # of a robot of which nothing else is known
+ROBOT_RADIUS_M = 0.3  # default
 Bits = tuple[int, ...]
 Ranges = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scan:
-    """A planar laser scan: beam k looks along angle_min_rad + k * angle_increment_rad."""
+    """A planar laser scan: beam k points along angle_min_rad + k * angle_increment_rad."""
 
     ranges_m: np.ndarray
     angle_min_rad: float
@@ -41,7 +41,7 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Circle:
-    """An obstacle as a planner may know it, enlarged by the robot: m and m/s in the odom frame."""
+    """An obstacle enlarged by the robot's radius, with its velocity, in the odom frame."""
 
     center_m: Point
     radius_m: float
@@ -50,11 +50,12 @@ class Circle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
-    """What the planner knows at one tick; now_ns - stamp_ns is the age of the inputs.
+    """The planner's inputs at one tick; now_ns - stamp_ns is their age.
 
-    The paper's planner reads the sectors alone. circles (what is within SR) and scan (real
-    surfaces, in a frame aligned with odom) are for planners that want more than bits; where
-    they are older than the pose, sensed says since when and from where.
+    The paper's planner reads only the sectors (ranges_m). Other planners may use circles (within
+    SR) or scan (obstacle surfaces, in a frame aligned with odom). If these are older than the
+    pose, sensed is their stamp and the pose at that stamp. refused is the reason for refusing
+    the inputs, "" if they are valid.
     """
 
     stamp_ns: int
@@ -68,7 +69,7 @@ class Observation:
     sensed: tuple[int, Pose2D] | None = None
 
 
-Refused = str  # an input that was refused travels as its reason
+Refused = str  # the reason why an input was refused, in place of the input
 
 
 def observe(
@@ -79,7 +80,7 @@ def observe(
     last_pose: Pose2D,
     age_ns: int = 0,
 ) -> Observation:
-    """Join what was read into an Observation; last_pose stands in for a pose that was refused."""
+    """Build an Observation from pose and ranges; last_pose replaces a pose that was refused."""
     refused = ""
     if isinstance(ranges_m, str):
         refused, ranges_m = ranges_m, ()
@@ -97,7 +98,7 @@ def observe(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """One answer of the planner and why; gap counts from 1, 0 is none; lengths in metres."""
+    """One decision and its reason; gap counts from 1, 0 means none; lengths in metres."""
 
     stamp_ns: int
     mode: Mode
@@ -114,8 +115,8 @@ class Decision:
 
 
 class PathPlanner(Protocol):
-    """What may drive the robot: one Observation in, one Decision out; it may remember."""
+    """Interface of every planner: Observation in, Decision out; it may keep state."""
 
     def plan(self, obs: Observation) -> Decision:
-        """Answer one observation; called once per tick, stamps rising."""
+        """Decide on one observation; called once per tick, with rising stamps."""
         ...

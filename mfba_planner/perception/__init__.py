@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From raw readings to what a planner knows: sensory vector (eq. 11), tracker, memory."""
+"""From sensor data to planner inputs: sensory vector (eq. 11), obstacle tracker and memory."""

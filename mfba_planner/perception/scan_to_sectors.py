@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sensory vector from any laser scan (eq. 11): each return is enlarged by the robot."""
+"""Sector ranges from a laser scan, for the sensory vector (eq. 11)."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ from .sensory_vector import SensorParams, mark_sectors, single_precision
 
 
 def aligned(scan: Scan, yaw_rad: float) -> Scan:
-    """The scan in a frame that its own is turned against by yaw_rad."""
+    """The scan in a frame in which the scan's own frame has the yaw yaw_rad."""
     return replace(scan, angle_min_rad=scan.angle_min_rad + yaw_rad)
 
 
 def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: SensorParams) -> Ranges:
-    """Range per sector from any laser scan; every return is a point enlarged by the robot.
+    """Range per sector from a laser scan; every return is a point enlarged by the robot.
 
-    yaw_rad turns the scan's frame into the sectors' frame. As in REP-117, +inf is free space,
-    -inf an obstacle nearer than range_min (taken at range_min), NaN and values outside
-    [range_min, range_max] are no measurement and are passed over. Raises InputError for a
-    scan without a single usable beam or with unusable geometry: blind is not free. A sector
-    that no beam looks into is free all the same: the scan knows nothing of it.
+    yaw_rad is the yaw of the scan's frame in the sectors' frame. As in REP-117, +inf is free
+    space and -inf an obstacle nearer than range_min (taken at range_min); NaN and values outside
+    [range_min, range_max] are ignored. A sector without a beam counts as free. Raises InputError
+    for a scan without any usable beam or with unusable geometry: it must not count as free.
     """
     geometry = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m, yaw_rad)
     if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sensory vector Vs: tangent spans of enlarged circles on sectors (eq. 11, Fig. 4, 5)."""
+"""The sensory vector Vs (eq. 11) and sector ranges from enlarged circles (Fig. 4, 5)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..core.options import check, option
 from ..core.types import Bits, Ranges
 
 TWO_PI = 2.0 * math.pi
-FARTHER = 1.0 + 1e-9  # times a distance: beyond it whatever the rounding
+FARTHER = 1.0 + 1e-9  # factor of a distance: surely beyond it in spite of rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,20 +36,20 @@ def sensory_vector(ranges_m: Iterable[float]) -> Bits:
     """Vs of eq. 11: a(i) = 0 where sector i is free (+inf), 1 for any other range."""
     ranges = tuple(ranges_m)
     if ranges.count(math.inf) == len(ranges):
-        return (0,) * len(ranges)  # most of the time
+        return (0,) * len(ranges)  # the usual case
     return tuple([0 if r == math.inf else 1 for r in ranges])
 
 
 def blind(sector: int, range_m: float) -> str:
-    """Why sectors with this range are refused; sectors are counted from 1."""
+    """The reason for refusing sectors with this range; sectors count from 1."""
     return f"sector {sector} holds {range_m}; the sensor was blind"
 
 
 def longest_range_m(params: SensorParams, enlarged_radius_m: float) -> float:
     """Largest finite range a sector can report: along the tangent of a circle at SR.
 
-    A circle whose near edge is SR away also sets the sectors its tangents reach into, where
-    it is further than SR.
+    A circle whose near edge is SR away also sets the sectors that its tangents reach, where it
+    is farther than SR.
     """
     centre = params.sensing_range_m + enlarged_radius_m
     return math.sqrt(centre * centre - enlarged_radius_m * enlarged_radius_m)
@@ -62,9 +62,9 @@ def sense_circles(
 
     Sector i (from 1) covers [i-1, i) times 2 pi / n, counter-clockwise from +x. A sector is
     set when the tangent span of a circle in range touches it. circles holds (centre,
-    enlarged radius) in metres. The ranges are rounded to what a LaserScan message can carry,
-    so that a planner decides the same with and without messages between. Fig. 4, 5.
-    Raises InputError for a position or circle that is not finite: NaN is not free.
+    enlarged radius) in metres. The ranges are rounded to the float32 of a LaserScan message, so
+    that decisions are the same with and without messages. Fig. 4, 5.
+    Raises InputError for a position or circle that is not finite: NaN must not count as free.
     """
     ranges = [math.inf] * params.sectors
     px, py = position
@@ -73,7 +73,7 @@ def sense_circles(
         dx, dy = cx - px, cy - py
         square, far = dx * dx + dy * dy, (radius + reach) * FARTHER
         if far * far < square < math.inf:
-            continue  # most are: spares them the square root, and decides nothing at the edge
+            continue  # surely out of range, as most are: saves the square root
         d = math.sqrt(square)
         if not math.isfinite(d - radius):
             raise InputError(
@@ -88,7 +88,7 @@ def sense_circles(
 def single_precision(ranges: Sequence[float]) -> Ranges:
     """Round to float32 and back, as a message does."""
     if ranges.count(math.inf) == len(ranges):
-        return tuple(ranges)  # most of the time: nothing to round
+        return tuple(ranges)  # the usual case: nothing to round
     return tuple(np.asarray(ranges, dtype=np.float32).tolist())
 
 
@@ -102,7 +102,7 @@ def mark_sectors(ranges: list[float], d: float, radius: float, direction: float)
     for sector in range(first, last + 1):
         nearest = min(max(direction, sector * width), (sector + 1) * width)
         r = ray_circle_distance(d, radius, nearest - direction)
-        if not math.isfinite(r):  # a tangent that only touches: rounding put it just outside
+        if not math.isfinite(r):  # a tangent: rounding put it just outside the circle
             r = math.sqrt(d * d - radius * radius)
         index = sector % n
         if r < ranges[index]:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planners: Algorithm 1 (eq. 12, 13) and the predictive one; peers/ holds others to compare."""
+"""Planners: Algorithm 1 (eq. 12, 13) and the predictive planner; peers/: for comparison."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Algorithm 1: switch between path generation (bats) and obstacle avoidance (gap vector)."""
+"""Algorithm 1, the paper's planner: path generation (bats), obstacle avoidance (gap vector)."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from ..perception.sensory_vector import sensory_vector
 from ..swarm.bat_swarm import BatSwarm, Disc, Vector
 from .gap_vector import gap_heading, gap_vector, nearest_free_gap
 from .mode_transitions import Event, transition
-from .odometry_jump import OdometryJump, with_jump_reason
-from .path_generation import Start, Step, generate_step, generate_steps
+from .odometry_jump import OdometryJump, with_odometry_jump
+from .path_generation import GoalStep, StepInput, generate_step, generate_steps
 from .planner_params import PlannerParams, Swarm
 from .stop_conditions import reason_to_stop
 
-FEW = 8  # bats of so few planners are no quicker at once
+MIN_BATCH = 8  # planners; fewer are faster one by one
 
 
-Generate = Callable[[Point, Point], Step]
+Generate = Callable[[Point, Point], GoalStep]
 
 
 def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Generate) -> Decision:
-    """One turn of Algorithm 1's loop: a pure function of its arguments.
+    """One iteration of Algorithm 1's loop: a pure function of its arguments.
 
-    generate(position, goal) returns the bats' next point and all their candidates; it is
-    called in path generation only. Standing still is the answer to everything that is not
-    path generation or obstacle avoidance, input that is not finite included.
+    generate(position, goal) returns the bats' next point and all their candidates; it is called
+    in path generation only. In every other mode but obstacle avoidance the robot stops, also for
+    input that is not finite.
     """
     vs = sensory_vector(obs.ranges_m)
     vg = gap_vector(vs)
@@ -69,10 +69,10 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
 
 
 def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tuple[Event, str, int]:
-    """Reduce an observation to one event, its reason and the chosen gap (0 when none)."""
-    standing = reason_to_stop(obs, params)
-    if standing:
-        return *standing, 0
+    """The event of an observation, its reason and the chosen gap (0 for none)."""
+    stop = reason_to_stop(obs, params)
+    if stop:
+        return *stop, 0
     assert obs.goal is not None
     position = obs.pose.position
     if not any(vs):
@@ -85,10 +85,10 @@ def _assess(obs: Observation, vs: Bits, vg: Bits, params: PlannerParams) -> tupl
 
 
 class Algorithm1:
-    """Algorithm 1 with its memory: the mode, and the swarm where a reading keeps one.
+    """Algorithm 1 with its state: the mode, and the swarm if Swarm.PERSISTENT.
 
-    The random stream of a decision depends on (seed, stamp) only, so a planner that is
-    restarted, or fed from a recording, decides as the first one did (fresh swarms).
+    The random stream of a decision depends on (seed, stamp) only. So with Swarm.FRESH a planner
+    that is restarted, or reads a recording, makes the same decisions.
     """
 
     def __init__(self, params: PlannerParams, seed: int) -> None:
@@ -101,17 +101,17 @@ class Algorithm1:
         self._goal: Point | None = None
         self._swarm: BatSwarm | None = None
         self._stamp_ns = 0
-        self._watch = OdometryJump()
-        self._generated_step: tuple[tuple[Start, PlannerParams], Step] | None = None
+        self._odometry_jump = OdometryJump()
+        self._generated_step: tuple[tuple[StepInput, PlannerParams], GoalStep] | None = None
 
     def reset(self) -> None:
-        """Forget everything but parameters and seed (a jump of time, a new trip)."""
+        """Drop all state but parameters and seed (after a clock reset, before a new trip)."""
         self.mode, self._goal, self._swarm = Mode.IDLE, None, None
 
     def plan(self, obs: Observation) -> Decision:
-        """Answer one observation and remember the mode; who was carried off begins anew."""
-        carried = self._watch.detect(obs, self.params, self.mode)
-        if carried:
+        """Decide on one observation and update the mode; after an odometry jump, reset first."""
+        odometry_jump_reason = self._odometry_jump.detect(obs, self.params, self.mode)
+        if odometry_jump_reason:
             self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
@@ -119,36 +119,38 @@ class Algorithm1:
         self._stamp_ns = obs.stamp_ns
         decision = decide(obs, self.mode, self.params, self._generate)
         self.mode = decision.mode
-        return with_jump_reason(decision, carried)
+        return with_odometry_jump(decision, odometry_jump_reason)
 
-    def _generate(self, position: Point, goal: Point) -> Step:
+    def _generate(self, position: Point, goal: Point) -> GoalStep:
         params = self.params
         if params.swarm is Swarm.PERSISTENT:
             return self._continue_swarm(position, goal)
-        start = Start(position, goal, self.seed, self._stamp_ns)
-        foreseen, self._generated_step = self._generated_step, None
-        if foreseen is not None and foreseen[0] == (start, params):
-            return foreseen[1]
-        return generate_step(start, params.step_length_m, params.bat)
+        step_input = StepInput(position, goal, self.seed, self._stamp_ns)
+        precomputed, self._generated_step = self._generated_step, None
+        if precomputed is not None and precomputed[0] == (step_input, params):
+            return precomputed[1]
+        return generate_step(step_input, params.step_length_m, params.bat)
 
-    def start(self, obs: Observation) -> Start | None:
-        """What fresh_step() will be asked for by plan(), None where it will not be."""
+    def step_input(self, obs: Observation) -> StepInput | None:
+        """The input plan() will pass to generate_step(), None if it will not call it."""
         if self.params.swarm is not Swarm.FRESH or obs.goal is None or obs.refused:
             return None
         if any(sensory_vector(obs.ranges_m)):
             return None
-        return Start(obs.pose.position, obs.goal, self.seed, obs.stamp_ns)
+        return StepInput(obs.pose.position, obs.goal, self.seed, obs.stamp_ns)
 
-    def accept_generated_step(self, start: Start, params: PlannerParams, step: Step) -> None:
-        """Take what fresh_steps() found; plan() uses it if it is just what it would ask for."""
-        self._generated_step = (start, params), step
+    def accept_generated_step(
+        self, step_input: StepInput, params: PlannerParams, step: GoalStep
+    ) -> None:
+        """Store a result of generate_steps(); plan() uses it if its own input is the same."""
+        self._generated_step = (step_input, params), step
 
-    def _continue_swarm(self, position: Point, goal: Point) -> Step:
-        """Fig. 1 read literally: bat.iterations per robot step, within the robot's reach.
+    def _continue_swarm(self, position: Point, goal: Point) -> GoalStep:
+        """Fig. 1 read literally: one swarm for the trip, bat.iterations per goal step.
 
-        The bats stay where they are in the world, but are drawn into the disc of one step
-        around the robot, as is the best point they ever saw; the robot goes to that point.
-        T of eq. 10 spans the trip: all iterations of the straight way from here to the goal.
+        The bats keep their positions in the world, but they and their best point are clamped into
+        the disc of one goal step around the robot. The robot moves to the best point. T of eq. 10
+        is the number of all iterations on the straight line from the first position to the goal.
         """
         reach = self.params.step_length_m
         if distance(position, goal) <= reach:
@@ -173,17 +175,17 @@ class Algorithm1:
 def generate_paths_together(
     planners: Sequence[Algorithm1], observations: Sequence[Observation]
 ) -> None:
-    """Let the bats of all that are about to generate a path fly at once, before they plan().
+    """Compute the next path generation step of many planners at once, before their plan().
 
-    Their decisions stay the same to the last bit. Who has other params than the first flies
-    alone later, as do few: arrays cost more than they spare then.
+    Their decisions stay the same bit by bit. A planner whose params differ from the first one's
+    computes its step itself in plan(), as do fewer than MIN_BATCH planners.
     """
-    about = [(planner, planner.start(obs)) for planner, obs in zip(planners, observations)]
-    starting = [(planner, start) for planner, start in about if start is not None]
-    if len(starting) < FEW:
+    inputs = [(planner, planner.step_input(obs)) for planner, obs in zip(planners, observations)]
+    batch = [(planner, step_input) for planner, step_input in inputs if step_input is not None]
+    if len(batch) < MIN_BATCH:
         return
-    params = starting[0][0].params
-    starts = [start for _, start in starting]
-    steps = generate_steps(starts, params.step_length_m, params.bat)
-    for (planner, start), step in zip(starting, steps):
-        planner.accept_generated_step(start, params, step)
+    params = batch[0][0].params
+    step_inputs = [step_input for _, step_input in batch]
+    steps = generate_steps(step_inputs, params.step_length_m, params.bat)
+    for (planner, step_input), step in zip(batch, steps):
+        planner.accept_generated_step(step_input, params, step)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every planner but the paper's has in common: a new one only says how to move."""
+"""Base class of all planners but the paper's: stop conditions, modes, Decision; Move."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..core.geometry import Point
 from ..core.types import NANO, Bits, Decision, Mode, Observation
 from ..perception.sensory_vector import SensorParams
 from .mode_transitions import Event, transition
-from .odometry_jump import OdometryJump, with_jump_reason
+from .odometry_jump import OdometryJump, with_odometry_jump
 from .planner_params import PlannerParams
 from .stop_conditions import reason_to_stop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Move:
-    """How to move during the next tick (m/s in the odom frame) and why.
+    """The velocity during the next tick (m/s in the odom frame) and its reason.
 
-    The rest is for the record: bits and gaps where the planner has any (gap counts from 1),
-    the waypoint where it is not what the velocity leads to, and the points it weighed.
+    The rest is only recorded: bits and gap if the planner has any (gap counts from 1), the
+    waypoint (default: the position after the next tick), and the candidate points.
     """
 
     velocity: Point
@@ -35,11 +35,11 @@ class Move:
 
 
 class BasePlanner:
-    """A planner that moves by move() and stands still for the reasons the paper's does.
+    """A planner that calls move() unless a stop condition of the paper's planner holds.
 
-    Subclasses define move(), and where they remember anything forget(), which is called
-    before the first observation and by reset(). Who never reads ranges_m where circles or a scan
-    are given sets reads_sectors to False: sweeps then spare themselves what sectors cost.
+    Subclasses define move(), and forget() if they keep state; forget() is called before the
+    first observation and by reset(). A subclass that never reads ranges_m when circles or a scan
+    are given sets reads_sectors to False; sweeps then do not compute sectors.
     """
 
     reads_sectors = True
@@ -51,49 +51,49 @@ class BasePlanner:
         self.params = params
         self.sensor = sensor
         self.seed = seed
-        self._watch = OdometryJump()
+        self._odometry_jump = OdometryJump()
         self.tick_s = params.tick_ns * NANO
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything but parameters and seed (a jump of time, a new trip)."""
+        """Drop all state but parameters and seed (after a clock reset, before a new trip)."""
         self.mode = Mode.IDLE
         self._goal: Point | None = None
         self.forget()
 
     def forget(self) -> None:
-        """Drop what a subclass remembers from tick to tick."""
+        """Drop the state of a subclass."""
 
     def move(self, obs: Observation, goal: Point) -> Move:
-        """Choose the next tick's velocity; the inputs are sound and the goal is not reached."""
+        """Choose the next tick's velocity; the inputs are valid and the goal is not reached."""
         raise NotImplementedError
 
     def plan(self, obs: Observation) -> Decision:
-        """Answer one observation and remember the mode; who was carried off begins anew."""
-        carried = self._watch.detect(obs, self.params, self.mode)
-        if carried:
+        """Decide on one observation and update the mode; after an odometry jump, reset first."""
+        odometry_jump_reason = self._odometry_jump.detect(obs, self.params, self.mode)
+        if odometry_jump_reason:
             self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
             self._goal = obs.goal
-        standing = reason_to_stop(obs, self.params, sectors=False)
-        if standing is None and self.mode is not Mode.ARRIVED:
+        stop = reason_to_stop(obs, self.params, sectors=False)
+        if stop is None and self.mode is not Mode.ARRIVED:
             assert obs.goal is not None
             move = self.move(obs, obs.goal)
         else:
-            event, reason = standing or (Event.CLEAR, "on the way")
+            event, reason = stop or (Event.CLEAR, "on the way")
             if self.mode is Mode.ARRIVED and event is not Event.AT_GOAL:
                 reason = f"goal was reached before; {reason}"
             move = Move(velocity=(0.0, 0.0), reason=reason, event=event)
         self.mode = transition(self.mode, move.event)
-        return with_jump_reason(self._decision(obs, move), carried)
+        return with_odometry_jump(self._decision(obs, move), odometry_jump_reason)
 
     def straight(self, position: Point, target: Point, speed_mps: float) -> Point:
-        """The velocity that leads to the target at most at this speed, and not beyond it."""
+        """Velocity towards the target, at most speed_mps, and not beyond the target in a tick."""
         dx, dy = target[0] - position[0], target[1] - position[1]
-        left = math.sqrt(dx * dx + dy * dy)
+        remaining_m = math.sqrt(dx * dx + dy * dy)
         reach = speed_mps * self.params.tick_ns * NANO
-        scale = 1.0 / self.tick_s if left <= reach else speed_mps / left
+        scale = 1.0 / self.tick_s if remaining_m <= reach else speed_mps / remaining_m
         return (dx * scale, dy * scale)
 
     def _decision(self, obs: Observation, move: Move) -> Decision:

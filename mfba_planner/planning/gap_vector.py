@@ -10,17 +10,17 @@ from functools import cache, lru_cache
 from ..core.geometry import wrap_angle
 from ..core.types import Bits
 
-TIE_RAD = 1e-9  # turns closer than this are equal: rounding must not choose the gap
+TIE_RAD = 1e-9  # angles closer than this count as equal: rounding must not choose the gap
 
 
 class GapHeading(Enum):
-    """Where gap i leads: along the boundary of sectors i and i+1, or the middle of sector i."""
+    """Heading of gap i: the boundary of sectors i and i+1, or the middle of sector i."""
 
     BOUNDARY = "boundary"
     MIDDLE = "middle"
 
 
-@lru_cache(maxsize=64)  # most of the time nothing is near
+@lru_cache(maxsize=64)  # most vectors are free of obstacles
 def gap_vector(vs: Bits) -> Bits:
     """Vg of Table 1: b(i) = a(i) or a(i+1); the ring wraps (Fig. 5 closes gap 12 by sector 1)."""
     return tuple([a | b for a, b in zip(vs, vs[1:] + vs[:1])])
@@ -28,8 +28,8 @@ def gap_vector(vs: Bits) -> Bits:
 
 def gap_heading(gap: int, count: int, rule: GapHeading = GapHeading.BOUNDARY) -> float:
     """Heading of gap i (from 1) in radians (Fig. 6)."""
-    place = gap if rule is GapHeading.BOUNDARY else gap - 0.5
-    return wrap_angle(2.0 * math.pi * place / count)
+    boundary = gap if rule is GapHeading.BOUNDARY else gap - 0.5
+    return wrap_angle(2.0 * math.pi * boundary / count)
 
 
 def nearest_free_gap(
@@ -37,7 +37,7 @@ def nearest_free_gap(
 ) -> int | None:
     """Number (from 1) of the free gap nearest in angle to the goal; the lower of two equals.
 
-    None when every gap is closed: the robot then holds its position (the paper is silent).
+    None when every gap is closed: the robot then stops (not specified in the paper).
     """
     best, smallest = None, math.inf
     for gap, (closed, heading) in enumerate(zip(vg, _headings(len(vg), rule)), start=1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The modes of Algorithm 1 and the events that lead from one to another."""
+"""State machine of the planner modes: events and transitions (Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..core.types import Mode
 
 
 class Event(Enum):
-    """What the planner has just learned; one event per tick."""
+    """What the observation of a tick amounts to; one event per tick."""
 
     NO_GOAL = "no_goal"
     NEW_GOAL = "new_goal"
@@ -34,9 +34,9 @@ _NEXT = {
 
 
 def transition(mode: Mode, event: Event) -> Mode:
-    """Next mode: Algorithm 1 has no memory, except that it ends on arrival.
+    """Next mode. It depends on the event only, except that ARRIVED is final.
 
-    Once ARRIVED, only a new (or withdrawn) goal leads out: the while loop is over.
+    Only a new or a withdrawn goal ends ARRIVED: there the paper's while loop is over.
     """
     if mode is Mode.ARRIVED and event not in (Event.NEW_GOAL, Event.NO_GOAL):
         return Mode.ARRIVED

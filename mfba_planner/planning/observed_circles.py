@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is around, for planners that do not care whether circles or beams told it."""
+"""Obstacles around the robot as an array, from known circles or from a scan."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 from ..core.types import ROBOT_RADIUS_M, Observation
 
 
-def discs(obs: Observation) -> np.ndarray:
+def circle_rows(obs: Observation) -> np.ndarray:
     """Rows (x, y, vx, vy, radius) around the robot, enlarged by it; (n, 5), n may be 0.
 
-    Known circles as they are; otherwise each return of the scan, in a frame aligned with odom,
-    as a point that stands still, enlarged by the default robot radius.
+    Known circles if given; otherwise each return of the scan, in a frame aligned with odom, as a
+    point at rest enlarged by the default robot radius.
     """
     px, py = obs.pose.position
     if obs.circles is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kidnapped robot: odometry that moved farther than the robot can have driven."""
+"""Odometry jumps: the pose moved farther than the robot can have driven (kidnapped robot)."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ CARRIED_OFF = "carried off"
 
 
 class OdometryJump:
-    """Compares each pose with the one before it."""
+    """Compares each pose with the previous one."""
 
     def __init__(self) -> None:
-        """Start before the first pose."""
+        """Start without a pose."""
         self._last: tuple[int, Pose2D] | None = None
 
     def detect(self, obs: Observation, params: PlannerParams, mode: Mode) -> str:
-        """Why the robot cannot have driven here, "" where it can.
+        """The reason why the robot cannot have driven to this pose, "" if it can.
 
-        Farther than its speed times the time since the last pose plus jump_m is too far. A pose
-        that was refused says nothing; stamps that go back begin anew. Who has arrived stays where
-        it is put: only a new goal makes it drive again.
+        A jump is a distance above speed times the time since the last pose plus jump_m. Refused
+        poses are ignored; a stamp that does not rise is not compared. In mode ARRIVED there is no
+        jump: only a new goal makes the robot drive again.
         """
         if obs.refused or not all(map(math.isfinite, obs.pose)):
             return ""
@@ -39,11 +39,15 @@ class OdometryJump:
         return f"{CARRIED_OFF} {moved_m:.3g} m in {took_s:.3g} s, beginning anew"
 
 
-def with_jump_reason(decision: Decision, carried: str) -> Decision:
-    """The decision, its reason preceded by how the robot came where it is."""
-    return replace(decision, reason=f"{carried}; {decision.reason}") if carried else decision
+def with_odometry_jump(decision: Decision, odometry_jump_reason: str) -> Decision:
+    """The decision with the jump's reason in front of its own; unchanged for ""."""
+    return (
+        replace(decision, reason=f"{odometry_jump_reason}; {decision.reason}")
+        if odometry_jump_reason
+        else decision
+    )
 
 
 def is_jump_reason(reason: str) -> bool:
-    """Whether a decision's reason says that the robot was carried to where it is."""
+    """Whether a decision's reason reports an odometry jump."""
     return reason.startswith(CARRIED_OFF)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The planner that the parameters name, as the nodes run it: on sectors, maybe with a scan."""
+"""Makes the planner that PlannerParams.method names; used by the planner node."""
 
 from __future__ import annotations
 
@@ -9,17 +9,15 @@ from ..perception.sensory_vector import SensorParams
 from .planner_params import Method, PlannerParams
 from .supervised_planner import SupervisedPlanner, supervised_algorithm_1
 
-DEFAULT_METHOD = (
-    Method.PREDICTIVE
-)  # of the programs and launch files: the robot that does not collide
+DEFAULT_METHOD = Method.PREDICTIVE  # of the programs and launch files, as it avoids collisions
 
 
 def params_for_method(
     method: str | None, params: PlannerParams, *, algorithm_1: bool
 ) -> PlannerParams:
-    """The given options for the method of that name, with the step and swarm it is made for.
+    """The given options for the method of that name, with its preset of step and swarm.
 
-    None: USUAL; or the paper's, where something was said that is about Algorithm 1 alone.
+    For None: DEFAULT_METHOD, or the paper's if an option of Algorithm 1 was given.
     """
     usual = Method.PAPER if algorithm_1 else DEFAULT_METHOD
     if Method(method or usual) is Method.PAPER:
@@ -32,9 +30,9 @@ def params_for_method(
 def make_planner(
     params: PlannerParams, sensor: SensorParams | None = None, seed: int = 0
 ) -> SupervisedPlanner:
-    """A fresh planner of params.method. Raises ConfigError for a negative seed."""
+    """A new planner of params.method. Raises ConfigError for a negative seed."""
     if params.method is Method.PREDICTIVE:
-        from .predictive import Predictive  # much to load, and mostly not asked for
+        from .predictive import Predictive  # slow to import, and not always needed
 
         return SupervisedPlanner(Predictive(params, sensor or SensorParams(), seed))
     return supervised_algorithm_1(params, seed)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of every planner: which one, its speed and step, the swarm, recovery."""
+"""Parameters of all planners: method, speed, goal step, swarm, speed limit, recovery."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .speed_limit import SpeedLimitParams
 
 
 class Method(Enum):
-    """Who decides on sectors: Algorithm 1, or the planner that predicts (predictive.py)."""
+    """The planner: Algorithm 1, or the predictive planner (predictive.py)."""
 
     PAPER = "paper"
     PREDICTIVE = "predictive"
 
 
 class Swarm(Enum):
-    """Fresh bats in the step's disc at every step, or one swarm that lives over the trip."""
+    """A fresh swarm at every goal step, or one persistent swarm for the trip."""
 
     FRESH = "fresh"
     PERSISTENT = "persistent"
@@ -32,17 +32,17 @@ class Swarm(Enum):
 class PlannerParams:
     """The reading `section6` of Algorithm 1 and section 6.2."""
 
-    method: Method = option(Method.PAPER, "Algorithm 1, or our planner that predicts")
+    method: Method = option(Method.PAPER, "Algorithm 1 of the paper, or our predictive planner")
     jump_m: float = option(
         0.5,
-        "odometry that moved so much farther than speed_mps allows: carried off",
+        "distance beyond what speed_mps allows that counts as an odometry jump",
         unit="m",
         minimum=0.01,
         maximum=1e6,
     )
     scan_radius_m: float = option(
         0.0,
-        "predictive: stay so far from what the scan shows, tracked; 0: decide on sectors",
+        "predictive: distance kept from tracked scan obstacles; 0: use sectors, no scan",
         unit="m",
         minimum=0.0,
         maximum=10.0,
@@ -57,8 +57,13 @@ class PlannerParams:
     input_timeout_s: float = option(
         1.0, "age at which odometry or sectors are stale", unit="s", minimum=0.001, maximum=3600.0
     )
-    gap_heading: GapHeading = option(GapHeading.BOUNDARY, "where a gap leads, in its two sectors")
-    swarm: Swarm = option(Swarm.FRESH, "fresh bats per step, or one persistent swarm (Fig. 1)")
+    gap_heading: GapHeading = option(
+        GapHeading.BOUNDARY,
+        "heading of a gap: boundary of its two sectors, or middle of the first",
+    )
+    swarm: Swarm = option(
+        Swarm.FRESH, "fresh swarm per goal step, or one persistent swarm (Fig. 1)"
+    )
     bat: BatParams = field(default_factory=BatParams)
     speed_limit: SpeedLimitParams = field(default_factory=SpeedLimitParams)
     recovery: RecoveryParams = field(default_factory=RecoveryParams)
@@ -69,7 +74,7 @@ class PlannerParams:
 
     @property
     def label(self) -> str:
-        """Who decides, for people: the law of beta in Algorithm 1, or the other method."""
+        """Name of the planner for output: ba or mfba for Algorithm 1, else the method."""
         paper = self.method is Method.PAPER
         return self.bat.algorithm.value if paper else self.method.value
 
@@ -80,5 +85,5 @@ class PlannerParams:
 
     @property
     def tracks_scan(self) -> bool:
-        """Whether it wants the scan beside the sectors."""
+        """Whether the planner uses the scan in addition to the sectors."""
         return self.method is Method.PREDICTIVE and self.scan_radius_m > 0.0

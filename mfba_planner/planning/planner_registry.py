@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planners by name; a new one is one file and one line here."""
+"""Registry of planners by name; a new planner needs one file and one line here."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def make(
     sensor: SensorParams | None = None,
     seed: int = 0,
 ) -> PathPlanner:
-    """A fresh planner: paper as params say, ba and mfba with that law of beta, and others.
+    """A new planner by name; ba and mfba are the paper's with params.bat.algorithm replaced.
 
     Raises ConfigError for an unknown name, with the nearest known one, and a negative seed.
     """
@@ -61,7 +61,7 @@ def make(
 
 
 def known(name: str) -> Factory:
-    """What makes the planner of that name. Raises ConfigError as make() does."""
+    """The factory of the planner of that name. Raises ConfigError as make() does."""
     factory = PLANNERS.get(name)
     if factory is None:
         raise ConfigError(f"planner {name!r}: unknown; {did_you_mean(name, list(PLANNERS))}")
@@ -69,9 +69,6 @@ def known(name: str) -> Factory:
 
 
 def preset_of(factory: Factory, params: PlannerParams) -> PlannerParams:
-    """The options a planner is made for, where it says so by an attribute `preset`.
-
-    That is called with the given ones and changes what it has to.
-    """
+    """The options changed by the factory's function `preset`; unchanged without one."""
     preset: Callable[[PlannerParams], PlannerParams] | None = getattr(factory, "preset", None)
     return params if preset is None else preset(params)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What to do while every gap is closed: wait, back off, replan, give up. The paper is silent."""
+"""Recovery while every gap is closed: wait, back off, replan, give up. Not in the paper."""
 
 from __future__ import annotations
 
@@ -16,23 +16,27 @@ SECOND_NS = 1e9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecoveryParams:
-    """How to get out of a blocked state; off by default, where the robot holds its position."""
+    """Parameters of the recovery; off by default: a blocked robot stops and waits."""
 
-    enabled: bool = option(False, "when every gap is closed: wait, back off, replan, give up")
+    enabled: bool = option(False, "while every gap is closed: wait, back off, replan, give up")
     wait_s: float = option(
         2.0,
-        "wait so long for a gap; free so long, it is over",
+        "waiting time for a gap; a gap open for as long ends the recovery",
         unit="s",
         minimum=0.0,
         maximum=600.0,
     )
     back_off_s: float = option(
-        1.0, "then move so long to where the most room is", unit="s", minimum=0.0, maximum=60.0
+        1.0,
+        "then move for this time to the side with the most room",
+        unit="s",
+        minimum=0.0,
+        maximum=60.0,
     )
     back_off_mps: float = option(
         0.2, "speed while backing off", unit="m/s", minimum=0.0, maximum=100.0
     )
-    attempts: int = option(3, "back off so often, then give up", minimum=0, maximum=1000)
+    attempts: int = option(3, "how often to back off before giving up", minimum=0, maximum=1000)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range."""
@@ -40,7 +44,7 @@ class RecoveryParams:
 
 
 class Phase(Enum):
-    """Where a recovery stands."""
+    """Phase of the recovery."""
 
     FREE = "free"
     WAIT = "wait"
@@ -51,7 +55,7 @@ class Phase(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recovery:
-    """The state: phase, since when its time counts, since when there is a gap, attempts made."""
+    """State: phase, start of its time, time when the last gap opened, attempts so far."""
 
     phase: Phase = Phase.FREE
     since_ns: int = 0
@@ -62,8 +66,8 @@ class Recovery:
 def advance(state: Recovery, blocked: bool, now_ns: int, params: RecoveryParams) -> Recovery:
     """Next state: a pure function, called once per tick with whether every gap is closed.
 
-    A gap that stays open for less than wait_s ends nothing: the wait goes on where it was, so
-    that a gap which flickers cannot keep a robot for ever. Only a new trip leads out of GIVEN_UP.
+    A gap open for less than wait_s does not restart the wait, so that a flickering gap cannot
+    delay giving up for ever. Only a new trip ends GIVEN_UP.
     """
     phase = state.phase
     if phase is Phase.GIVEN_UP:
@@ -88,10 +92,10 @@ def advance(state: Recovery, blocked: bool, now_ns: int, params: RecoveryParams)
 def _while_free(state: Recovery, blocked: bool, now_ns: int, params: RecoveryParams) -> Recovery:
     over = _passed(state.free_ns, now_ns, params.wait_s)
     if blocked:
-        fresh = over or not state.since_ns
-        since_ns, attempt = (now_ns, 0) if fresh else (state.since_ns, state.attempt)
+        restarted = over or not state.since_ns
+        since_ns, attempt = (now_ns, 0) if restarted else (state.since_ns, state.attempt)
         waiting = _changed(state, Phase.WAIT, since_ns, attempt=attempt)
-        return advance(waiting, True, now_ns, params)  # which may have lasted long enough
+        return advance(waiting, True, now_ns, params)  # the wait may be over already
     return Recovery() if over else state
 
 
@@ -118,19 +122,19 @@ def _passed(since_ns: int, now_ns: int, duration_s: float) -> bool:
 def longest_s(params: RecoveryParams, tick_s: float) -> float:
     """Upper bound of the time from the first closed tick to GIVEN_UP, in s.
 
-    It holds for any input that never leaves a gap open for wait_s: each attempt costs a wait, in
-    which an open gap may last almost as long again, and each phase ends with a tick.
+    It holds if no gap stays open for wait_s: each attempt includes a wait, which an open gap may
+    prolong by almost wait_s, and each phase ends at a tick.
     """
     waits, n = params.attempts + 1, params.attempts
     return waits * (2.0 * params.wait_s + 3.0 * tick_s) + n * (params.back_off_s + 2.0 * tick_s)
 
 
 def most_room(ranges_m: Ranges, preferred_rad: float) -> tuple[float, float]:
-    """(heading in rad, room in m): where a point can go farthest; of equals, nearest to preferred.
+    """(heading in rad, room in m) of the most room; of equals the one nearest to preferred_rad.
 
-    The headings are the middles of the sectors. The room is what is left to the tangent line of
-    the nearest enlarged obstacle in each sector less than a right angle off: moving on less than
-    that, the robot touches nothing that stands still. inf where nothing is seen.
+    The headings are the middles of the sectors. The room is the distance to the nearest tangent
+    line of the enlarged obstacles in all sectors less than 90 degrees off: a shorter move touches
+    no obstacle at rest. inf without obstacles.
     """
     n = len(ranges_m)
     width = 2.0 * math.pi / n

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What keeps a planner from moving: refused, stale or missing input, no goal, goal reached."""
+"""Stop conditions of every planner: refused or stale input, no goal, goal reached."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .planner_params import PlannerParams
 def reason_to_stop(
     obs: Observation, params: PlannerParams, *, sectors: bool = True
 ) -> tuple[Event, str] | None:
-    """What keeps any planner from moving, with its reason; sectors=False: it reads none."""
+    """The stop condition that holds and its reason, or None; sectors=False: sectors unused."""
     refused = obs.refused or _fault(obs, sectors)
     if refused:
         return Event.INVALID, f"refused input: {refused}"
@@ -29,12 +29,12 @@ def reason_to_stop(
 
 
 def _fault(obs: Observation, sectors: bool) -> str:
-    """What must never move a robot, "" for nothing; the last of the doors."""
+    """Why the input must not move a robot, "" if it is valid; the last check."""
     pose, goal, ranges = obs.pose, obs.goal or (0.0, 0.0), obs.ranges_m
     total, ring = sum(pose) + sum(goal), sum(ranges)
-    finite = total - total == 0.0 and ring == ring  # or a sum has overflowed
+    finite = total - total == 0.0 and ring == ring  # False also if a sum overflows
     if finite and obs.stamp_ns >= 0 and (len(ranges) > 2 or not sectors):
-        return ""  # the usual case, found in one go
+        return ""  # the usual case, by one check
     for name, numbers in (("pose", obs.pose), ("goal", obs.goal or ())):
         if not all(map(math.isfinite, numbers)):
             return f"{name} {tuple(numbers)} is not finite"

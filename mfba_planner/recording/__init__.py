@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MCAP bags as rosbag2 writes them: write, read, recover, describe; no rclpy needed."""
+"""MCAP bags in rosbag2's format: write, read, recover and describe them, without rclpy."""

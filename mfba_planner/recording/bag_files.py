@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which .mcap files a path stands for: a bare file, or a bag directory with metadata.yaml."""
+"""Find the .mcap files of a bag: a bare file, or a directory with metadata.yaml."""
 
 from __future__ import annotations
 
@@ -13,40 +13,40 @@ from .bag_metadata import BagMetadata
 
 
 @dataclass
-class Located:
-    """The storage files in order, metadata.yaml if there is one, and what is wrong so far."""
+class BagFiles:
+    """The storage files in sequence, the metadata.yaml (None without one), problems found."""
 
     files: list[Path]
     metadata: BagMetadata | None = None
     problems: list[str] = field(default_factory=list)
 
 
-def locate(path: Path, *, salvage: bool) -> Located:
-    """Find a bag's files; `salvage` does without a sound metadata.yaml. Raises BagError."""
+def find_bag_files(path: Path, *, salvage: bool) -> BagFiles:
+    """Find a bag's files; `salvage` allows a missing or broken metadata.yaml. Raises BagError."""
     try:
         if path.is_file():
-            return Located([path])
+            return BagFiles([path])
         if not path.exists():
             raise BagError(f"{path}: does not exist; give a .mcap file or a bag directory")
         if not path.is_dir():
             raise BagError(f"{path}: not a file; give a .mcap file or a bag directory")
-        found = sorted(path.glob("*.mcap"), key=_natural)
-        listed = path / metadata.FILE_NAME
-        if not listed.exists():
-            return _unlisted(path, found, salvage)
+        found = sorted(path.glob("*.mcap"), key=_natural_key)
+        metadata_path = path / metadata.FILE_NAME
+        if not metadata_path.exists():
+            return _without_metadata(path, found, salvage)
         try:
-            return _listed(listed)
+            return _with_metadata(metadata_path)
         except BagError as error:
             if not salvage or not found:
                 raise
-            return Located(found, problems=[str(error).split("; ")[0]])
+            return BagFiles(found, problems=[str(error).split("; ")[0]])
     except OSError as error:
         raise BagError(
             f"{path}: cannot be read ({error.strerror}); give a .mcap file or a bag directory"
         ) from error
 
 
-def _unlisted(path: Path, found: list[Path], salvage: bool) -> Located:
+def _without_metadata(path: Path, found: list[Path], salvage: bool) -> BagFiles:
     missing = f"{metadata.FILE_NAME} is missing"
     if not found:
         kind = "a sqlite3 (.db3) bag" if any(path.glob("*.db3")) else "not a bag"
@@ -58,28 +58,29 @@ def _unlisted(path: Path, found: list[Path], salvage: bool) -> Located:
         raise BagError(
             f"{path}: {missing} (the recording was not closed); run `mfba recover {path}`"
         )
-    return Located(found, problems=[f"{missing}: the recording was not closed"])
+    return BagFiles(found, problems=[f"{missing}: the recording was not closed"])
 
 
-def _listed(listed: Path) -> Located:
+def _with_metadata(metadata_path: Path) -> BagFiles:
     try:
-        text = listed.read_text(encoding="utf-8")
+        text = metadata_path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise BagError(f"{listed}: not UTF-8 text; give the .mcap file itself") from error
-    content = metadata.load_file(text, str(listed))
-    return Located([_file(listed, file.path) for file in content.files], content)
+        raise BagError(f"{metadata_path}: not UTF-8 text; give the .mcap file itself") from error
+    content = metadata.load_file(text, str(metadata_path))
+    return BagFiles([_storage_file(metadata_path, file.path) for file in content.files], content)
 
 
-def _file(listed: Path, name: str) -> Path:
-    # Before version 4 the bag's own directory led each path.
-    for candidate in (listed.parent / name, listed.parent / Path(name).name):
+def _storage_file(metadata_path: Path, name: str) -> Path:
+    # Before version 4 each path started with the bag directory.
+    for candidate in (metadata_path.parent / name, metadata_path.parent / Path(name).name):
         if candidate.is_file():
             return candidate
     raise BagError(
-        f"{listed}: names {name}, which is not there; put the file back, or give a .mcap file"
+        f"{metadata_path}: lists {name}, which does not exist; "
+        "restore that file, or give a .mcap file"
     )
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """bag_2 before bag_10."""
+def _natural_key(path: Path) -> list[tuple[int, str]]:
+    """Sort key that puts bag_2 before bag_10."""
     return [(int(p), "") if p.isdigit() else (0, p) for p in re.split(r"(\d+)", path.name)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bag holds, for `mfba info`."""
+"""Describe a bag: files, topics, counts, attachments, problems; for `mfba info`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .bag_reader import BagReader
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BagInfo:
-    """A bag's facts; times in ns, None without messages."""
+    """Description of a bag; times in ns, start_ns None without messages."""
 
     path: Path
     files: tuple[Path, ...]
@@ -30,18 +30,18 @@ class BagInfo:
 
     @property
     def complete(self) -> bool:
-        """Whether the bag was closed and nothing of it is missing."""
+        """Whether the bag was closed and nothing is missing from it."""
         return not self.problems
 
 
 def describe(path: str | Path) -> BagInfo:
-    """The facts of a bag, also of one that was not closed. Raises BagError for anything else."""
+    """Describe a bag, also one that was not closed. Raises BagError if nothing is readable."""
     try:
         return _describe(BagReader(path))
-    except BagError as refusal:
-        # Say what is whole of it; where nothing is, this raises the same again.
+    except BagError as refused:
+        # Describe what is readable. If nothing is, this raises the same error again.
         info = _describe(BagReader(path, salvage=True))
-        return replace(info, problems=info.problems or (str(refusal).split("; ")[0],))
+        return replace(info, problems=info.problems or (str(refused).split("; ")[0],))
 
 
 def _describe(reader: BagReader) -> BagInfo:
@@ -62,7 +62,7 @@ def _describe(reader: BagReader) -> BagInfo:
 
 
 def format_info(info: BagInfo) -> str:
-    """The facts as text for a terminal, without a trailing newline."""
+    """The description as text for a terminal, without a trailing newline."""
     lines = [
         f"Bag:         {info.path}",
         f"Files:       {', '.join(file.name for file in info.files)}",
@@ -77,14 +77,14 @@ def format_info(info: BagInfo) -> str:
             f"Start:       {_date(info.start_ns)}",
             f"Duration:    {info.duration_ns / 1e9:.3f} s",
         ]
-    width = max((len(topic.name) for topic in info.topics), default=0)
-    types = max((len(topic.type_name) for topic in info.topics), default=0)
+    name_width = max((len(topic.name) for topic in info.topics), default=0)
+    type_width = max((len(topic.type_name) for topic in info.topics), default=0)
     for topic in info.topics:
         offered = "; ".join(
             f"{q.reliability}, {q.durability}, {q.history} {q.depth}" for q in topic.qos
         )
         lines.append(
-            f"Topic:       {topic.name:<{width}}  {topic.type_name:<{types}}  "
+            f"Topic:       {topic.name:<{name_width}}  {topic.type_name:<{type_width}}  "
             f"{topic.message_count:>8}  {offered}".rstrip()
         )
     lines += [
@@ -105,8 +105,8 @@ def _size(size: float) -> str:
 
 
 def _date(time_ns: int) -> str:
-    """Wall time in UTC; a bag in simulated time starts near zero and shows seconds."""
+    """Wall time in UTC; seconds for a bag in simulated time, which starts near zero."""
     if time_ns < 10**9 * 86400 * 365:
         return f"{time_ns / 1e9:.3f} s"
-    moment = datetime.fromtimestamp(time_ns // 10**9, tz=timezone.utc)
-    return f"{moment:%Y-%m-%d %H:%M:%S}.{time_ns % 10**9 // 10**6:03d} UTC"
+    time = datetime.fromtimestamp(time_ns // 10**9, tz=timezone.utc)
+    return f"{time:%Y-%m-%d %H:%M:%S}.{time_ns % 10**9 // 10**6:03d} UTC"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bag says about itself: metadata.yaml version 9 and MCAP's `rosbag2` record."""
+"""A bag's metadata: read and write metadata.yaml version 9 and MCAP's `rosbag2` record."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from typing import Any
 import yaml
 
 from ..core.errors import BagError
-from . import qos_profiles as qos_words
-from . import yaml_text
+from . import qos_profiles, yaml_text
 from .qos_profiles import OfferedQos
 
 FILE_NAME = "metadata.yaml"
@@ -19,13 +18,13 @@ RECORD_NAME = "rosbag2"
 RECORD_KEY = "serialized_metadata"
 ROS_DISTRO = "jazzy"
 VERSION = 9
-NO_TIME_NS = 2**63 - 1  # what rosbag2 writes as the start of a bag without messages
+NO_TIME_NS = 2**63 - 1  # rosbag2 writes this as the start of a bag without messages
 _ROOT = "rosbag2_bagfile_information"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BagTopic:
-    """One topic of a bag: name, type, offered QoS, RIHS01 hash ("" unknown), count."""
+    """One topic of a bag: name, type, offered QoS, RIHS01 hash ("": unknown), count."""
 
     name: str
     type_name: str
@@ -84,7 +83,7 @@ def _content(bag: BagMetadata) -> dict[str, Any]:
                     "name": topic.name,
                     "type": topic.type_name,
                     "serialization_format": "cdr",
-                    "offered_qos_profiles": qos_words.to_list(topic.qos),
+                    "offered_qos_profiles": qos_profiles.to_list(topic.qos),
                     "type_description_hash": topic.type_hash,
                 },
                 "message_count": topic.message_count,
@@ -108,55 +107,55 @@ def _content(bag: BagMetadata) -> dict[str, Any]:
     }
 
 
-def load_file(text: str, where: str) -> BagMetadata:
-    """Parse metadata.yaml of versions 1 to 9; `where` names it in errors. Raises BagError."""
+def load_file(text: str, source: str) -> BagMetadata:
+    """Parse metadata.yaml of versions 1 to 9; `source` is its name in errors. Raises BagError."""
     try:
         content = yaml_text.load(text)[_ROOT]
         version = int(content["version"])
     except (yaml.YAMLError, TypeError, KeyError, ValueError) as error:
-        raise _broken(where, error) from error
+        raise _unreadable(source, error) from error
     if not 1 <= version <= VERSION:
         raise BagError(
-            f"{where}: version {version} is not known (1 to {VERSION} are); "
+            f"{source}: version {version} is not known (1 to {VERSION} are); "
             "give the .mcap file itself"
         )
     try:
-        return _parse(content, where)
+        return _parse(content, source)
     except (TypeError, KeyError, ValueError, AttributeError) as error:
-        raise _broken(where, error) from error
+        raise _unreadable(source, error) from error
 
 
-def _broken(where: str, error: Exception) -> BagError:
+def _unreadable(source: str, error: Exception) -> BagError:
     reason = f"{type(error).__name__}: {error}".split("\n")[0]
     return BagError(
-        f"{where}: not a readable metadata.yaml ({reason}); "
+        f"{source}: not a readable metadata.yaml ({reason}); "
         "give the .mcap file itself, or run `mfba recover` on the directory"
     )
 
 
-def _parse(content: Mapping[str, Any], where: str) -> BagMetadata:
+def _parse(content: Mapping[str, Any], source: str) -> BagMetadata:
     storage = content["storage_identifier"]
     if storage != "mcap":
         raise BagError(
-            f"{where}: storage {storage!r}, only mcap can be read; "
+            f"{source}: storage {storage!r}, only mcap can be read; "
             "convert the bag with `rosbags-convert --dst-storage mcap`"
         )
     mode = str(content.get("compression_mode") or "none").lower()
     if mode != "none":
         raise BagError(
-            f"{where}: compressed by {mode}, only MCAP's own chunk compression can be read; "
+            f"{source}: compressed by {mode}, only MCAP's own chunk compression can be read; "
             "convert the bag with `ros2 bag convert`"
         )
     if not content["relative_file_paths"]:
-        raise BagError(f"{where}: names no storage file; give the .mcap file itself")
-    # Before version 5 there are no per-file facts, so the whole bag's count stands for them.
+        raise BagError(f"{source}: lists no storage file; give the .mcap file itself")
+    # Before version 5 there are no per-file counts: the first file gets the whole bag's count.
     per_file = content.get("files") or [
         {"path": path, "message_count": content["message_count"] if i == 0 else 0}
         for i, path in enumerate(content["relative_file_paths"])
     ]
     by_path = {str(file["path"]): file for file in per_file}
     return BagMetadata(
-        topics=tuple(_topic(item, where) for item in content["topics_with_message_count"] or ()),
+        topics=tuple(_topic(item, source) for item in content["topics_with_message_count"] or ()),
         files=tuple(
             _file(str(path), by_path.get(str(path), {})) for path in content["relative_file_paths"]
         ),
@@ -164,18 +163,18 @@ def _parse(content: Mapping[str, Any], where: str) -> BagMetadata:
     )
 
 
-def _topic(item: Mapping[str, Any], where: str) -> BagTopic:
+def _topic(item: Mapping[str, Any], source: str) -> BagTopic:
     topic = item["topic_metadata"]
     encoding = topic["serialization_format"]
     if encoding != "cdr":
         raise BagError(
-            f"{where}: topic {topic['name']} is serialized as {encoding!r}, only cdr can be read; "
-            "convert the bag with `ros2 bag convert`"
+            f"{source}: topic {topic['name']} is serialized as {encoding!r}, "
+            "only cdr can be read; convert the bag with `ros2 bag convert`"
         )
     return BagTopic(
         name=str(topic["name"]),
         type_name=str(topic["type"]),
-        qos=qos_words.from_list(topic.get("offered_qos_profiles")),
+        qos=qos_profiles.from_list(topic.get("offered_qos_profiles")),
         type_hash=str(topic.get("type_description_hash") or ""),
         message_count=int(item["message_count"]),
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read a bag: ours or rosbag2's, a directory or a bare .mcap file, without rclpy."""
+"""Read a bag of mfba or rosbag2, a directory or a bare .mcap file, without rclpy."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from mcap_ros2.decoder import DecoderFactory
 
 from ..core.errors import BagError
 from . import bag_metadata, qos_profiles
-from .bag_files import locate
+from .bag_files import find_bag_files
 from .bag_metadata import BagTopic
 from .mcap_file import McapFile, Piece
 from .mcap_index import open_file
-from .merge_by_time import RawMessage, Source, in_time_order
+from .merge_by_time import RawMessage, Source, merge_by_log_time
 from .message_definitions import Definition
 
 
@@ -36,27 +36,27 @@ class DecodedMessage(NamedTuple):
 
 class _OpenFile(NamedTuple):
     mcap: McapFile
-    topics: dict[int, str]  # of the channels that are read
+    topics: dict[int, str]  # topic name by channel id, of the channels that are read
 
 
 class BagReader:
     """An open bag.
 
-    `salvage` also takes bags that were never closed or are damaged, and reads all that is
-    whole of them; what is missing stands in `problems`. Otherwise such a bag raises BagError.
+    A bag that was never closed or is damaged raises BagError. With `salvage` its whole records
+    are read, and `problems` lists what is missing.
     """
 
     def __init__(self, path: str | Path, *, salvage: bool = False) -> None:
         self.path = Path(path)
-        located = locate(self.path, salvage=salvage)
-        self.problems = located.problems
-        self._metadata = located.metadata
+        bag_files = find_bag_files(self.path, salvage=salvage)
+        self.problems = bag_files.problems
+        self._metadata = bag_files.metadata
         self._topics: dict[str, BagTopic] = {}
         self._definitions: dict[str, Definition] = {}
         self._files: list[_OpenFile] = []
         self._stack = ExitStack()
         try:
-            for file_path in located.files:
+            for file_path in bag_files.files:
                 self._open(file_path, salvage)
         except BaseException:
             self.close()
@@ -75,7 +75,7 @@ class BagReader:
 
     @property
     def topics(self) -> dict[str, BagTopic]:
-        """The topics by name, with the counts of what is really there."""
+        """The topics by name, with the message counts of the files."""
         return dict(self._topics)
 
     @property
@@ -105,7 +105,7 @@ class BagReader:
 
     @property
     def complete(self) -> bool:
-        """Whether the bag was closed and is undamaged, as far as opening it tells."""
+        """Whether opening the bag found it closed and undamaged."""
         return not self.problems
 
     @property
@@ -115,7 +115,7 @@ class BagReader:
 
     @property
     def chunk_count(self) -> int:
-        """Chunks with messages; runs of messages outside chunks count too."""
+        """Number of chunks with messages, and of runs of messages outside chunks."""
         return sum(1 for _ in self._pieces())
 
     @property
@@ -130,7 +130,7 @@ class BagReader:
 
     @property
     def ros_distro(self) -> str:
-        """The distribution that recorded it, "unknown" where nothing says so. Raises BagError."""
+        """ROS distribution of the recorder, "unknown" if not recorded. Raises BagError."""
         if self._metadata is not None:
             return self._metadata.ros_distro
         for name, content in self.metadata_records():
@@ -176,9 +176,9 @@ class BagReader:
         start_offset_s: float = 0.0,
         in_file_order: bool = False,
     ) -> Iterator[RawMessage]:
-        """Raw messages in log-time order, from `start_offset_s` after the bag's start on.
+        """Raw messages sorted by log time, from `start_offset_s` after the bag's start on.
 
-        Holds only the chunks that overlap in time; `in_file_order` holds one. Raises BagError.
+        Holds the chunks that overlap in time; with `in_file_order` one chunk. Raises BagError.
         """
         start_ns = (self.start_ns or 0) + round(start_offset_s * 1e9)
         sources = [
@@ -187,22 +187,22 @@ class BagReader:
             if piece.end_ns >= start_ns
         ]
         if not in_file_order:
-            return in_time_order(sources)
+            return merge_by_log_time(sources)
         return (message for source in sources for message in source.load())
 
     def decoded(
         self, topics: Collection[str] | None = None, *, start_offset_s: float = 0.0
     ) -> Iterator[DecodedMessage]:
-        """Messages decoded by the bag's own schemas, in log-time order. Raises BagError."""
+        """Messages decoded by the bag's own schemas, sorted by log time. Raises BagError."""
         decoders: dict[str, Callable[[bytes], Any]] = {}
         for raw in self.messages(topics, start_offset_s=start_offset_s):
             if raw.type_name not in decoders:
                 decoders[raw.type_name] = self._decoder(raw)
             try:
                 message = decoders[raw.type_name](raw.data)
-            except Exception as error:  # generated parsers raise whatever the bytes provoke
+            except Exception as error:  # generated parsers raise any type
                 raise BagError(
-                    f"{self.path}: a message on {raw.topic} at {raw.log_time_ns} ns is no "
+                    f"{self.path}: a message on {raw.topic} at {raw.log_time_ns} ns is not a "
                     f"{raw.type_name} ({type(error).__name__}); leave the topic out"
                 ) from error
             yield DecodedMessage(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write a bag directory: an MCAP file as rosbag2 writes it, and metadata.yaml at the end."""
+"""Write a bag directory: an MCAP file in rosbag2's format, and metadata.yaml at the end."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from .message_definitions import Definition, definition_of
 from .qos_profiles import OfferedQos
 
 CHUNK_BYTES = 512 * 1024
-MAX_CHUNK_AGE_S = 0.8  # leaves 0.2 s of the promised 1 s to a late timer
+MAX_CHUNK_AGE_S = 0.8  # the limit is 1 s; 0.2 s are left for a late timer
 _MESSAGE_OVERHEAD = 31  # bytes around each message in a chunk
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class BagWriter:
-    """A bag being recorded into a new directory; `close` makes it complete.
+    """A bag being recorded into a new directory; `close` completes it.
 
-    What was written survives kill -9 up to the chunk in progress, which ends at `chunk_bytes`,
-    or before `max_chunk_age_s` where a regular timer calls `flush_if_due`. Raises OutputError
-    for a directory that exists or cannot be written, and for a disk that fills up.
+    After kill -9 only the chunk in progress is lost. A chunk ends at `chunk_bytes`, or before
+    `max_chunk_age_s` if a regular timer calls `flush_if_due`. Raises OutputError for a directory
+    that exists or cannot be written, and for a full disk.
     """
 
     def __init__(
@@ -59,16 +59,16 @@ class BagWriter:
         self._pending_count = 0
         self._stored_count = 0
         self._last_call_ns: int | None = None
-        self._empty_since_ns = 0  # of the steady clock: nothing was pending then
-        self._ended = ""  # once it has: why nothing more can be written
-        self._made = file_storage.make_directory(self.directory)
+        self._empty_since_ns = 0  # steady time at which nothing was pending
+        self._end_reason = ""  # why nothing more can be written; "" while open
+        self._made_directories = file_storage.make_directory(self.directory)
         try:
-            self._stream = file_storage.WholeWrites(self.path)
+            self._stream = file_storage.WholeWriteFile(self.path)
         except OSError as error:
-            file_storage.remove_empty(self._made)
-            raise file_storage.cannot_create(self.directory, error) from error
+            file_storage.remove_empty(self._made_directories)
+            raise file_storage.creation_error(self.directory, error) from error
         try:
-            # Chunks are ended here, by size and by age; mcap's own limit is out of the way.
+            # This class ends chunks, by size and age; mcap's own limit must never apply.
             self._writer = Writer(
                 self._stream,  # type: ignore[arg-type]
                 chunk_size=1 << 62,
@@ -80,7 +80,7 @@ class BagWriter:
         except BaseException as error:
             self.discard()
             if isinstance(error, OSError):
-                raise file_storage.cannot_create(self.directory, error) from error
+                raise file_storage.creation_error(self.directory, error) from error
             raise
 
     def __enter__(self) -> BagWriter:
@@ -91,7 +91,7 @@ class BagWriter:
 
     @property
     def message_count(self) -> int:
-        """Messages written, those of the chunk in progress too."""
+        """Messages written, including the chunk in progress."""
         return self._stored_count + self._pending_count
 
     @property
@@ -110,7 +110,7 @@ class BagWriter:
         *,
         definition: Definition | None = None,
     ) -> None:
-        """Announce a topic, also while recording; again with the same type changes nothing.
+        """Add a topic, also while recording; adding it again with the same type changes nothing.
 
         `definition` defaults to the installed one. Raises InputError for a type that is not
         installed, OutputError for another type on a known topic.
@@ -125,7 +125,7 @@ class BagWriter:
             return
         definition = definition or definition_of(type_name)
         profiles = (offered,) if isinstance(offered, OfferedQos) else tuple(offered)
-        with self._guarded():
+        with self._writing():
             if type_name not in self._schema_ids:
                 self._schema_ids[type_name] = self._writer.register_schema(
                     type_name, definition.encoding, definition.text.encode()
@@ -153,21 +153,21 @@ class BagWriter:
         *,
         sequence: int | None = None,
     ) -> None:
-        """Store one serialized message; `sequence` defaults to the topic's own count.
+        """Store one serialized message; `sequence` defaults to the topic's message count.
 
         Raises OutputError for an unknown topic, a time below 0 or from 2**63 - 1 on, a full disk.
         """
         count = self._counts.get(topic)
         if count is None:
-            raise OutputError(f"{topic}: not a topic of this bag; announce it with add_topic")
+            raise OutputError(f"{topic}: not a topic of this bag; add it with add_topic")
         for time_ns in (log_time_ns, publish_time_ns):
             if not 0 <= time_ns < bag_metadata.NO_TIME_NS:
                 raise OutputError(
                     f"{topic}: time {time_ns} ns cannot be stored; give 0 to 2**63 - 2"
                 )
-        self._refuse_after_end()
+        self._require_open()
         try:
-            # Into memory only: flush writes. (Spelt out, as _guarded costs as much again.)
+            # Goes into memory only; flush writes. (No _writing: it would double the cost.)
             self._writer.add_message(
                 self._channel_ids[topic],
                 log_time_ns,
@@ -187,18 +187,18 @@ class BagWriter:
             self.flush()
 
     def flush(self) -> None:
-        """End the chunk in progress and hand it to the system."""
-        with self._guarded():
+        """End the chunk in progress and write it to the file."""
+        with self._writing():
             self._writer.flush()
         self._stored_count += self._pending_count
         self._pending_count = self._pending_bytes = 0
         self._empty_since_ns = self._last_call_ns or 0
 
     def flush_if_due(self, steady_now_ns: int) -> None:
-        """Flush before the chunk in progress gets too old: call it from a regular timer.
+        """Flush before the chunk in progress gets too old; call it from a regular timer.
 
-        The oldest message may have come right after the last moment known to be without any,
-        and the next chance to flush is one period away: both count towards its age.
+        The oldest message may be as old as the last time at which nothing was pending, and the
+        next call is one period away. Both count towards the age of the chunk.
         """
         last_ns, self._last_call_ns = self._last_call_ns, steady_now_ns
         if self._pending_count:
@@ -217,26 +217,26 @@ class BagWriter:
         log_time_ns: int = 0,
         create_time_ns: int = 0,
     ) -> None:
-        """Store a file inside the bag, at once."""
-        with self._guarded():
+        """Store a file inside the bag immediately."""
+        with self._writing():
             self._writer.add_attachment(create_time_ns, log_time_ns, name, media_type, data)
 
     def add_metadata(self, name: str, content: Mapping[str, str]) -> None:
-        """Store a metadata record, at once."""
-        with self._guarded():
+        """Store a metadata record immediately."""
+        with self._writing():
             self._writer.add_metadata(name, dict(content))
 
     def close(self) -> None:
-        """Finish the file and write metadata.yaml; does nothing after the end or a failure."""
-        if self._ended:
+        """Finish the file and write metadata.yaml; does nothing if closed or after a failure."""
+        if self._end_reason:
             return
         self.flush()
-        with self._guarded():
+        with self._writing():
             self._write_record()
             self._writer.finish()
             self._stream.close()
             text = bag_metadata.dump_file(self._content())
-            file_storage.write_whole(self.directory / bag_metadata.FILE_NAME, text)
+            file_storage.write_atomically(self.directory / bag_metadata.FILE_NAME, text)
         self._end()
 
     def discard(self) -> None:
@@ -245,7 +245,7 @@ class BagWriter:
         for path in (self.path, self.directory / bag_metadata.FILE_NAME):
             with suppress(OSError):
                 path.unlink()
-        file_storage.remove_empty(self._made)
+        file_storage.remove_empty(self._made_directories)
 
     def _content(self) -> BagMetadata:
         file = BagFile(
@@ -263,33 +263,33 @@ class BagWriter:
         self._writer.add_metadata(bag_metadata.RECORD_NAME, {bag_metadata.RECORD_KEY: text})
 
     @contextmanager
-    def _guarded(self) -> Iterator[None]:
-        """Refuse after the end; whatever fails inside, leave a file that can be recovered.
+    def _writing(self) -> Iterator[None]:
+        """Raise OutputError after the end; close the file, recoverable, if the body fails.
 
-        An interrupt is a failure too: mcap's indexes may not fit the file any more.
+        An interrupt counts as a failure: mcap's indexes may no longer match the file.
         """
-        self._refuse_after_end()
+        self._require_open()
         try:
             yield
         except OSError as error:
-            what = "disk full" if error.errno in _FULL else "cannot be written"
+            problem = "disk full" if error.errno in _FULL else "cannot be written"
             self._end(
-                f"{self.directory}: {what} after {self._stored_count} messages "
+                f"{self.directory}: {problem} after {self._stored_count} messages "
                 f"({error.strerror}); make room and run `mfba recover {self.directory}`"
             )
-            raise OutputError(self._ended) from error
+            raise OutputError(self._end_reason) from error
         except BaseException:
             self._end()
             raise
 
-    def _refuse_after_end(self) -> None:
-        if self._ended:
-            raise OutputError(self._ended)
+    def _require_open(self) -> None:
+        if self._end_reason:
+            raise OutputError(self._end_reason)
 
     def _end(self, reason: str = "") -> None:
-        """Close the file; whoever writes on gets the first reason again."""
-        self._ended = (
-            self._ended
+        """Close the file; later writes raise the first reason again."""
+        self._end_reason = (
+            self._end_reason
             or reason
             or (f"{self.directory}: the recording has ended; record into a new directory")
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The effective configuration a bag carries, so that it explains itself."""
+"""The configuration of a run as an attachment of its bag: write and read it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..core.errors import BagError, OutputError
 from .bag_reader import BagReader
 
-if TYPE_CHECKING:  # who reads a bag need not load what writes one
+if TYPE_CHECKING:  # reading a bag must not load the writer
     from .bag_writer import BagWriter
 
 ATTACHMENT_NAME = "mfba_planner/configuration.json"
@@ -31,11 +31,11 @@ def attach_configuration(writer: BagWriter, configuration: Mapping[str, Any]) ->
 
 
 def read_configuration(reader: BagReader) -> dict[str, Any]:
-    """The configuration a bag carries. Raises BagError where it has none we know."""
+    """The configuration in a bag. Raises BagError if missing or of an unknown version."""
     data = reader.attachment(ATTACHMENT_NAME)
     if data is None:
         raise BagError(
-            f"{reader.path}: carries no {ATTACHMENT_NAME}, so it was not recorded by mfba; "
+            f"{reader.path}: has no {ATTACHMENT_NAME}, so it was not recorded by mfba; "
             "give a bag that `mfba run` recorded"
         )
     try:

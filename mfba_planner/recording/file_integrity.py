@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a closed MCAP file still is, bit for bit, what was written."""
+"""Check the data section of a closed MCAP file against its CRC."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ..core.errors import BagError
 from .mcap_records import MAGIC
 
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offset start, summary CRC
-_DATA_END = struct.Struct("<BQI")  # opcode, length, CRC of all before it (0: not given)
+_DATA_END = struct.Struct("<BQI")  # opcode, length, CRC of all bytes before (0: none)
 _BLOCK_BYTES = 1 << 20
 _REMEDY = "copy it again from where it was recorded"
 
 
 def check_data(path: Path) -> bool:
-    """Hold the data section of a closed file against its CRC; False where it carries none.
+    """Compare the data section of a closed file with its CRC; False if the file has none.
 
-    Raises BagError where they differ. Streams: holds one block.
+    Raises BagError on a mismatch. Holds one block in memory.
     """
     with path.open("rb") as stream:
         size = stream.seek(0, os.SEEK_END)
@@ -34,7 +34,7 @@ def check_data(path: Path) -> bool:
         opcode, _, stored = _DATA_END.unpack(stream.read(_DATA_END.size))
         if opcode != Opcode.DATA_END:
             raise BagError(
-                f"{path}: its data section does not end where its index says; {_REMEDY}"
+                f"{path}: its data section does not end at the position in its index; {_REMEDY}"
             )
         if not stored:
             return False
@@ -45,7 +45,7 @@ def check_data(path: Path) -> bool:
             crc, left = zlib.crc32(block, crc), left - len(block)
     if crc != stored:
         raise BagError(
-            f"{path}: its data section has CRC {crc:08x} and not {stored:08x}, at least one bit "
-            f"has changed since it was written; {_REMEDY}"
+            f"{path}: its data section has CRC {crc:08x}, not {stored:08x}: at least one bit "
+            f"has changed since the recording; {_REMEDY}"
         )
     return True

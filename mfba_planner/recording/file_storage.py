@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files and directories that are there whole or not at all."""
+"""Write files and directories completely or not at all."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from pathlib import Path
 from ..core.errors import OutputError
 
 
-class WholeWrites:
-    """A new unbuffered file that ends at a whole write, also after one has failed."""
+class WholeWriteFile:
+    """A new unbuffered file; a write that fails is undone, so the file ends at a whole write."""
 
     def __init__(self, path: Path) -> None:
-        self._file = open(path, "xb", buffering=0)  # noqa: SIM115  (open as long as the writer)
+        self._file = open(path, "xb", buffering=0)  # noqa: SIM115  (stays open with the writer)
         self._offset = 0
 
     def write(self, data: bytes) -> int:
-        """Write all of `data` or, raising, nothing of it."""
+        """Write all of `data`, or nothing and raise."""
         try:
             rest = memoryview(data)
             while rest:
@@ -36,10 +36,10 @@ class WholeWrites:
         return self._offset
 
     def flush(self) -> None:
-        """Nothing is held back: each write went to the system."""
+        """Does nothing: writes are not buffered."""
 
     def close(self) -> None:
-        """Bring everything to the disk and close; a second call does nothing."""
+        """Sync to disk and close; a second call does nothing."""
         if not self._file.closed:
             try:
                 os.fsync(self._file.fileno())
@@ -48,9 +48,9 @@ class WholeWrites:
 
 
 def make_directory(directory: Path) -> list[Path]:
-    """Make a new directory and its missing parents; what was made, innermost first.
+    """Make a new directory and its missing parents; return those made, innermost first.
 
-    Raises OutputError, with nothing left behind, where it exists or cannot be made.
+    Raises OutputError if it exists or cannot be made; then no directory is left behind.
     """
     missing = [directory]
     while not os.path.lexists(missing[-1].parent):
@@ -66,36 +66,36 @@ def make_directory(directory: Path) -> list[Path]:
             raise OutputError(
                 f"{directory}: exists already and is never overwritten; choose a new directory"
             ) from error
-        raise cannot_create(directory, error) from error
+        raise creation_error(directory, error) from error
     return made
 
 
-def cannot_create(directory: Path, error: OSError) -> OutputError:
-    """The error for a directory that cannot be begun."""
+def creation_error(directory: Path, error: OSError) -> OutputError:
+    """The OutputError for a directory that cannot be created."""
     return OutputError(
         f"{directory}: cannot be created ({error.strerror}); "
-        "choose a new directory where you may write and there is room"
+        "choose a new directory where you may write, with enough free space"
     )
 
 
 def remove_empty(directories: Iterable[Path]) -> None:
-    """Remove directories, innermost first, as far as they are empty."""
+    """Remove the empty ones among these directories, given innermost first."""
     for directory in directories:
         with suppress(OSError):
             directory.rmdir()
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file that is there whole or not at all, also after a power cut."""
-    draft = path.with_name(f".{path.name}.part")
+def write_atomically(path: Path, text: str) -> None:
+    """Write a text file completely or not at all, also in case of a power cut."""
+    temporary = path.with_name(f".{path.name}.part")
     try:
-        with open(draft, "x", encoding="utf-8") as stream:
+        with open(temporary, "x", encoding="utf-8") as stream:
             stream.write(text)
             stream.flush()
             os.fsync(stream.fileno())
-        os.replace(draft, path)
+        os.replace(temporary, path)
     except BaseException:
-        draft.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
     directory = os.open(path.parent, os.O_RDONLY)
     try:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a message says, in the core's terms: for live messages and for those decoded from a bag.
+"""Convert ROS messages, live or decoded from a bag, to the core's types.
 
-Only attributes are read, so no ROS is needed. Everything is checked: InputError names what
-is wrong. ros/interface/to_messages.py holds the other direction.
+Only attributes are read, so ROS is not needed. All values are checked: InputError names the
+wrong one. ros/interface/to_messages.py converts in the other direction.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def _finite(what: str, values: Iterable[float]) -> None:
             raise InputError(f"{what} holds {value}; send finite numbers")
 
 
-def or_refused(read: Callable[[Any], T], message: Any) -> T | Refused:
-    """What read makes of a message, or the reason why it refuses it."""
+def value_or_refusal(read: Callable[[Any], T], message: Any) -> T | Refused:
+    """read(message), or the text of its InputError."""
     try:
         return read(message)
     except InputError as error:
@@ -47,7 +47,7 @@ def or_refused(read: Callable[[Any], T], message: Any) -> T | Refused:
 def pose2d(pose: Any, what: str) -> Pose2D:
     """geometry_msgs/Pose as planar pose; yaw from the quaternion (REP-103).
 
-    Raises InputError for NaN, inf or a quaternion that is nothing like a unit one.
+    Raises InputError for NaN, inf or a quaternion far from unit length.
     """
     p, q = pose.position, pose.orientation
     _finite(f"{what} position", (p.x, p.y))
@@ -59,7 +59,7 @@ def pose2d(pose: Any, what: str) -> Pose2D:
 
 
 def require_frame(message: Any, frame: str, what: str, parameter: str = "odom_frame") -> None:
-    """Raise FrameError for a message in another frame; an empty frame asks for none."""
+    """Raise FrameError for a message in another frame; an empty frame accepts any."""
     given = message.header.frame_id
     if frame and given != frame:
         raise FrameError(
@@ -74,9 +74,9 @@ def robot_pose(odometry: Any, frame: str = "") -> Pose2D:
 
 
 def goal_point(pose_stamped: Any, frame: str = "", what: str = "goal_pose") -> Point:
-    """geometry_msgs/PoseStamped to GP; its orientation is not used.
+    """geometry_msgs/PoseStamped to the goal position; its orientation is not used.
 
-    Raises InputError for NaN or inf, and for another frame; one that names none is taken as is.
+    An empty frame_id is accepted. Raises InputError for NaN, inf or another frame.
     """
     if pose_stamped.header.frame_id:
         require_frame(pose_stamped, frame, what)
@@ -86,9 +86,9 @@ def goal_point(pose_stamped: Any, frame: str = "", what: str = "goal_pose") -> P
 
 
 def waypoint_points(path: Any, frame: str = "") -> tuple[Point, ...]:
-    """nav_msgs/Path to goals in their order; InputError for none, NaN, inf or another frame.
+    """nav_msgs/Path to a sequence of goals; InputError for no pose, NaN, inf or another frame.
 
-    The frame of the path holds for poses that name none.
+    A pose without frame_id is in the frame of the path.
     """
     if path.header.frame_id:
         require_frame(path, frame, "waypoints")
@@ -110,7 +110,7 @@ def obstacle_centers(pose_array: Any) -> list[Point]:
 
 
 def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
-    """The sectors topic to ranges; inf is free.
+    """The sectors topic (LaserScan) to ranges in m; inf means free.
 
     Raises InputError for NaN, -inf, fewer than 3 sectors or another frame.
     """
@@ -125,9 +125,9 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
 
 
 def laser_scan(message: Any, frame: str = "") -> Scan:
-    """sensor_msgs/LaserScan to a Scan, which perception.scan_to_sectors.sense_scan judges.
+    """sensor_msgs/LaserScan to a Scan; FrameError for another frame.
 
-    Raises FrameError for another frame.
+    perception.scan_to_sectors.sense_scan checks the ranges.
     """
     require_frame(message, frame, "scan", "scan_frame")
     return Scan(
@@ -148,7 +148,7 @@ def velocity(twist: Any) -> tuple[float, float, float]:
 
 
 def rotated(vector: Point, angle_rad: float) -> Point:
-    """A plane vector turned counter-clockwise; by 0 exactly itself."""
+    """A vector in the plane rotated counter-clockwise; an angle of 0 changes no bit."""
     if angle_rad == 0.0:
         return vector
     c, s = math.cos(angle_rad), math.sin(angle_rad)
@@ -156,38 +156,38 @@ def rotated(vector: Point, angle_rad: float) -> Point:
 
 
 def body_velocity(decision: Decision, base: Base, tick_ns: int) -> tuple[float, float, float]:
-    """What cmd_vel says for a decision: (vx, vy, wz) in the body frame."""
-    told = command(decision, base, tick_ns)
-    return (told[0], 0.0, told[1]) if base.turns else (*rotated(told, -decision.pose.yaw), 0.0)
+    """The cmd_vel of a decision: (vx, vy, wz) in the body frame, m/s and rad/s."""
+    v = command(decision, base, tick_ns)
+    return (v[0], 0.0, v[1]) if base.turns else (*rotated(v, -decision.pose.yaw), 0.0)
 
 
 def told(twist: Any, base: Base, yaw_rad: float) -> Point:
-    """The inverse: what World.step takes, of a base with this heading; raises as velocity()."""
+    """Twist to the command of World.step, for a base with this yaw; raises as velocity()."""
     vx, vy, wz = velocity(twist)
     return (vx, wz) if base.turns else rotated((vx, vy), yaw_rad)
 
 
-def points_text(points: Iterable[Point]) -> str:
-    """Points as text that gives back the same floats: 'x,y x,y'."""
-    return " ".join(f"{x!r},{y!r}" for x, y in points)
+def points_text(values: Iterable[Point]) -> str:
+    """Points as text 'x,y x,y', which parses back to the same floats."""
+    return " ".join(f"{x!r},{y!r}" for x, y in values)
 
 
 def points(text: str) -> tuple[Point, ...]:
     """Inverse of points_text; InputError for anything else."""
     try:
-        pairs = [tuple(map(float, part.split(","))) for part in text.split()]
+        pairs = [tuple(map(float, pair.split(","))) for pair in text.split()]
         return tuple((x, y) for x, y in pairs)
     except ValueError:
         raise InputError(f"{text!r}: not a list of points 'x,y x,y'") from None
 
 
-def decision_value(diagnostics: Any, key: str) -> str:
-    """What planner/decision says of one thing, "" where it does not."""
+def decision_field(diagnostics: Any, key: str) -> str:
+    """The value of one key of planner/decision, "" without that key."""
     return next((item.value for item in diagnostics.status[0].values if item.key == key), "")
 
 
 def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:
-    """planner/decision and the sectors it answers to a Decision; InputError if garbled."""
+    """planner/decision and the ranges of its stamp to a Decision; InputError if malformed."""
     try:
         status = diagnostics.status[0]
         fields = {item.key: item.value for item in status.values}
@@ -208,4 +208,6 @@ def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:
             candidates=points(fields["candidates"]),
         )
     except (KeyError, ValueError, IndexError) as error:
-        raise InputError(f"planner/decision lacks or garbles {error}; was it edited?") from None
+        raise InputError(
+            f"planner/decision: missing or malformed {error}; was it edited?"
+        ) from None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One open MCAP file and where in it everything is."""
+"""An open MCAP file with the index of its records, and access to them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Piece(NamedTuple):
 
 @dataclass
 class McapFile:
-    """The index of one open file; `damage` says in words what of it cannot be read."""
+    """The index of one open file; `damage` describes what cannot be read."""
 
     path: Path
     stream: BinaryIO
@@ -43,7 +43,7 @@ class McapFile:
     complete: bool = False
 
     def messages(self, piece: Piece) -> list[Message]:
-        """The messages of a piece in file order. Raises BagError."""
+        """The messages of a piece, in file sequence. Raises BagError."""
         with reading(self.path, f"the chunk at byte {piece.offset}"):
             if piece.is_chunk:
                 return mcap_records.messages(
@@ -60,30 +60,30 @@ class McapFile:
         """The content of one metadata record. Raises BagError."""
         with reading(self.path, f"the metadata record {index.name!r}"):
             body = self.body(index.offset, Opcode.METADATA)
-            return dict(Metadata.read(mcap_records.parsed(body)).metadata)
+            return dict(Metadata.read(mcap_records.body_stream(body)).metadata)
 
-    def define(self, opcode: int, body: bytes) -> None:
-        """Take a schema or channel record; others are left alone, repetitions too."""
+    def add_definition(self, opcode: int, body: bytes) -> None:
+        """Add a schema or channel record; other records and repetitions are ignored."""
         if opcode == Opcode.SCHEMA:
-            schema = Schema.read(mcap_records.parsed(body))
+            schema = Schema.read(mcap_records.body_stream(body))
             self.schemas.setdefault(schema.id, schema)
         elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(mcap_records.parsed(body))
+            channel = Channel.read(mcap_records.body_stream(body))
             self.channels.setdefault(channel.id, channel)
 
     def is_defined(self, channel: Channel) -> bool:
-        """Whether the channel's schema is known (0 stands for none)."""
+        """Whether the channel's schema is known (schema id 0: no schema)."""
         return channel.schema_id == 0 or channel.schema_id in self.schemas
 
     def body(self, offset: int, opcode: int) -> bytes:
-        """The body of the record at `offset`. Raises ValueError for another kind of record."""
+        """The body of the record at `offset`. Raises ValueError for another opcode."""
         found, length = FRAME.unpack(self.bytes_at(offset, FRAME.size))
         if found != opcode:
             raise ValueError(f"record type {found} instead of {int(opcode)} at byte {offset}")
         return self.bytes_at(offset + FRAME.size, length)
 
     def bytes_at(self, offset: int, length: int) -> bytes:
-        """Exactly `length` bytes. Raises ValueError where the file is shorter."""
+        """Exactly `length` bytes. Raises ValueError if the file is shorter."""
         if offset + length > self.size:
             raise ValueError(f"{length} bytes wanted at byte {offset} of {self.size}")
         self.stream.seek(offset)

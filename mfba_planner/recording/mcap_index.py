@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Open an MCAP file: refuse what is something else, index it by its summary or by a walk."""
+"""Open an MCAP file: refuse other formats, index by its summary or record by record."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mcap.records import AttachmentIndex, ChunkIndex, Footer, Header, MetadataIn
 
 from ..core.errors import BagError
 from .mcap_file import McapFile, Piece
-from .mcap_records import FRAME, MAGIC, frames, parsed, reading
+from .mcap_records import FRAME, MAGIC, body_stream, frames, reading
 from .mcap_walk import walk
 
 _FOOTER_BYTES = FRAME.size + 20
@@ -24,7 +24,7 @@ _OTHER_FORMATS = (
 
 
 def open_file(path: Path, *, salvage: bool = False) -> McapFile:
-    """Open and index a file; `salvage` takes all that is whole of it. Raises BagError."""
+    """Open and index a file; `salvage` indexes the whole records. Raises BagError."""
     try:
         stream = path.open("rb")
     except OSError as error:
@@ -34,8 +34,8 @@ def open_file(path: Path, *, salvage: bool = False) -> McapFile:
     try:
         with reading(path, "the file"):
             file = McapFile(path, stream, stream.seek(0, 2))
-            _refuse_other_formats(file)
-            _refuse_other_profiles(file)
+            _require_mcap(file)
+            _require_ros2_profile(file)
             footer = _footer(file)
         if footer is None and not salvage:
             raise BagError(
@@ -51,7 +51,7 @@ def open_file(path: Path, *, salvage: bool = False) -> McapFile:
         raise
 
 
-def _refuse_other_formats(file: McapFile) -> None:
+def _require_mcap(file: McapFile) -> None:
     if file.size == 0:
         raise BagError(f"{file.path}: empty file; give a .mcap file or a bag directory")
     head = file.bytes_at(0, min(file.size, 16))
@@ -64,9 +64,9 @@ def _refuse_other_formats(file: McapFile) -> None:
         )
 
 
-def _refuse_other_profiles(file: McapFile) -> None:
+def _require_ros2_profile(file: McapFile) -> None:
     try:
-        header = Header.read(parsed(file.body(len(MAGIC), Opcode.HEADER)))
+        header = Header.read(body_stream(file.body(len(MAGIC), Opcode.HEADER)))
     except ValueError as error:
         raise BagError(
             f"{file.path}: truncated within its header ({file.size} bytes), nothing of it can be "
@@ -80,23 +80,23 @@ def _refuse_other_profiles(file: McapFile) -> None:
 
 
 def _footer(file: McapFile) -> Footer | None:
-    """The footer of a file that was closed, None where the end is missing."""
+    """The footer of a closed file, None if the end of the file is missing."""
     if file.size < _TAIL_BYTES:
         return None
     tail = file.bytes_at(file.size - _TAIL_BYTES, _TAIL_BYTES)
     if not tail.endswith(MAGIC) or FRAME.unpack_from(tail) != (Opcode.FOOTER, 20):
         return None
-    return Footer.read(parsed(tail[FRAME.size :]))
+    return Footer.read(body_stream(tail[FRAME.size :]))
 
 
 def _read_summary(file: McapFile, footer: Footer) -> bool:
-    """Fill the index from the summary; False, and nothing filled, where it does not suffice."""
+    """Fill the index from the summary; False, with nothing filled, if it is incomplete."""
     if footer.summary_start == 0:
         return False
     found = McapFile(file.path, file.stream, file.size)
     statistics: Statistics | None = None
     with reading(file.path, "the summary"):
-        # The CRC covers all up to itself: the footer's last 4 bytes and the magic stay out.
+        # The CRC covers all bytes before itself: not the footer's last 4 bytes and the magic.
         end = file.size - len(MAGIC) - 4
         data = file.bytes_at(footer.summary_start, end - footer.summary_start)
         if footer.summary_crc not in (0, zlib.crc32(data)):
@@ -104,10 +104,10 @@ def _read_summary(file: McapFile, footer: Footer) -> bool:
         data = data[: 4 - _FOOTER_BYTES]
         for opcode, start, stop in frames(data):
             if opcode == Opcode.STATISTICS:
-                statistics = Statistics.read(parsed(data[start:stop]))
+                statistics = Statistics.read(body_stream(data[start:stop]))
             else:
-                _take(found, opcode, data[start:stop])
-    if statistics is None or not _suffices(found, statistics):
+                _add_index_record(found, opcode, data[start:stop])
+    if statistics is None or not _is_complete(found, statistics):
         return False
     file.schemas, file.channels, file.pieces = found.schemas, found.channels, found.pieces
     file.attachments, file.metadata = found.attachments, found.metadata
@@ -115,9 +115,9 @@ def _read_summary(file: McapFile, footer: Footer) -> bool:
     return True
 
 
-def _take(file: McapFile, opcode: int, body: bytes) -> None:
+def _add_index_record(file: McapFile, opcode: int, body: bytes) -> None:
     if opcode == Opcode.CHUNK_INDEX:
-        chunk = ChunkIndex.read(parsed(body))
+        chunk = ChunkIndex.read(body_stream(body))
         file.pieces.append(
             Piece(
                 offset=chunk.chunk_start_offset,
@@ -128,15 +128,15 @@ def _take(file: McapFile, opcode: int, body: bytes) -> None:
             )
         )
     elif opcode == Opcode.ATTACHMENT_INDEX:
-        file.attachments.append(AttachmentIndex.read(parsed(body)))
+        file.attachments.append(AttachmentIndex.read(body_stream(body)))
     elif opcode == Opcode.METADATA_INDEX:
-        file.metadata.append(MetadataIndex.read(parsed(body)))
+        file.metadata.append(MetadataIndex.read(body_stream(body)))
     else:
-        file.define(opcode, body)
+        file.add_definition(opcode, body)
 
 
-def _suffices(summary: McapFile, statistics: Statistics) -> bool:
-    """Whether a summary names everything the data section holds."""
+def _is_complete(summary: McapFile, statistics: Statistics) -> bool:
+    """Whether a summary lists everything in the data section."""
     return (
         statistics.chunk_count == len(summary.pieces)
         and (statistics.chunk_count > 0 or statistics.message_count == 0)

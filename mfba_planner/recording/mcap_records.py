@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MCAP records out of bytes, checked: frames, messages, chunks, attachments."""
+"""Parse and check MCAP records from bytes: frames, messages, chunks, attachments."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from mcap.stream_reader import get_chunk_data_stream
 
 from ..core.errors import BagError
 
-# Begins and ends every file; mcap.writer has it too, but loads half of the network stack with it.
+# First and last bytes of every file. mcap.writer has it too, but its import is slow.
 MAGIC = b"\x89MCAP0\r\n"
 FRAME = struct.Struct("<BQ")  # opcode, length of the body
 _MESSAGE = struct.Struct("<HIQQ")  # channel id, sequence, log time, publish time
 
-# mcap parses what it is given without looking: broken bytes surface as any of these.
+# mcap does not check its input: broken bytes raise any of these.
 _PARSE_ERRORS = (
     McapError,
     ValueError,
@@ -50,7 +50,7 @@ class Message(NamedTuple):
 
 @contextmanager
 def reading(path: Path, what: str) -> Iterator[None]:
-    """Turn whatever broken bytes or a failing disk raise inside into a BagError."""
+    """Convert the errors of broken bytes or a failing disk in the body into a BagError."""
     try:
         yield
     except OSError as error:
@@ -64,8 +64,8 @@ def reading(path: Path, what: str) -> Iterator[None]:
         ) from error
 
 
-def parsed(body: bytes) -> ReadDataStream:
-    """A record's body as the stream the `read` functions of mcap.records take."""
+def body_stream(body: bytes) -> ReadDataStream:
+    """A record's body as the stream that the `read` functions of mcap.records expect."""
     return ReadDataStream(BytesIO(body))
 
 
@@ -82,7 +82,7 @@ def frames(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def messages(data: bytes) -> list[Message]:
-    """The messages among the records of `data`, in their order there."""
+    """The messages among the records of `data`, in the same sequence."""
     return [
         Message._make((*_MESSAGE.unpack_from(data, start), data[start + _MESSAGE.size : end]))
         for opcode, start, end in frames(data)
@@ -91,8 +91,8 @@ def messages(data: bytes) -> list[Message]:
 
 
 def chunk_data(body: bytes) -> bytes:
-    """The records inside a chunk, uncompressed, size and CRC checked."""
-    chunk = Chunk.read(parsed(body))
+    """The records in a chunk, uncompressed. Checks size and CRC."""
+    chunk = Chunk.read(body_stream(body))
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     if length != chunk.uncompressed_size:
         raise ValueError(f"a chunk of {length} bytes instead of {chunk.uncompressed_size}")
@@ -100,8 +100,8 @@ def chunk_data(body: bytes) -> bytes:
 
 
 def attachment(body: bytes) -> Attachment:
-    """An attachment, CRC checked (mcap reads past it without looking)."""
+    """An attachment. Checks the CRC, which mcap ignores; raises ValueError."""
     stored = int.from_bytes(body[-4:], "little")
     if stored not in (0, zlib.crc32(body[:-4])):
         raise ValueError("wrong CRC")
-    return Attachment.read(parsed(body))
+    return Attachment.read(body_stream(body))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Index an MCAP file record by record, for files without a summary, an index, or an end.
 
-Every record is framed by an opcode and a length, so what is whole can be told from what is not.
+Every record starts with an opcode and a length, so whole records can be found in damaged files.
 """
 
 from __future__ import annotations
@@ -14,70 +14,70 @@ from . import mcap_records
 from .mcap_file import McapFile, Piece
 from .mcap_records import FRAME, MAGIC, Message, reading
 
-_LOOSE_RUN_BYTES = 1 << 20  # messages outside chunks are handled in runs of about this size
+_UNCHUNKED_RUN_BYTES = 1 << 20  # messages outside chunks are indexed in runs of about this size
 
 
 def walk(file: McapFile, *, salvage: bool) -> None:
     """Fill the index up to the last whole record.
 
-    What cannot be read is noted in `file.damage` when salvaging; otherwise raises BagError.
+    Records that cannot be read are listed in `file.damage` if salvaging, else raise BagError.
     """
-    _Walk(file, salvage).run()
+    _RecordWalk(file, salvage).run()
 
 
-class _Walk:
+class _RecordWalk:
     def __init__(self, file: McapFile, salvage: bool) -> None:
         self.file = file
         self.salvage = salvage
         self.end = file.size - (len(MAGIC) if file.complete else 0)
         self.in_data = True
-        self.loose: list[Message] = []
-        self.loose_offset = 0
+        self.unchunked: list[Message] = []
+        self.unchunked_offset = 0
 
     def run(self) -> None:
-        position = len(MAGIC)
-        while position < self.end:
-            opcode, after = self._frame(position)
-            if opcode == 0 or after > self.end:
+        offset = len(MAGIC)
+        while offset < self.end:
+            opcode, next_offset = self._frame(offset)
+            if opcode == 0 or next_offset > self.end:
                 if self.in_data:
-                    self._give_up(position, self.end, "no whole record")
+                    self._skip(offset, self.end, "no whole record")
                 break
             try:
-                with reading(self.file.path, f"the record at byte {position}"):
-                    self._record(opcode, position, after)
+                with reading(self.file.path, f"the record at byte {offset}"):
+                    self._add_record(opcode, offset, next_offset)
             except BagError:
-                self._end_loose(position)
-                self._give_up(position, after, "a record that cannot be read")
-            position = after
-        self._end_loose(position)
+                self._end_unchunked_run(offset)
+                self._skip(offset, next_offset, "a record that cannot be read")
+            offset = next_offset
+        self._end_unchunked_run(offset)
         self._drop_undefined()
 
-    def _frame(self, position: int) -> tuple[int, int]:
-        """Opcode (0 for none) and end of the record at `position`."""
-        if position + FRAME.size > self.end:
+    def _frame(self, offset: int) -> tuple[int, int]:
+        """Opcode (0 for none) and end of the record at `offset`."""
+        if offset + FRAME.size > self.end:
             return 0, self.end
-        opcode, length = FRAME.unpack(self.file.bytes_at(position, FRAME.size))
-        return opcode, position + FRAME.size + length
+        opcode, length = FRAME.unpack(self.file.bytes_at(offset, FRAME.size))
+        return opcode, offset + FRAME.size + length
 
-    def _record(self, opcode: int, position: int, after: int) -> None:
+    def _add_record(self, opcode: int, offset: int, next_offset: int) -> None:
         file = self.file
         if opcode == Opcode.MESSAGE:
-            self._loose_message(position, after)
+            self._add_unchunked_message(offset, next_offset)
             return
-        self._end_loose(position)
+        self._end_unchunked_run(offset)
         if opcode == Opcode.DATA_END:
             self.in_data = False
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            # In the summary too: a topic without any message may stand there alone.
-            file.define(opcode, file.body(position, opcode))
+            # Also in the summary: a topic without messages may be described only there.
+            file.add_definition(opcode, file.body(offset, opcode))
         elif opcode == Opcode.CHUNK:
-            self._chunk(position, after)
+            self._add_chunk(offset, next_offset)
         elif opcode == Opcode.ATTACHMENT:
-            found = mcap_records.attachment(file.body(position, opcode))
+            found = mcap_records.attachment(file.body(offset, opcode))
             file.attachments.append(
                 AttachmentIndex(
-                    offset=position,
-                    length=after - position,
+                    offset=offset,
+                    length=next_offset - offset,
                     log_time=found.log_time,
                     create_time=found.create_time,
                     data_size=len(found.data),
@@ -86,48 +86,48 @@ class _Walk:
                 )
             )
         elif opcode == Opcode.METADATA:
-            name = Metadata.read(mcap_records.parsed(file.body(position, opcode))).name
+            name = Metadata.read(mcap_records.body_stream(file.body(offset, opcode))).name
             file.metadata.append(
-                MetadataIndex(offset=position, length=after - position, name=name)
+                MetadataIndex(offset=offset, length=next_offset - offset, name=name)
             )
 
-    def _chunk(self, position: int, after: int) -> None:
-        data = mcap_records.chunk_data(self.file.body(position, Opcode.CHUNK))
+    def _add_chunk(self, offset: int, next_offset: int) -> None:
+        data = mcap_records.chunk_data(self.file.body(offset, Opcode.CHUNK))
         for opcode, start, end in mcap_records.frames(data):
             if opcode != Opcode.MESSAGE:
-                self.file.define(opcode, data[start:end])
-        self._piece(mcap_records.messages(data), position, after, is_chunk=True)
+                self.file.add_definition(opcode, data[start:end])
+        self._add_piece(mcap_records.messages(data), offset, next_offset, is_chunk=True)
 
-    def _loose_message(self, position: int, after: int) -> None:
-        if self.loose and after - self.loose_offset > _LOOSE_RUN_BYTES:
-            self._end_loose(position)
-        if not self.loose:
-            self.loose_offset = position
-        self.loose += mcap_records.messages(self.file.bytes_at(position, after - position))
+    def _add_unchunked_message(self, offset: int, next_offset: int) -> None:
+        if self.unchunked and next_offset - self.unchunked_offset > _UNCHUNKED_RUN_BYTES:
+            self._end_unchunked_run(offset)
+        if not self.unchunked:
+            self.unchunked_offset = offset
+        self.unchunked += mcap_records.messages(self.file.bytes_at(offset, next_offset - offset))
 
-    def _end_loose(self, position: int) -> None:
-        self._piece(self.loose, self.loose_offset, position, is_chunk=False)
-        self.loose = []
+    def _end_unchunked_run(self, offset: int) -> None:
+        self._add_piece(self.unchunked, self.unchunked_offset, offset, is_chunk=False)
+        self.unchunked = []
 
-    def _piece(self, messages: list[Message], start: int, end: int, *, is_chunk: bool) -> None:
+    def _add_piece(self, messages: list[Message], start: int, end: int, *, is_chunk: bool) -> None:
         if messages:
             times = [message.log_time_ns for message in messages]
             self.file.counts.update(message.channel_id for message in messages)
             self.file.pieces.append(Piece(start, end - start, min(times), max(times), is_chunk))
 
     def _drop_undefined(self) -> None:
-        """What a damaged chunk defined is gone for the messages of later chunks too."""
+        """Drop channels and messages whose definitions were in a damaged chunk."""
         file = self.file
         file.channels = {k: c for k, c in file.channels.items() if file.is_defined(c)}
         for channel_id in [k for k in file.counts if k not in file.channels]:
             count = file.counts.pop(channel_id)
-            self._note(f"{count} messages of channel {channel_id}, which is not described")
+            self._add_damage(f"{count} messages of channel {channel_id}, which is not described")
 
-    def _give_up(self, start: int, end: int, reason: str) -> None:
+    def _skip(self, start: int, end: int, reason: str) -> None:
         self.file.bytes_lost += end - start
-        self._note(f"{end - start} bytes at byte {start}: {reason}")
+        self._add_damage(f"{end - start} bytes at byte {start}: {reason}")
 
-    def _note(self, damage: str) -> None:
+    def _add_damage(self, damage: str) -> None:
         if not self.salvage:
             raise BagError(
                 f"{self.file.path}: damaged, {damage}; run `mfba recover {self.file.path}`"

@@ -23,7 +23,7 @@ _PRIMITIVES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """A message type as a bag carries it: `pkg/msg/Name`, schema text, RIHS01 hash."""
+    """A message type as stored in a bag: `pkg/msg/Name`, schema text, RIHS01 hash."""
 
     type_name: str
     text: str
@@ -32,44 +32,44 @@ class Definition:
 
 
 def definition_of(type_name: str) -> Definition:
-    """The definition of an installed type. Raises InputError for one that is not installed."""
+    """The definition of a message type. Raises InputError if it is not installed."""
     return _definition(type_name, _prefixes())
 
 
 def _prefixes() -> tuple[str, ...]:
-    # A sourced workspace names its prefixes; the wheels put share/ under sys.prefix.
+    # A sourced workspace lists its prefixes; the wheels install share/ under sys.prefix.
     ament = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     return (*(prefix for prefix in ament if prefix), sys.prefix)
 
 
 @cache
 def _definition(type_name: str, prefixes: tuple[str, ...]) -> Definition:
-    parts = type_name.split("/")
-    if len(parts) != 3 or parts[1] != "msg" or not all(parts):
+    fields = type_name.split("/")
+    if len(fields) != 3 or fields[1] != "msg" or not all(fields):
         raise InputError(
-            f"{type_name!r}: not a message type; write it in three parts, like std_msgs/msg/String"
+            f"{type_name!r}: not a message type; write package/msg/Name, like std_msgs/msg/String"
         )
-    path = _msg_file(parts[0], parts[2], prefixes)
-    own, *dependencies = _with_dependencies(parts[0], parts[2], prefixes, set())
+    path = _msg_file(fields[0], fields[2], prefixes)
+    own, *dependencies = _with_dependencies(fields[0], fields[2], prefixes, set())
     blocks = [f"{_SEPARATOR}MSG: {package}/{name}\n{text}" for package, name, text in dependencies]
     return Definition(type_name, own[2] + "".join(blocks), _type_hash(type_name, path))
 
 
 def _with_dependencies(
-    package: str, name: str, prefixes: tuple[str, ...], seen: set[tuple[str, str]]
+    package: str, name: str, prefixes: tuple[str, ...], visited: set[tuple[str, str]]
 ) -> list[tuple[str, str, str]]:
-    """(package, name, .msg text) of a type and all it uses, depth first, each once.
+    """(package, name, .msg text) of a type and its dependencies, depth first, each once.
 
-    What a type uses comes in alphabetical order, so that the text is rosbag2's to the byte.
+    Dependencies are sorted by name, so that the text equals rosbag2's to the byte.
     """
-    seen.add((package, name))
+    visited.add((package, name))
     text = _msg_file(package, name, prefixes).read_text(encoding="utf-8")
     found = [(package, name, text)]
     fields = [match for match in map(_FIELD_TYPE.match, text.splitlines()) if match]
     uses = {(match[1] or package, match[2]) for match in fields if match[2] not in _PRIMITIVES}
     for used in sorted(uses):
-        if used not in seen:
-            found += _with_dependencies(*used, prefixes, seen)
+        if used not in visited:
+            found += _with_dependencies(*used, prefixes, visited)
     return found
 
 

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decisions at the end of a bag whose inputs never came into it: what is said of them.
+"""Notes about omitted decisions: those at the end of a bag whose inputs were not recorded.
 
-A node that is killed takes with it what it had sent but not yet delivered to everybody: the
-planner may have answered what the recorder never got. Such a bag is read without the decisions
-that came after the end of their inputs' topic. An input that lacks before that end is a hole, and
-is refused.
+A node that is killed loses messages it sent but did not deliver to all subscribers: the planner
+may have received an input that the recorder did not. Decisions after the last message of their
+input's topic are therefore omitted. An input that is missing earlier is an error of the bag.
 """
 
 from __future__ import annotations
@@ -16,17 +15,17 @@ from typing import TextIO
 from .robot_topics import of_robot
 
 
-def left_out(stamps: Collection[int], topics: Collection[str]) -> str:
-    """What is said of decisions under these stamps, in ns, that came after the topics' end."""
+def omission_text(stamps: Collection[int], topics: Collection[str]) -> str:
+    """The note about decisions with these stamps, in ns, after the last message of the topics."""
     last = "decision" if len(stamps) == 1 else f"{len(stamps)} decisions"
     return (
         f"left out the last {last}, from stamp {min(stamps)} ns on: "
-        f"{', '.join(topics)} ended before (a node that was killed?)"
+        f"{', '.join(topics)} ended before (was a node killed?)"
     )
 
 
-def tell(path: Path, said: Mapping[str, str], file: TextIO | None = None) -> None:
-    """Print a line for each robot of a bag of which something is left out ("": nothing is)."""
-    for robot, what in said.items():
-        if what:
-            print(f"note: {path}: {of_robot(robot, what)}", file=file)
+def tell(path: Path, omissions: Mapping[str, str], file: TextIO | None = None) -> None:
+    """Print the note of each robot of a bag, from the notes by robot ("": nothing to print)."""
+    for robot, text in omissions.items():
+        if text:
+            print(f"note: {path}: {of_robot(robot, text)}", file=file)

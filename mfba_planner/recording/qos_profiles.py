@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Offered QoS as plain data, and the words rosbag2 writes for it."""
+"""Offered QoS profiles as plain data, and in rosbag2's YAML."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from . import yaml_text
 INFINITE_NS = 2**63 - 1
 _NS_PER_S = 1_000_000_000
 
-# rmw's enumerations in their numeric order: metadata.yaml before version 9 holds the numbers.
+# rmw's enumerations by number: metadata.yaml before version 9 holds the numbers.
 HISTORY = ("system_default", "keep_last", "keep_all", "unknown")
 RELIABILITY = ("system_default", "reliable", "best_effort", "unknown", "best_available")
 DURABILITY = ("system_default", "transient_local", "volatile", "unknown", "best_available")
@@ -31,7 +31,7 @@ LIVELINESS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OfferedQos:
-    """One publisher's QoS in rosbag2's words; durations in ns, INFINITE_NS for none."""
+    """One publisher's QoS with rosbag2's names; durations in ns, INFINITE_NS for none."""
 
     history: str = "keep_last"
     depth: int = 10
@@ -45,7 +45,7 @@ class OfferedQos:
 
 
 def to_list(profiles: Iterable[OfferedQos]) -> list[dict[str, Any]]:
-    """The YAML list of metadata.yaml version 9, keys in rosbag2's order."""
+    """The YAML list of metadata.yaml version 9, keys in rosbag2's sequence."""
     return [
         {
             "history": qos.history,
@@ -63,12 +63,12 @@ def to_list(profiles: Iterable[OfferedQos]) -> list[dict[str, Any]]:
 
 
 def to_text(profiles: Iterable[OfferedQos]) -> str:
-    """The same list as YAML text, as an MCAP channel's metadata carries it."""
+    """The same list as YAML text, the form in an MCAP channel's metadata."""
     return yaml_text.dump(to_list(profiles))
 
 
 def from_list(value: object) -> tuple[OfferedQos, ...]:
-    """Profiles of a YAML list, or of its text; words or rmw's numbers. Raises BagError."""
+    """Profiles of a YAML list, or of its text; names or rmw's numbers. Raises BagError."""
     try:
         items: Any = yaml_text.load(value) if isinstance(value, str) else value
         return tuple(_from_item(item) for item in items or ())
@@ -107,5 +107,5 @@ def _to_time(total_ns: int) -> dict[str, int]:
 
 
 def _from_time(item: Mapping[str, Any]) -> int:
-    # rosbag2 clamps what it cannot hold; more than 2**63-1 ns means "none" too.
+    # Like rosbag2: more than 2**63-1 ns means infinite.
     return min(int(item["sec"]) * _NS_PER_S + int(item["nsec"]), INFINITE_NS)

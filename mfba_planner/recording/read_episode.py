@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a bag back to Episodes: what a planner saw and decided, tick by tick, without ROS."""
+"""Read a bag back into Episodes: the decisions of each tick, without ROS."""
 
 from __future__ import annotations
 
@@ -27,57 +27,58 @@ TRUTH = "/ground_truth"
 
 
 class Recording(NamedTuple):
-    """What a bag holds: the scenario as it was given, its seed, and an Episode by robot."""
+    """Content of a bag: the scenario as configured, its seed, and an Episode by robot."""
 
     scenario: Scenario
     seed: int
-    episodes: dict[str, Episode]  # in the scenario's order; a robot alone is called ALONE
-    missed: dict[str, str]  # of whom the last decisions are left out: which, and why
+    episodes: dict[str, Episode]  # in the scenario's sequence; NO_NAMESPACE for a single robot
+    missed: dict[str, str]  # by robot: which last decisions are omitted, and why
 
 
 def read_recording(
     path: str | Path, robots: Sequence[str] = (), *, salvage: bool = False
 ) -> Recording:
-    """The Episodes of a bag, of all its robots or those named; the others move as they went.
+    """The Episodes of a bag, of all its robots or those named; the others move as recorded.
 
-    Decisions after the end of their inputs are left out and named in `missed`. `salvage` also
-    reads a bag that was never closed. Raises BagError for a bag without configuration or without
-    decisions, where a decision's inputs are missing before their end, and for a robot that is
-    not there.
+    Decisions after the last of their inputs are omitted and noted in the Recording. `salvage`
+    also reads a bag that was never closed. Raises BagError for a bag without configuration or
+    decisions, for missing inputs before the last ones, and for an unknown robot.
     """
     with BagReader(path, salvage=salvage) as reader:
         scenario, seed, setups = read_setups(reader)
         names = list(setups)
-        wanted = chosen(reader.path, names, robots)
+        selected = chosen(reader.path, names, robots)
         ticks: dict[str, dict[int, Decision]] = {name: {} for name in names}
         missed: dict[str, str] = {}
-        for found in stream_decisions(reader, names, missed):
-            ticks[found.robot].setdefault(found.decision.stamp_ns, found.decision)
+        for recorded in stream_decisions(reader, names, missed):
+            ticks[recorded.robot].setdefault(recorded.decision.stamp_ns, recorded.decision)
         truth = _read_truth(reader, names)
     episodes = {
-        name: setup.episode(tuple(said for _, said in sorted(ticks[name].items())), truth[name])
+        name: setup.episode(
+            tuple(decision for _, decision in sorted(ticks[name].items())), truth[name]
+        )
         for name, setup in setups.items()
     }
     if scenario.robots:
         poses = [e.truth or tuple(tick.pose for tick in e.ticks) for e in episodes.values()]
         tick_ns = next(iter(setups.values())).planner.tick_ns
         worlds = dict(zip(names, scenarios_with_others(scenario, poses, tick_ns)))
-        episodes = {name: replace(episodes[name], scenario=worlds[name]) for name in wanted}
-    told = {name: missed[name] for name in episodes if name in missed}
-    return Recording(scenario, seed, episodes, told)
+        episodes = {name: replace(episodes[name], scenario=worlds[name]) for name in selected}
+    selected_notes = {name: text for name, text in missed.items() if name in episodes}
+    return Recording(scenario, seed, episodes, selected_notes)
 
 
 def read_episode(path: str | Path, *, salvage: bool = False) -> Episode:
-    """read_recording() of a bag of one robot; BagError for that of a fleet."""
+    """The Episode of a bag of one robot, as read_recording(); BagError for a fleet's bag."""
     with BagReader(path, salvage=salvage) as reader:
         read_setup(reader)
     return read_recording(path, salvage=salvage).episodes[NO_NAMESPACE]
 
 
 class Summary(NamedTuple):
-    """A run in short: episode has its last tick only where the bag was streamed.
+    """A run in short; `episode` holds only the last tick if the bag was streamed.
 
-    missed says which of the last decisions are left out, and why, "" where none is.
+    The last field is the note about omitted decisions, "" if none is.
     """
 
     episode: Episode
@@ -87,50 +88,52 @@ class Summary(NamedTuple):
 
 
 def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
-    """The Summary of a bag of one robot, of any length.
+    """The Summary of a bag of one robot, of any length: the bag is streamed.
 
-    Streams; raises as read_episode does, and where the stamp of a decision goes back.
+    Raises as read_episode(), and BagError if the stamp of a decision decreases.
     """
     with BagReader(path, salvage=salvage) as reader:
         setup, truth = read_setup(reader), _read_truth(reader, [NO_NAMESPACE])[NO_NAMESPACE]
         missed: dict[str, str] = {}
-        stream = (found.decision for found in rising_decisions(reader, [NO_NAMESPACE], missed))
-        first = next(stream)  # or it raises
-        tally, hashed = MetricsAccumulator(setup.episode((first,))), Digest()
+        stream = (
+            recorded.decision for recorded in rising_decisions(reader, [NO_NAMESPACE], missed)
+        )
+        first = next(stream)  # raises BagError without decisions
+        metrics, hasher = MetricsAccumulator(setup.episode((first,))), Digest()
         for tick in chain([first], stream):
-            tally.add(tick, truth.get(tick.stamp_ns))
-            hashed.add(tick)
+            metrics.add(tick, truth.get(tick.stamp_ns))
+            hasher.add(tick)
     episode = setup.episode((tick,), truth)
-    result = tally.result(episode.outcome)
-    return Summary(episode, result, hashed.hexdigest(), missed.get(NO_NAMESPACE, ""))
+    result = metrics.result(episode.outcome)
+    return Summary(episode, result, hasher.hexdigest(), missed.get(NO_NAMESPACE, ""))
 
 
 def summaries(
     path: str | Path, robots: Sequence[str] = (), *, salvage: bool = False
 ) -> dict[str, Summary]:
-    """The Summary of each robot of a bag, or of those named; raises as read_recording does."""
+    """The Summary of each robot of a bag, or of those named; raises as read_recording()."""
     with BagReader(path, salvage=salvage) as reader:
         names = list(read_setups(reader).by_robot)
         chosen(reader.path, names, robots)
     if names == [NO_NAMESPACE]:
         return {NO_NAMESPACE: summarize(path, salvage=salvage)}
-    # What the others did is part of what happened to each, so all has to be read first.
-    found = read_recording(path, robots, salvage=salvage)
+    # The robots are moving obstacles of each other, so all are read before any is evaluated.
+    recorded = read_recording(path, robots, salvage=salvage)
     return {
-        name: Summary(e, evaluate(e), digest(e.ticks), found.missed.get(name, ""))
-        for name, e in found.episodes.items()
+        name: Summary(e, evaluate(e), digest(e.ticks), recorded.missed.get(name, ""))
+        for name, e in recorded.episodes.items()
     }
 
 
 def _read_truth(reader: BagReader, robots: Sequence[str]) -> dict[str, dict[int, Pose2D]]:
-    """Where each robot really was, by stamp, in a bag that says so."""
-    found: dict[str, dict[int, Pose2D]] = {robot: {} for robot in robots}
+    """The true pose of each robot by stamp; empty if the bag has no ground truth."""
+    recorded: dict[str, dict[int, Pose2D]] = {robot: {} for robot in robots}
     if not any(below(robot, TRUTH) in reader.topics for robot in robots):
-        return found
+        return recorded
     for robot, message in messages_by_robot(reader, robots, [TRUTH]):
         odom = message.message
         try:
-            found[robot][stamp_ns(odom.header.stamp)] = robot_pose(odom)
+            recorded[robot][stamp_ns(odom.header.stamp)] = robot_pose(odom)
         except InputError as error:
             raise BagError(f"{reader.path}: {below(robot, TRUTH)}: {error}") from None
-    return found
+    return recorded

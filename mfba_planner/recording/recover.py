@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Make an ordinary bag of one that was killed, truncated or damaged."""
+"""Recover the whole records of a killed, truncated or damaged bag into a new bag."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .bag_writer import BagWriter
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecoverReport:
-    """What came over: messages and source chunks; what did not: bytes, and `problems`."""
+    """Counts of copied messages, source chunks and attachments; bytes lost and `problems`."""
 
     source: Path
     output: Path
@@ -26,9 +26,9 @@ class RecoverReport:
 
 
 def recover(path: str | Path, out_dir: str | Path) -> RecoverReport:
-    """Copy all that is whole of a bag into a new one, streaming; the source stays as it is.
+    """Copy the whole records of a bag into a new one, streaming; the source is not changed.
 
-    Raises BagError when there is nothing, OutputError when `out_dir` exists or is full.
+    Raises BagError if there are none, OutputError if `out_dir` exists or the disk is full.
     """
     with BagReader(path, salvage=True) as reader:
         if not reader.message_count and not reader.complete:
@@ -41,7 +41,7 @@ def recover(path: str | Path, out_dir: str | Path) -> RecoverReport:
             attachments = _copy(reader, writer)
             writer.close()
         except BaseException:
-            # The source is still there: half a copy helps nobody.
+            # The source still exists, so a partial copy is removed.
             writer.discard()
             raise
         return RecoverReport(

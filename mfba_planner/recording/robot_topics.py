@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whose messages are whose: who is alone has its topics at the root, others below their names.
+"""Topic names of each robot in a bag: at the root for a single robot, else in its namespace.
 
-A robot is called by its name, one that is alone ALONE. What it said is handed out under the
-topic's name at the root, so that nobody else needs to know of namespaces.
+A robot is identified by its name, a single robot by NO_NAMESPACE. Messages are returned with the
+topic name at the root, so that readers need no namespaces.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ NO_NAMESPACE = ""
 
 
 def below(robot: str, topic: str) -> str:
-    """The name of a robot's topic in a bag, from its name at the root."""
+    """The full name of a robot's topic in a bag, from its name at the root."""
     return f"/{robot}{topic}" if robot else topic
 
 
 def messages_by_robot(
     reader: BagReader, robots: Sequence[str], topics: Collection[str]
 ) -> Iterator[tuple[str, DecodedMessage]]:
-    """Yield (robot, message under its topic's name at the root) in one pass, by log time."""
-    owners = {below(robot, topic): (robot, topic) for robot in robots for topic in topics}
-    for message in reader.decoded(owners):
-        robot, topic = owners[message.topic]
+    """Yield (robot, message with its topic name at the root) in one pass, by log time."""
+    robot_topics = {below(robot, topic): (robot, topic) for robot in robots for topic in topics}
+    for message in reader.decoded(robot_topics):
+        robot, topic = robot_topics[message.topic]
         yield robot, message._replace(topic=topic)
 
 
 def chosen(path: Path, robots: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
-    """The wanted ones of a bag's robots, all where none is named. BagError for one not there."""
+    """The wanted robots of a bag, all if none is named. BagError for an unknown robot."""
     for name in wanted:
         if NO_NAMESPACE in robots:
             raise BagError(f"{path}: holds one robot's run, and no {name}; leave out --robot")
@@ -42,6 +42,6 @@ def chosen(path: Path, robots: Sequence[str], wanted: Sequence[str]) -> tuple[st
     return tuple(name for name in robots if name in wanted) if wanted else tuple(robots)
 
 
-def of_robot(robot: str, said: str) -> str:
-    """A line about a robot of a bag; of one that is alone it needs no name."""
-    return f"{robot}: {said}" if robot else said
+def of_robot(robot: str, text: str) -> str:
+    """A line of text with the robot's name in front; unchanged for a single robot."""
+    return f"{robot}: {text}" if robot else text

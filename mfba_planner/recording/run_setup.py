@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bag's configuration says about the run, of each robot."""
+"""Read the setup of a run from a bag's configuration: scenario, parameters, seed, by robot."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from .robot_topics import NO_NAMESPACE
 
 T = TypeVar("T")
 
-# Options younger than the oldest bags: what they default to is what was done then.
-LATER = ("method", "jump_m", "scan_radius_m", "speed_limit.", "recovery.")
+# Options that older bags lack; their defaults are the behaviour of that time.
+NEWER_OPTIONS = ("method", "jump_m", "scan_radius_m", "speed_limit.", "recovery.")
 
 
 class Setup(NamedTuple):
-    """What is said about one robot; of a fleet, the others stand at their starts."""
+    """The setup of one robot; in a fleet's scenario the others stand at their starts."""
 
     scenario: Scenario
     sensor: SensorParams
@@ -36,13 +36,13 @@ class Setup(NamedTuple):
     seed: int
     driver: str
     lockstep: bool
-    odom_frame: str = ""  # that its inputs must be in; "": any
-    scan_frame: str = ""  # and its sensor's scans
+    odom_frame: str = ""  # required frame of the inputs; "": any
+    scan_frame: str = ""  # required frame of the scans; "": any
 
     def episode(self, ticks: tuple[Decision, ...], truth: Mapping[int, Pose2D] = {}) -> Episode:
-        """The Episode of these decisions, at least one; truth is where the robot was, by stamp."""
-        true = tuple(truth.get(tick.stamp_ns, tick.pose) for tick in ticks) if truth else ()
-        last = true[-1] if true else ticks[-1].pose
+        """The Episode of these decisions, at least one; `truth` is the true pose by stamp."""
+        true_poses = tuple(truth.get(tick.stamp_ns, tick.pose) for tick in ticks) if truth else ()
+        last_pose = true_poses[-1] if true_poses else ticks[-1].pose
         return Episode(
             scenario=self.scenario,
             sensor=self.sensor,
@@ -50,13 +50,13 @@ class Setup(NamedTuple):
             seed=self.seed,
             driver=self.driver,
             ticks=ticks,
-            outcome=_outcome(self.scenario, self.planner, ticks[-1].stamp_ns, last),
-            truth=true,
+            outcome=_outcome(self.scenario, self.planner, ticks[-1].stamp_ns, last_pose),
+            truth=true_poses,
         )
 
 
 class Setups(NamedTuple):
-    """What was run: the scenario as it was given, its seed, and a Setup by robot, in its order."""
+    """The scenario as configured, its seed, and a Setup by robot in the scenario's sequence."""
 
     scenario: Scenario
     seed: int
@@ -64,7 +64,7 @@ class Setups(NamedTuple):
 
 
 def read_setups(reader: BagReader) -> Setups:
-    """The configuration a bag carries, checked. Raises BagError."""
+    """Read and check the setups in a bag's configuration. Raises BagError."""
     configuration = read_configuration(reader)
     nodes = configuration.get("nodes", {})
     try:
@@ -73,22 +73,22 @@ def read_setups(reader: BagReader) -> Setups:
         names = scenario.robot_names
         starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
         worlds = scenarios_with_others(scenario, starts, world["tick_ns"]) if names else [scenario]
-        found = {}
-        for name, seen in zip(names or (NO_NAMESPACE,), worlds):
-            above = f"{name}/" if name else ""
-            planner, sensor = (nodes[above + node] for node in ("planner", "virtual_sensor"))
-            found[name] = Setup(
-                scenario=seen,
-                sensor=_only(SensorParams(), sensor),
-                planner=_only(PlannerParams(), planner),
+        setups = {}
+        for name, robot_scenario in zip(names or (NO_NAMESPACE,), worlds):
+            prefix = f"{name}/" if name else ""
+            planner, sensor = (nodes[prefix + node] for node in ("planner", "virtual_sensor"))
+            setups[name] = Setup(
+                scenario=robot_scenario,
+                sensor=_node_options(SensorParams(), sensor),
+                planner=_node_options(PlannerParams(), planner),
                 seed=planner["seed"],
                 driver=configuration["run"].get("driver", "by hand"),
                 lockstep=bool(planner["lockstep"]),
                 odom_frame=planner.get("odom_frame", ""),
                 scan_frame=sensor.get("scan_frame", ""),
             )
-        alone = found.get(NO_NAMESPACE)
-        return Setups(scenario, alone.seed if alone else world["seed"], found)
+        single = setups.get(NO_NAMESPACE)
+        return Setups(scenario, single.seed if single else world["seed"], setups)
     except (ConfigError, InputError) as error:
         raise BagError(f"{reader.path}: {error}") from None
     except KeyError as error:
@@ -98,24 +98,28 @@ def read_setups(reader: BagReader) -> Setups:
 
 
 def read_setup(reader: BagReader) -> Setup:
-    """read_setups() of a robot that is alone; BagError for a fleet's bag."""
-    found = read_setups(reader).by_robot
-    if NO_NAMESPACE not in found:
+    """The Setup of a bag of one robot; BagError for a fleet's bag."""
+    setups = read_setups(reader).by_robot
+    if NO_NAMESPACE not in setups:
         raise BagError(
-            f"{reader.path}: holds {len(found)} robots, and a bag of one is read here; use "
+            f"{reader.path}: holds {len(setups)} robots, but this reads a bag of one; use "
             "mfba_planner.recording.read_episode.read_recording"
         )
-    return found[NO_NAMESPACE]
+    return setups[NO_NAMESPACE]
 
 
-def _only(defaults: T, values: dict[str, Any]) -> T:
-    """The options of one dataclass out of all parameters of a node."""
-    told = [name for name in flatten(defaults) if name in values or not name.startswith(LATER)]
-    return override(defaults, {name: values[name] for name in told})
+def _node_options(defaults: T, values: dict[str, Any]) -> T:
+    """The options of one dataclass, from all parameters of a node."""
+    names = [
+        name for name in flatten(defaults) if name in values or not name.startswith(NEWER_OPTIONS)
+    ]
+    return override(defaults, {name: values[name] for name in names})
 
 
-def _outcome(scenario: Scenario, params: PlannerParams, last_ns: int, last: Pose2D) -> Outcome:
-    """How the run ended, judged as the simulated world judges it."""
+def _outcome(
+    scenario: Scenario, params: PlannerParams, last_ns: int, last_pose: Pose2D
+) -> Outcome:
+    """The outcome of the run by the rules of the simulated world."""
     world = World(scenario, params.tick_ns, params.goal_tolerance_m)
-    world.tick, world.pose = last_ns // params.tick_ns - 1, last
+    world.tick, world.pose = last_ns // params.tick_ns - 1, last_pose
     return world.outcome() or Outcome.INTERRUPTED

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bag's ticks as one tidy table, a row per decision, streamed."""
+"""A bag as a table of ticks: one row per decision, streamed; for `mfba export`."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Row = dict[str, Any]
 
 # name: (type, meaning); the ranges of the sectors follow as range_1, range_2, ...
 COLUMNS: dict[str, tuple[type, str]] = {
-    "robot": (str, "whose row it is; of fleets only"),
+    "robot": (str, "name of the robot; only for fleets"),
     "stamp_ns": (int, "stamp of the tick, ns"),
     "time_s": (float, "time since the first row's stamp, s"),
     "mode": (str, "mode of the planner"),
-    "reason": (str, "why it decided so"),
+    "reason": (str, "reason for the decision"),
     "x": (float, "pose, m"),
     "y": (float, "pose, m"),
     "yaw": (float, "pose, rad"),
@@ -38,34 +38,34 @@ COLUMNS: dict[str, tuple[type, str]] = {
 
 
 def read_rows(reader: BagReader, robots: Sequence[str], missed: dict[str, str]) -> Iterator[Row]:
-    """Yield the rows under rising stamps, those of a stamp in the order of robots.
+    """Yield the rows sorted by stamp, then in the sequence of `robots`.
 
-    Leaves out and raises BagError as rising_decisions does.
+    Omits decisions and raises BagError as rising_decisions().
     """
     first_ns: int | None = None
-    answers = rising_decisions(reader, robots, missed)
-    for stamp, found in groupby(answers, lambda answer: answer.decision.stamp_ns):
+    decisions = rising_decisions(reader, robots, missed)
+    for stamp, group in groupby(decisions, lambda recorded: recorded.decision.stamp_ns):
         first_ns = stamp if first_ns is None else first_ns
-        for answer in sorted(found, key=lambda answer: robots.index(answer.robot)):
-            yield _row(answer, first_ns)
+        for recorded in sorted(group, key=lambda recorded: robots.index(recorded.robot)):
+            yield _row(recorded, first_ns)
 
 
-def _row(answer: RecordedDecision, first_ns: int) -> Row:
-    found = answer.decision
-    goal = found.goal or (None, None)
+def _row(recorded: RecordedDecision, first_ns: int) -> Row:
+    decision = recorded.decision
+    goal = decision.goal or (None, None)
     return {
-        **({} if answer.robot == NO_NAMESPACE else {"robot": answer.robot}),
-        "stamp_ns": found.stamp_ns,
-        "time_s": (found.stamp_ns - first_ns) * NANO,
-        "mode": found.mode.value,
-        "reason": found.reason,
-        **dict(zip(("x", "y", "yaw"), found.pose)),
+        **({} if recorded.robot == NO_NAMESPACE else {"robot": recorded.robot}),
+        "stamp_ns": decision.stamp_ns,
+        "time_s": (decision.stamp_ns - first_ns) * NANO,
+        "mode": decision.mode.value,
+        "reason": decision.reason,
+        **dict(zip(("x", "y", "yaw"), decision.pose)),
         "goal_x": goal[0],
         "goal_y": goal[1],
-        **dict(zip(("waypoint_x", "waypoint_y"), found.waypoint)),
-        **dict(zip(("velocity_x", "velocity_y"), found.velocity)),
-        "gap": found.gap,
-        "vs": bits_text(found.vs),
-        "vg": bits_text(found.vg),
-        **{f"range_{k}": r for k, r in enumerate(answer.sectors.ranges, start=1)},
+        **dict(zip(("waypoint_x", "waypoint_y"), decision.waypoint)),
+        **dict(zip(("velocity_x", "velocity_y"), decision.velocity)),
+        "gap": decision.gap,
+        "vs": bits_text(decision.vs),
+        "vg": bits_text(decision.vg),
+        **{f"range_{k}": r for k, r in enumerate(recorded.sectors.ranges, start=1)},
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's constants and every reading of its gaps, as options of one swarm."""
+"""Parameters of a bat swarm: the paper's constants, and options where the paper is ambiguous."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from ..core.options import check, option
 
 
 class Algorithm(Enum):
-    """Which law draws beta of eq. 4."""
+    """How beta of eq. 4 is drawn."""
 
     BA = "ba"
     MFBA = "mfba"
 
 
 class Velocity(Enum):
-    """Eq. 5 as printed flies away from the best; the literature's sign flies towards it."""
+    """Sign of eq. 5: as printed bats move away from the best; in the literature, towards it."""
 
     TOWARDS_BEST = "towards_best"
     AS_PRINTED = "as_printed"
 
 
 class Schedule(Enum):
-    """Eq. 10's t: t/T stays in [0, 1] as eq. 4 demands; the raw t is what is printed."""
+    """The t of eq. 10: t/T stays in [0, 1] as eq. 4 requires; the raw t is as printed."""
 
     NORMALIZED = "normalized"
     RAW = "raw"
 
 
 class Bounds(Enum):
-    """Whether a bat that leaves the search region is put back onto its edge."""
+    """Whether a bat outside the search region is moved back to its edge."""
 
     CLAMP = "clamp"
     NONE = "none"
@@ -46,14 +46,14 @@ class Epsilon(Enum):
 
 
 class Initial(Enum):
-    """Eq. 3 with the sign that lands inside the box, or as printed (mirrored outside)."""
+    """Sign of eq. 3: inside the box, or as printed (mirrored, outside the box)."""
 
     INSIDE = "inside"
     AS_PRINTED = "as_printed"
 
 
 class Walk(Enum):
-    """Where the local walk of eq. 7 starts: the best ever seen, or the bat itself."""
+    """Where the local walk of eq. 7 starts: the best point so far, or the bat itself."""
 
     BEST = "best"
     SELF = "self"
@@ -67,7 +67,7 @@ class Step(Enum):
 
 
 class Acceptance(Enum):
-    """What a candidate must not be worse than: its bat, the best ever seen, or nothing."""
+    """What a candidate must not be worse than: its bat, the best so far, or nothing."""
 
     OWN = "own"
     BEST = "best"
@@ -83,7 +83,7 @@ class Update(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatParams:
-    """Constants of section 6.2 and the reading `robust` of what the paper leaves open."""
+    """Constants of section 6.2; where the paper is ambiguous, the reading `robust`."""
 
     algorithm: Algorithm = option(Algorithm.MFBA, "beta is random (ba) or follows eq. 10 (mfba)")
     population: int = option(5, "number of bats", minimum=2, maximum=10_000)

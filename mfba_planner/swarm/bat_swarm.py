@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bat swarm: BA (eq. 3-9) and MFBA (eq. 10), ask/tell, with the paper's gaps as options."""
+"""One bat swarm, BA (eq. 3-9) or MFBA (eq. 10), with an ask/tell interface; minimize()."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .bat_params import (
 )
 from .invalid_values import Failures
 from .search_region import Box, Disc, Region, Vector
-from .swarm_iteration import Law, Pair
+from .swarm_iteration import BatMotion, Pair
 
 __all__ = [
     "Acceptance", "Algorithm", "BatParams", "BatSwarm", "Bounds", "Box", "Disc", "Epsilon",
@@ -33,39 +33,39 @@ __all__ = [
     "draws_per_bat", "minimize",
 ]  # fmt: skip
 
-DRAWN_AHEAD = 2**14  # uniforms
+DRAWN_AHEAD = 2**14  # most uniforms drawn in one block
 
 
 def draws_per_bat(params: BatParams, d: int) -> int:
-    """Uniforms of one bat in one iteration: beta, gate, acceptance, d epsilons, a pair's two."""
+    """Uniforms of one bat in one iteration: beta, walk, acceptance, d epsilons, 2 for a pair."""
     return 3 + d + (2 if params.step is Step.PAIR else 0)
 
 
 class BatSwarm:
-    """One swarm that minimises: `ask()` for n candidates, `tell()` their n values, repeat.
+    """One swarm that minimizes: `ask()` for n candidates, `tell()` their n values, repeat.
 
     The first ask returns the initial population of eq. 3, each later one the candidates of
     iteration t = 1, 2, ... (eq. 4-7); tell accepts or refuses them (eq. 8, 9). Synchronous:
-    all bats of an iteration see the best of the iterations before. best_x and best_value are
-    the best so far, failures the values that were no numbers.
+    all bats of an iteration use the best of the previous iterations. best_x and best_value are
+    the best so far; failures counts the values that were not finite numbers.
     """
 
     __slots__ = (
         "_a",
+        "_accept_draws",
+        "_accept_start",
         "_ahead",
-        "_always",
+        "_always_update",
         "_asked",
-        "_each",
-        "_gate",
-        "_gates",
+        "_draw_iterators",
+        "_is_ba",
         "_iteration",
         "_limit",
         "_normalized",
+        "_pair_draws",
         "_paired",
-        "_picks",
+        "_per_coordinate",
         "_r",
-        "_random",
-        "_readers",
         "_rng",
         "_scale",
         "_stride",
@@ -93,15 +93,15 @@ class BatSwarm:
     ) -> None:
         """Draw the initial population (eq. 3) from rng, the only source of randomness.
 
-        horizon is T of eq. 10 where it is not params.iterations. The draws of iterations up to
-        `ahead` are taken in blocks, which is faster and gives the same swarm.
+        horizon is T of eq. 10 (default: params.iterations). The draws of iterations up to `ahead`
+        are taken in blocks: faster, with the same result.
         """
         self.params = params
         self.horizon = horizon or params.iterations
         self.region = region
         low, high = region.span()
         d = len(low)
-        self._iteration = Law.of(params, region).iteration(d)
+        self._iteration = BatMotion.of(params, region).iteration(d)
         self.t = 0
         self.best_x: Vector = []
         self.best_value = math.inf
@@ -119,48 +119,48 @@ class BatSwarm:
             ]
         )
         self._stride = draws_per_bat(params, d)
-        self._each = params.epsilon is Epsilon.PER_COORDINATE
+        self._per_coordinate = params.epsilon is Epsilon.PER_COORDINATE
         self._paired = params.step is Step.PAIR
-        self._random = params.algorithm is Algorithm.BA
+        self._is_ba = params.algorithm is Algorithm.BA
         self._normalized = params.schedule is Schedule.NORMALIZED
-        self._always = params.update is Update.ALWAYS
+        self._always_update = params.update is Update.ALWAYS
         self._limit = None if params.acceptance is Acceptance.OWN else params.acceptance
         self._v = [[0.0] * d for _ in range(n)]
         self._a = [params.a0] * n
         self._scale = params.sigma * math.fsum(self._a) / n  # of eq. 7
         self._r = [params.r0] * n
         self._values = [math.inf] * n
-        self._gates: Vector = []  # acceptance draws of the iterations drawn already
-        self._gate = 0  # where this iteration's begin
-        self._readers: list[Iterator[float]] = []
-        self._picks: list[Iterator[float]] = []
+        self._accept_draws: Vector = []  # acceptance draws of the current block of iterations
+        self._accept_start = 0  # index of this iteration's first one
+        self._draw_iterators: list[Iterator[float]] = []
+        self._pair_draws: list[Iterator[float]] = []
         self.candidates = list(self._x)
 
     def ask(self) -> list[Vector]:
-        """Return n candidates of d floats; asking twice without tell returns the same ones."""
+        """Return n candidates of d floats; a second call without tell() returns the same ones."""
         if not self._asked:
             self._asked = True
             if self.best_x:
                 self.t += 1
-                self.candidates = self._fly()
+                self.candidates = self._iterate()
         return self.candidates
 
     def tell(self, values: Sequence[Any]) -> None:
-        """Take the n objective values of the candidates last asked for; lower is better.
+        """Take the n objective values of the last candidates; lower is better.
 
-        What is no finite number (an exception stands for a call that raised) is counted in
-        failures; it is never the best, and none but +inf is accepted. Raises InputError for a
-        wrong count.
+        A value that is not a finite number (an exception stands for a call that raised) is
+        counted in failures. It never becomes the best, and only +inf can be accepted. Raises
+        InputError for a wrong count.
         """
         n = self.params.population
         if len(values) != n:
-            raise InputError(f"{len(values)} values told for {n} bats: tell one per candidate")
+            raise InputError(f"{len(values)} values for {n} bats: give one per candidate")
         if not self._asked:
-            raise InputError("tell without ask: call ask() for the next candidates first")
+            raise InputError("tell() without ask(): call ask() for the next candidates first")
         self._asked = False
         try:
             total = sum(values)
-        except Exception:  # of what is no number
+        except Exception:  # a value is not a number
             total = None
         finite = type(total) is float and total - total == 0.0
         if not finite:  # or the sum has overflowed
@@ -176,14 +176,16 @@ class BatSwarm:
             self.best_x, self.best_value = self.candidates[values.index(least)], least
 
     def change_region(self, region: Region, objective: Callable[[Vector], float]) -> None:
-        """Draw bats and best into another region and value them again, between tell and ask.
+        """Clamp bats and best into another region, evaluate them again; between tell and ask only.
 
-        Raises InputError at any other moment.
+        Raises InputError between ask and tell, and before the first tell.
         """
         if self._asked or not self.best_x:
-            raise InputError("resettle before tell: tell the values of the candidates first")
+            raise InputError(
+                "change_region() before tell(): give the values of the candidates first"
+            )
         self.region = region
-        self._iteration = Law.of(self.params, region).iteration(len(self.best_x))
+        self._iteration = BatMotion.of(self.params, region).iteration(len(self.best_x))
         self._x = self._bounded(self._x)
         self._values = [objective(x) for x in self._x]
         self.best_x = self._bounded([self.best_x])[0]
@@ -192,69 +194,70 @@ class BatSwarm:
 
     def beta(self, u: float) -> float:
         """Beta of eq. 4 from a uniform draw u: u itself (BA), or eq. 10 (MFBA)."""
-        return self._time() * self._decays([u])[0]
+        return self._time() * self._beta_factors([u])[0]
 
     def _time(self) -> float:
-        """The t of eq. 10; normalized it stays in [0, 1] beyond iteration T as well."""
-        if self._random:
+        """The t of eq. 10; normalized, it stays 1 beyond iteration T."""
+        if self._is_ba:
             return 1.0
         if not self._normalized:
             return self.t
         t = self.t / self.horizon
         return t if t < 1.0 else 1.0
 
-    def _decays(self, u: Vector) -> Vector:
-        """What t is multiplied with to give beta."""
-        if self._random:
+    def _beta_factors(self, u: Vector) -> Vector:
+        """Beta divided by t, for each draw."""
+        if self._is_ba:
             return u
         exp, rate = math.exp, -self.params.rho
         return [exp(rate * ui) for ui in u]  # eq. 10
 
     def _draw(self) -> None:
-        """Draw the uniforms of the next iterations, sorted by what they are for.
+        """Draw the uniforms of the next iterations, one iterator per purpose.
 
-        Every bat draws everything each time, used or not, so that one draw more or less never
-        shifts the others. Readers take one value per bat and go on where they stopped.
+        Every bat draws all its uniforms in each iteration, used or not, so that no option
+        shifts the draws of the others. Each iterator gives one value per bat and iteration.
         """
         n, d, stride = self.params.population, len(self.best_x), self._stride
         count = max(1, min(self._ahead - self.t + 1, DRAWN_AHEAD // (n * stride)))
         u = self._rng.random((count * n, stride)).T.tolist()
-        # An epsilon for each coordinate, or the first one for all of them.
-        epsilons = u[3 : 3 + d] if self._each else u[3:4] * d
-        self._readers = list(map(iter, (self._decays(u[0]), u[1], *epsilons)))
+        # One epsilon per coordinate, or the first one for all.
+        epsilons = u[3 : 3 + d] if self._per_coordinate else u[3:4] * d
+        self._draw_iterators = list(map(iter, (self._beta_factors(u[0]), u[1], *epsilons)))
         if self._paired:
-            self._picks = [iter(u[3 + d]), iter(u[4 + d])]
-        self._gates = u[2]
-        self._gate = 0
+            self._pair_draws = [iter(u[3 + d]), iter(u[4 + d])]
+        self._accept_draws = u[2]
+        self._accept_start = 0
 
-    def _fly(self) -> list[Vector]:
+    def _iterate(self) -> list[Vector]:
         """Candidates of one iteration, eq. 4-7."""
         p = self.params
-        self._gate += p.population
-        if self._gate >= len(self._gates):
+        self._accept_start += p.population
+        if self._accept_start >= len(self._accept_draws):
             self._draw()
-        pairs = self._pairs(*self._picks) if self._paired else None
-        bats = zip(self._x, self._v, self._r, *self._readers)
+        pairs = self._pairs(*self._pair_draws) if self._paired else None
+        bats = zip(self._x, self._v, self._r, *self._draw_iterators)
         return self._iteration(bats, self._time(), self.best_x, self._scale, pairs)
 
     def _pairs(self, ones: Iterator[float], others: Iterator[float]) -> list[Pair]:
-        """For every bat, where two different bats picked at random are."""
+        """For every bat, the positions of two different bats picked at random."""
         x = self._x
         n = len(x)
         picked = ((int(one * n), int(other * (n - 1))) for _, one, other in zip(x, ones, others))
         return [(x[a], x[(a + 1 + b) % n]) for a, b in picked]
 
     def _accept(self, values: Sequence[float]) -> None:
-        """Take candidates that are good enough, with probability A_i; then eq. 8 and 9."""
-        p, own, a, gates, gate = self.params, self._values, self._a, self._gates, self._gate
+        """Accept candidates that are good enough, with probability A_i; then eq. 8 and 9."""
+        p, own, a = self.params, self._values, self._a
+        draws, start = self._accept_draws, self._accept_start
         limits = own
         if self._limit is not None:
             limit = self.best_value if self._limit is Acceptance.BEST else math.inf
             limits = [limit] * len(own)
-        always = changed = self._always
+        always = changed = self._always_update
         rate = p.r0 * (1.0 - math.exp(-p.gamma * self.t))  # eq. 9
         for i, value in enumerate(values):
-            if value <= limits[i] and gates[gate + i] < a[i]:
+            if value <= limits[i] and draws[start + i] < a[i]:
                 self._x[i] = self.candidates[i]
                 own[i] = value
             elif not always:
@@ -279,7 +282,7 @@ class BatSwarm:
 
 
 def _value(objective: Callable[[Vector], float], x: Vector) -> Any:
-    """The value at x, or the exception that stands for it."""
+    """The value at x, or the exception raised there."""
     try:
         return objective(x)
     except Exception as error:
@@ -291,8 +294,8 @@ def minimize(
 ) -> BatSwarm:
     """Run one swarm for params.iterations and return it; see best_x, best_value and failures.
 
-    An objective that fails here and there does not lose the run. Raises InputError for one
-    that raised or returned no number every time.
+    Single failures of the objective are counted and the run continues. Raises InputError if
+    every call raised or returned no number.
     """
     swarm = BatSwarm(params, region, rng, ahead=params.iterations)
     ask, tell = swarm.ask, swarm.tell
@@ -301,7 +304,7 @@ def minimize(
         points = ask()
         try:
             for x in points:
-                values.append(objective(x))  # keeps what came before an exception
+                values.append(objective(x))  # keeps the values before an exception
         except Exception as error:
             values.append(error)  # named and counted by tell
             values += [_value(objective, x) for x in points[len(values) :]]

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many independent swarms at once: bat.py's equations on arrays, the same results bit by bit.
+"""Many independent swarms on arrays, with the same results as bat_swarm.py bit by bit.
 
-Every run has a generator of its own and draws what bat.py would draw; a stream read in one
-piece or in many is the same stream. What could differ in the last bit is done as bat.py does
-it: exp by the math module (numpy's differs in 5 % of the arguments), the mean loudness rounded
-once, as by fsum. So equal bits from the objective give equal bits in the result. Runs whose
-generators would be in the same state may share one: what they draw is drawn once.
+Every run has its own generator and draws the same numbers as bat_swarm.py. Operations that could
+differ in the last bit are done as there: exp by the math module (numpy's differs for 5 % of the
+arguments), and the mean loudness rounded once, as by fsum. So an objective with equal bits gives
+results with equal bits. Runs whose generators would be in the same state may share one.
 """
 
 from __future__ import annotations
@@ -39,8 +38,8 @@ Array = np.ndarray
 Objective = Callable[[Array], Array]
 
 _SCALE, _LARGEST = 2.0**60, 2.0**63
-CACHED_BATS = 8192  # flown at once: their arrays fit a processor's cache
-DRAWN = 2**20  # uniforms held at once
+CACHED_BATS = 8192  # bats iterated at once: their arrays fit into a processor's cache
+DRAWN = 2**20  # most uniforms in memory
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +70,8 @@ def minimize_batch(
         failures=np.zeros(runs, dtype=np.int64),
     )
     at_once = max(1, CACHED_BATS // params.population)
-    for begin in range(0, runs, at_once):
-        rows = slice(begin, begin + at_once)
+    for start in range(0, runs, at_once):
+        rows = slice(start, start + at_once)
         swarms = Swarms(objective, region, params, rngs[rows])
         result.history[rows] = swarms.run()
         result.best_value[rows] = swarms.best_value
@@ -95,16 +94,16 @@ class Swarms:
         rngs: Sequence[Generator],
         shared: Sequence[int] | None = None,
     ) -> None:
-        """Take a generator per run, or fewer, of which run i draws from number shared[i]."""
+        """Take one generator per run, or fewer: run i then uses generator number shared[i]."""
         self.objective, self.region, self.params, self.rngs = objective, region, params, rngs
         self.runs = len(rngs if shared is None else shared)
-        # One generator for all is spread over them by arithmetic itself.
+        # A single generator for all runs needs no index: numpy broadcasts its draws.
         self.shared = None if shared is None or len(rngs) == 1 else np.array(shared)
         self.d = len(region.span()[0])
         self.stride = draws_per_bat(params, self.d)
 
-    def _begin(self) -> None:
-        """Draw and value the first population."""
+    def _start(self) -> None:
+        """Draw and evaluate the first population."""
         n, d, runs, params = self.params.population, self.d, self.runs, self.params
         sign = 1.0 if params.initial is Initial.INSIDE else -1.0
         u = np.empty((len(self.rngs), n, d))
@@ -130,19 +129,19 @@ class Swarms:
         self._keep_best(values)
 
     def run(self) -> Array:
-        """Fly T iterations; the best values (R, T + 1) of the first population and after each."""
+        """Run T iterations; best values (R, T + 1), first those of the initial population."""
         p = self.params
         history = np.empty((self.runs, p.iterations + 1))
         with np.errstate(over="ignore", invalid="ignore"):
-            self._begin()
+            self._start()
             history[:, 0] = self.best_value
             done = 0
-            each = len(self.rngs) * p.population * self.stride
+            per_iteration = len(self.rngs) * p.population * self.stride
             while done < p.iterations:
-                count = min(p.iterations - done, max(1, DRAWN // each))
+                count = min(p.iterations - done, max(1, DRAWN // per_iteration))
                 for u in self._draw(count):
                     done += 1
-                    self.candidates = self._fly(u, done)
+                    self.candidates = self._iterate(u, done)
                     values = self._value()
                     self._accept(values, u[2], done)
                     self._keep_best(values)
@@ -150,7 +149,7 @@ class Swarms:
         return history
 
     def _draw(self, count: int) -> Array:
-        """Uniforms of so many iterations, (count, stride, R or 1, n): bat.py's order in a run."""
+        """Uniforms of the next iterations, (count, stride, R or 1, n), as in bat_swarm.py."""
         n, stride = self.params.population, self.stride
         u = np.empty((count, stride, len(self.rngs), n))
         for i, rng in enumerate(self.rngs):
@@ -161,12 +160,12 @@ class Swarms:
         p = self.params
         if p.algorithm is Algorithm.BA:
             return u
-        when = min(1.0, t / p.iterations) if p.schedule is Schedule.NORMALIZED else t
+        t_eq_10 = min(1.0, t / p.iterations) if p.schedule is Schedule.NORMALIZED else t
         exponents = (-p.rho * u).ravel().tolist()
         betas = np.fromiter(map(math.exp, exponents), float, len(exponents))
-        return when * betas.reshape(u.shape)  # eq. 10
+        return t_eq_10 * betas.reshape(u.shape)  # eq. 10
 
-    def _fly(self, u: Array, t: int) -> Array:
+    def _iterate(self, u: Array, t: int) -> Array:
         """Candidates (d, R, n) of iteration t, eq. 4-7, from its uniforms (stride, R, n)."""
         p = self.params
         sign = 1.0 if p.velocity is Velocity.TOWARDS_BEST else -1.0
@@ -178,13 +177,13 @@ class Swarms:
         if p.inertia != 1.0:
             v *= p.inertia
         v += (best - x) * f  # eq. 5
-        flown = x + v  # eq. 6
+        moved = x + v  # eq. 6
         epsilon = 2.0 * (u[3:4] if p.epsilon is Epsilon.SCALAR else u[3 : 3 + self.d]) - 1.0
         if pair:
-            here, there = (np.take_along_axis(x, bats[None], axis=2) for bats in pair)
-            epsilon = epsilon * (there - here)
-        candidates = (best if p.walk is Walk.BEST else flown) + scale * epsilon  # eq. 7
-        np.copyto(candidates, flown, where=~walk)
+            one, other = (np.take_along_axis(x, bats[None], axis=2) for bats in pair)
+            epsilon = epsilon * (other - one)
+        candidates = (best if p.walk is Walk.BEST else moved) + scale * epsilon  # eq. 7
+        np.copyto(candidates, moved, where=~walk)
         self._bound(candidates)
         return candidates
 
@@ -216,13 +215,13 @@ class Swarms:
             values[values == -math.inf] = math.nan
         return values
 
-    def _accept(self, values: Array, gate: Array, t: int) -> None:
-        """Take what is good enough, with probability A_i; then eq. 8 and 9."""
+    def _accept(self, values: Array, accept_draw: Array, t: int) -> None:
+        """Accept candidates that are good enough, with probability A_i; then eq. 8 and 9."""
         p = self.params
         limit: Array | float = self.values
         if p.acceptance is not Acceptance.OWN:
             limit = self.best_value[:, None] if p.acceptance is Acceptance.BEST else math.inf
-        accepted = (values <= limit) & (gate < self.a)
+        accepted = (values <= limit) & (accept_draw < self.a)
         np.copyto(self.x, self.candidates, where=accepted)
         np.copyto(self.values, values, where=accepted)
         changed = accepted if p.update is Update.ACCEPTED else np.full_like(accepted, True)
@@ -232,9 +231,9 @@ class Swarms:
             self._average()
 
     def _average(self) -> None:
-        """Sigma times the mean loudness, rounded once, as fsum is.
+        """Sigma times the mean loudness, rounded once, as by fsum.
 
-        As multiples of 2^-60 loudnesses are added up as whole numbers: nothing is lost.
+        Where all loudnesses are multiples of 2^-60, their sum as integers is exact.
         """
         p, scaled = self.params, self.a * _SCALE
         if self.a.size and scaled.max() * p.population < _LARGEST:
@@ -246,7 +245,7 @@ class Swarms:
         self.loudness = np.array(sums)
 
     def _keep_best(self, values: Array) -> None:
-        """Remember the best of the candidates where it is better than all before."""
+        """Update the best where the best candidate is better."""
         values = values if self.finite else _numbers(values)
         first = values.argmin(axis=1)
         least = values[self.row, first]
@@ -255,7 +254,7 @@ class Swarms:
         np.copyto(self.best_x, self.candidates[:, self.row, first], where=better)
 
     def _bound(self, x: Array) -> None:
-        """Put (d, R, n) points outside back onto the edge."""
+        """Move (d, R, n) points outside to the edge of the region."""
         if self.params.bounds is Bounds.NONE:
             return
         if isinstance(self.region, Disc):
@@ -265,14 +264,14 @@ class Swarms:
 
 
 def _into_box(x: Array, box: Box) -> None:
-    """Each coordinate is cut to its interval, a NaN to the lower edge: as Box.clamp."""
+    """As Box.clamp: each coordinate is cut to its interval, NaN to the lower edge."""
     for xj, low, high in zip(x, *box.span()):
         np.copyto(xj, low, where=~(xj > low))
         np.copyto(xj, high, where=~(xj < high))
 
 
 def _into_disc(x: Array, disc: Disc) -> None:
-    """A point outside is drawn back along its radius: as Disc.clamp."""
+    """As Disc.clamp: a point outside is moved along its radius to the edge."""
     center = np.array(disc.center)[:, None, None]
     offset = x - center
     squares = offset * offset
@@ -284,5 +283,5 @@ def _into_disc(x: Array, disc: Disc) -> None:
 
 
 def _numbers(values: Array) -> Array:
-    """A NaN is worse than any number."""
+    """The values with NaN replaced by inf."""
     return np.where(np.isnan(values), math.inf, values)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values of an objective that are no numbers: named and counted, so that the run goes on."""
+"""Objective values that are not finite numbers: classified and counted."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 
 @dataclass(slots=True)
 class Failures:
-    """How often an objective failed, by name, and the first failure with its point."""
+    """How often an objective failed, by kind of failure, and the first failure with its point."""
 
     counts: dict[str, int] = field(default_factory=dict)
     first: str = ""
-    broken: int = 0  # raised, or returned what is no number at all
+    broken: int = 0  # raised, or returned something that is not a number
 
     def number(self, value: Any, x: object) -> float:
-        """Return the value as a float; what is no finite number is counted.
+        """Return the value as a float; count it if it is not a finite number.
 
-        +inf stays what it is, the worst of all; NaN stands for everything else.
+        +inf is returned as it is, any other failure as NaN.
         """
-        name, number = _judge(value)
+        name, number = _classify(value)
         if name:
             self.counts[name] = self.counts.get(name, 0) + 1
             self.broken += name not in ("NaN", "inf", "-inf")
@@ -30,19 +30,19 @@ class Failures:
         return number
 
     def __bool__(self) -> bool:
-        """Tell whether anything has failed."""
+        """Whether any value has failed."""
         return bool(self.counts)
 
     def __str__(self) -> str:
-        """One line: how many of what, and the first."""
+        """One line: the counts, and the first failure."""
         if not self:
             return "no failures"
-        parts = ", ".join(f"{count} x {name}" for name, count in self.counts.items())
-        return " ".join(f"{parts}; first: {self.first}".split())
+        counts = ", ".join(f"{count} x {name}" for name, count in self.counts.items())
+        return " ".join(f"{counts}; first: {self.first}".split())
 
 
-def _judge(value: Any) -> tuple[str, float]:
-    """Name of a failure ("" for none) and the number that stands for the value."""
+def _classify(value: Any) -> tuple[str, float]:
+    """Name of the failure ("" for none) and the number that replaces the value."""
     if isinstance(value, BaseException):
         return f"raised {type(value).__name__}", math.nan
     shape = getattr(value, "shape", ())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where bats search: a box in d dimensions, or the disc of one step in the plane."""
+"""Search regions of the bats: a box in d dimensions, or a disc in the plane."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Vector = list[float]
 
 
 class Region(Protocol):
-    """Where the bats search."""
+    """A search region."""
 
     def span(self) -> tuple[Vector, Vector]:
         """Return x_min and x_max of eq. 3, d floats each."""
@@ -22,7 +22,7 @@ class Region(Protocol):
         """Return a box in whose interior clamp changes nothing."""
 
     def clamp(self, x: Vector) -> Vector:
-        """Return x, or the point of the edge that replaces an x outside."""
+        """Return x, or for an x outside a point on the edge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Box:
     upper: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Refuse a box in which nothing can be searched."""
+        """Raise ConfigError for bounds that are not finite numbers with lower <= upper."""
         try:
             for name in ("lower", "upper"):
                 edge = tuple(float(v) for v in getattr(self, name))
@@ -60,7 +60,7 @@ class Box:
         return self.span()
 
     def clamp(self, x: Vector) -> Vector:
-        """Each coordinate is cut to its interval, a NaN to the lower edge."""
+        """Each coordinate is cut to its interval, NaN to the lower edge."""
         return [
             (v if v < high else high) if v > low else low
             for v, low, high in zip(x, self.lower, self.upper)
@@ -69,7 +69,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """Disc in the plane: the points a robot can reach in one step."""
+    """Disc in the plane: the points a robot can reach in one goal step."""
 
     radius: float
     center: tuple[float, float] = (0.0, 0.0)
@@ -85,7 +85,7 @@ class Disc:
         return [cx - r, cy - r], [cx + r, cy + r]
 
     def clamp(self, x: Vector) -> Vector:
-        """A point outside is drawn back along its radius."""
+        """A point outside is moved along its radius to the edge."""
         (cx, cy), (px, py) = self.center, x
         dx, dy = px - cx, py - cy
         norm = math.sqrt(dx * dx + dy * dy)

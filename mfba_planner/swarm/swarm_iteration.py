@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Eq. 4-7 for one iteration of n bats: in d dimensions, and unrolled in the plane."""
+"""One iteration of n bats (eq. 4-7): in d dimensions, and unrolled for the plane."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Iteration = Callable[[Bats, float, Vector, float, Pairs], list[Vector]]
 
 
 @dataclass(slots=True)
-class Law:
-    """What stays the same from iteration to iteration; clamp is needed outside low-high only."""
+class BatMotion:
+    """Constants of eq. 4-7 for one swarm; points within low-high need no clamp."""
 
     f_min: float
     f_span: float
@@ -33,16 +33,16 @@ class Law:
     disc: Disc | None
 
     @classmethod
-    def of(cls, params: BatParams, region: Region) -> Law:
-        """Read the options once."""
+    def of(cls, params: BatParams, region: Region) -> BatMotion:
+        """Derive the constants from the options."""
         low, high = region.inner()
         clamp = region.clamp
         if params.bounds is Bounds.NONE:
-            low, high, clamp = [-math.inf] * len(low), [math.inf] * len(low), _as_it_is
-        # Eq. 5 with the sign that flies towards the best; the printed one is -f.
+            low, high, clamp = [-math.inf] * len(low), [math.inf] * len(low), _unchanged
+        # Eq. 5 with the sign towards the best; the printed sign gives -f.
         sign = 1.0 if params.velocity is Velocity.TOWARDS_BEST else -1.0
         f_span, from_best = params.f_max - params.f_min, params.walk is Walk.BEST
-        # Not a subclass: its clamp may be another one.
+        # Exact types only: a subclass may have another clamp.
         bounded = params.bounds is Bounds.CLAMP
         is_box, disc = type(region) is Box and bounded, None
         if type(region) is Disc and bounded:
@@ -52,11 +52,11 @@ class Law:
         )
 
     def iteration(self, d: int) -> Iteration:
-        """What moves n bats in d dimensions: (bats, t, best, scale, pairs) -> candidates.
+        """The function for d dimensions: (bats, t, best, scale, pairs) -> candidates.
 
-        A bat is its x, its v (which changes), r, what t is multiplied with to give beta, the
-        draw that decides whether it walks, and d draws for epsilon. scale is sigma times the
-        mean loudness; a pair makes a bat's walk as long as the pair is apart.
+        A bat is a tuple of x, v (changed in place), r, beta / t, the draw that decides on the
+        local walk, and d draws for epsilon. scale is sigma times the mean loudness. With pairs,
+        a bat's walk is multiplied by the difference of its pair.
         """
         return self._iterate_in_the_plane if d == 2 else self._iterate_in_d_dimensions
 
@@ -65,17 +65,17 @@ class Law:
     ) -> list[Vector]:
         inertia, clamp = self.inertia, self.clamp
         points = []
-        for i, (x, v, r, decay, pulse, *draws) in enumerate(bats):
-            f = self.sign * (self.f_min + self.f_span * (t * decay))  # eq. 4
+        for i, (x, v, r, beta_factor, walk_draw, *draws) in enumerate(bats):
+            f = self.sign * (self.f_min + self.f_span * (t * beta_factor))  # eq. 4
             point = []
             for j, (xj, bj, draw) in enumerate(zip(x, best, draws)):
                 v[j] = vj = inertia * v[j] + (bj - xj) * f  # eq. 5
                 new = xj + vj  # eq. 6
-                if pulse > r:
+                if walk_draw > r:
                     epsilon = 2.0 * draw - 1.0
                     if pairs:
-                        here, there = pairs[i]
-                        epsilon *= there[j] - here[j]
+                        one, other = pairs[i]
+                        epsilon *= other[j] - one[j]
                     new = (bj if self.from_best else new) + scale * epsilon  # eq. 7
                 point.append(new)
             points.append(clamp(point))
@@ -84,7 +84,7 @@ class Law:
     def _iterate_in_the_plane(
         self, bats: Bats, t: float, best: Vector, scale: float, pairs: Pairs
     ) -> list[Vector]:
-        """Two coordinates unrolled: the same numbers to the last bit, in half the time."""
+        """Two coordinates unrolled: the same result bit by bit, in half the time."""
         f_min, f_span, sign, inertia = self.f_min, self.f_span, self.sign, self.inertia
         clamp, is_box, from_best, (bx, by) = self.clamp, self.is_box, self.from_best, best
         (left, bottom), (right, top) = self.low, self.high
@@ -92,18 +92,18 @@ class Law:
         if disc is not None:
             (cx, cy), radius = disc.center, disc.radius
         points: list[Vector] = []
-        for (x, y), v, r, decay, pulse, ex, ey in bats:
-            f = sign * (f_min + f_span * (t * decay))  # eq. 4
+        for (x, y), v, r, beta_factor, walk_draw, ex, ey in bats:
+            f = sign * (f_min + f_span * (t * beta_factor))  # eq. 4
             vx, vy = v
             v[0] = vx = inertia * vx + (bx - x) * f  # eq. 5
             v[1] = vy = inertia * vy + (by - y) * f  # eq. 5
-            if pulse > r:
+            if walk_draw > r:
                 ex = 2.0 * ex - 1.0
                 ey = 2.0 * ey - 1.0
                 if pairs:
-                    here, there = pairs[len(points)]
-                    ex *= there[0] - here[0]
-                    ey *= there[1] - here[1]
+                    one, other = pairs[len(points)]
+                    ex *= other[0] - one[0]
+                    ey *= other[1] - one[1]
                 if from_best:
                     x = bx + scale * ex  # eq. 7
                     y = by + scale * ey  # eq. 7
@@ -131,5 +131,5 @@ class Law:
         return points
 
 
-def _as_it_is(x: Vector) -> Vector:
+def _unchanged(x: Vector) -> Vector:
     return x

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a bag's decisions are what the planner decides: again, without ROS, bit for bit."""
+"""Verify bags: decide again on the recorded inputs, without ROS, and compare bit for bit."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two answers to the same question: where they first differ, and in what."""
+"""Compare two sequences of decisions: the first tick and the fields that differ."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..simulation.decision_digest import canonical
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Divergence:
-    """The first tick at which two runs differ; a run that has ended before has None there."""
+    """The first tick at which two runs differ; None for a run that ended before."""
 
     tick: int
     left: Decision | None
@@ -21,7 +21,7 @@ class Divergence:
 
     @property
     def differing(self) -> tuple[str, ...]:
-        """Names of the fields of Decision that differ."""
+        """Names of the Decision fields that differ."""
         if self.left is None or self.right is None:
             return ()
         return tuple(
@@ -32,7 +32,7 @@ class Divergence:
 
 
 def first_divergence(left: Sequence[Decision], right: Sequence[Decision]) -> Divergence | None:
-    """Where two runs of decisions first differ, in any bit of their canonical form."""
+    """The first tick at which two runs differ in any bit of the canonical form, or None."""
     for tick, (a, b) in enumerate(zip(left, right)):
         if canonical(tick, a) != canonical(tick, b):
             return Divergence(tick=tick, left=a, right=b)
@@ -47,7 +47,7 @@ def first_divergence(left: Sequence[Decision], right: Sequence[Decision]) -> Div
 
 
 def side_by_side(found: Divergence, left_name: str, right_name: str) -> list[str]:
-    """Both decisions as lines; what differs is marked with >."""
+    """Both decisions as lines of text; differing fields are marked with >."""
     rows = [("", left_name, right_name)]
     for item in fields(Decision):
         if item.name == "candidates":
@@ -62,7 +62,7 @@ def side_by_side(found: Divergence, left_name: str, right_name: str) -> list[str
 
 
 def _bits(decision: Decision, name: str) -> str:
-    return repr(getattr(decision, name))  # of floats, repr tells every bit but a NaN's payload
+    return repr(getattr(decision, name))  # exact for floats, except a NaN's payload
 
 
 def _text(decision: Decision | None, name: str) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner would decide on a recording of /scan and /odom that is not ours."""
+"""Run the planner on a foreign recording of /scan and /odom, for `mfba verify`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,13 @@ from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions import DECISION, SECTORS, robots_with_decisions
 from ..recording.file_integrity import check_data
-from ..recording.from_messages import goal_point, laser_scan, or_refused, robot_pose, stamp_ns
+from ..recording.from_messages import (
+    goal_point,
+    laser_scan,
+    robot_pose,
+    stamp_ns,
+    value_or_refusal,
+)
 from ..recording.robot_topics import NO_NAMESPACE
 from ..simulation.decision_digest import digest
 from .lidar_extrinsics import StaticFrames
@@ -35,7 +41,7 @@ GOAL_TOPIC = "goal_pose"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:
-    """What a recording does not say; goal and scan_yaw_rad None: as recorded."""
+    """Parameters that a recording lacks; goal and scan_yaw_rad None: as recorded."""
 
     robot_radius_m: float
     scan_yaw_rad: float | None = None
@@ -49,7 +55,7 @@ class Robot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Redecided:
-    """The decisions on every scan; faults speak against the recording, notes do not."""
+    """The decisions on every scan; faults are errors of the recording, notes are not."""
 
     decided: tuple[Decision, ...]
     faults: tuple[str, ...]
@@ -57,12 +63,12 @@ class Redecided:
 
     @property
     def digest(self) -> str:
-        """Decision digest."""
+        """Digest of the decisions."""
         return digest(self.decided)
 
 
 def is_foreign(reader: BagReader) -> bool:
-    """Whether a bag has scans and odometry, but neither decisions nor sectors of ours."""
+    """Whether a bag has scans and odometry, but no decisions and no sectors."""
     types = {topic.type_name for topic in reader.topics.values()}
     ours = (
         SECTORS in reader.topics
@@ -72,39 +78,41 @@ def is_foreign(reader: BagReader) -> bool:
     return not ours and {ODOMETRY, SCAN} <= types
 
 
-def redecide_recording(path: str | Path, robot: Robot) -> Redecided:
+def redecide_recording(path: str | Path, params: Robot) -> Redecided:
     """Decide on every scan with the odometry of its stamp, or the newest recorded before it.
 
-    As virtual_sensor (source: scan) and planner do when the bag is replayed, with the lidar as
-    /tf_static has it. Raises BagError for a bag that cannot be read, without goal, where topics
-    must be named, and where nobody says how the lidar is mounted.
+    Same as virtual_sensor (source: scan) and planner on a replay of the bag, with the lidar
+    extrinsics of /tf_static. Raises BagError for a bag that cannot be read or has no goal, if
+    topics must be named, and for unknown lidar extrinsics.
     """
     with BagReader(path) as reader:
         for file in reader.file_paths:
             check_data(file)
-        scan = _topic(reader, SCAN, robot.scan, "--scan")
-        odom = _topic(reader, ODOMETRY, robot.odom, "--odom")
+        scan = _topic_name(reader, SCAN, params.scan, "--scan")
+        odom = _topic_name(reader, ODOMETRY, params.odom, "--odom")
         faults: list[str] = []
-        poses = _Poses(reader, odom, faults)
-        goals = _goals(reader, robot)
-        mounted = _Mounted(reader, robot, odom)
-        return _Decider(robot, poses, goals, faults, mounted).on(reader, scan)
+        poses = _PoseLookup(reader, odom, faults)
+        goals = _goals(reader, params)
+        scan_yaw = _ScanYaw(reader, params, odom)
+        return _PlannerRun(params, poses, goals, faults, scan_yaw).decide_all(reader, scan)
 
 
-def _topic(reader: BagReader, kind: str, wanted: str, option: str) -> str:
-    found = sorted(name for name, topic in reader.topics.items() if topic.type_name == kind)
+def _topic_name(reader: BagReader, type_name: str, wanted: str, option: str) -> str:
+    found = sorted(name for name, topic in reader.topics.items() if topic.type_name == type_name)
     if wanted in found:
         return wanted
     if wanted or len(found) > 1:
-        what = f"{option} {wanted}: not one of" if wanted else f"{len(found)} topics of {kind},"
-        raise BagError(f"{reader.path}: {what} {', '.join(found)}; name one with {option}")
+        problem = (
+            f"{option} {wanted}: not one of" if wanted else f"{len(found)} topics of {type_name},"
+        )
+        raise BagError(f"{reader.path}: {problem} {', '.join(found)}; name one with {option}")
     return found[0]
 
 
-def _goals(reader: BagReader, robot: Robot) -> list[tuple[int, Point]]:
-    """Goals and when they were recorded, rising."""
-    if robot.goal is not None:
-        return [(-1, robot.goal)]
+def _goals(reader: BagReader, params: Robot) -> list[tuple[int, Point]]:
+    """(log time in ns, goal), sorted by time."""
+    if params.goal is not None:
+        return [(-1, params.goal)]
     names = [
         name
         for name, topic in reader.topics.items()
@@ -124,7 +132,7 @@ def _goals(reader: BagReader, robot: Robot) -> list[tuple[int, Point]]:
 def _rising(
     reader: BagReader, topic: str, faults: list[str]
 ) -> Iterator[tuple[int, DecodedMessage]]:
-    """Messages with their stamps; one whose stamp does not rise is a fault and left out."""
+    """Yield (stamp, message); a stamp that does not rise is a fault, its message is skipped."""
     last_ns = -1
     for message in reader.decoded([topic]):
         stamp = stamp_ns(message.message.header.stamp)
@@ -135,39 +143,39 @@ def _rising(
         yield stamp, message
 
 
-class _Poses:
-    """All poses of a recording: by stamp, and by when they were recorded."""
+class _PoseLookup:
+    """All poses of a recording, by stamp and by log time."""
 
     def __init__(self, reader: BagReader, topic: str, faults: list[str]) -> None:
         self.by_stamp: dict[int, Pose2D | Refused] = {}
         self._times_ns: list[int] = []
         self._all: list[tuple[int, Pose2D | Refused]] = []
         for stamp, message in _rising(reader, topic, faults):
-            pose = or_refused(robot_pose, message.message)
+            pose = value_or_refusal(robot_pose, message.message)
             self.by_stamp[stamp] = pose
             self._times_ns.append(message.log_time_ns)
             self._all.append((stamp, pose))
 
     def newest(self, log_time_ns: int) -> tuple[int, Pose2D | Refused] | None:
-        """(stamp, pose) recorded last before a time."""
-        place = bisect_right(self._times_ns, log_time_ns)
-        return self._all[place - 1] if place else None
+        """(stamp, pose) of the newest pose recorded up to a log time, None without one."""
+        index = bisect_right(self._times_ns, log_time_ns)
+        return self._all[index - 1] if index else None
 
 
-class _Mounted:
-    """How the lidar of each scan is turned against the robot."""
+class _ScanYaw:
+    """The yaw of each scan's lidar on the robot, as given or from /tf_static."""
 
-    def __init__(self, reader: BagReader, robot: Robot, odom: str) -> None:
+    def __init__(self, reader: BagReader, params: Robot, odom: str) -> None:
         self.notes: list[str] = []
-        self._told = robot.scan_yaw_rad
+        self._given_yaw_rad = params.scan_yaw_rad
         self._path, self._frames = reader.path, StaticFrames(reader)
         self._base = next((m.message.child_frame_id for m in reader.decoded([odom])), "")
         self._yaws: dict[str, float] = {}
 
     def yaw_rad(self, scan: Any) -> float:
-        """Raises BagError where nothing says it."""
-        if self._told is not None:
-            return self._told
+        """Yaw of the frame of a scan. Raises BagError if it is unknown."""
+        if self._given_yaw_rad is not None:
+            return self._given_yaw_rad
         frame = scan.header.frame_id
         if frame not in self._yaws:
             try:
@@ -177,33 +185,33 @@ class _Mounted:
             self._yaws[frame] = yaw
             if yaw or offset_m:
                 self.notes.append(
-                    f"/tf_static: {frame} is turned by {yaw:.4g} rad in {self._base}, "
-                    f"{offset_m:.4g} m off its middle: --robot-radius must allow for that"
+                    f"/tf_static: {frame} is rotated by {yaw:.4g} rad in {self._base}, "
+                    f"{offset_m:.4g} m from its origin: --robot-radius must include that"
                 )
         return self._yaws[frame]
 
 
-class _Decider:
-    """Takes the scans one by one."""
+class _PlannerRun:
+    """One planner, run on the scans one by one."""
 
     def __init__(
         self,
-        robot: Robot,
-        poses: _Poses,
+        params: Robot,
+        poses: _PoseLookup,
         goals: list[tuple[int, Point]],
         faults: list[str],
-        mounted: _Mounted,
+        scan_yaw: _ScanYaw,
     ) -> None:
-        self._robot = robot
-        self._mounted = mounted
+        self._params = params
+        self._scan_yaw = scan_yaw
         self._poses = poses
         self._goals = goals
         self._faults = faults
-        self._path_planner = make_planner(robot.planner, robot.sensor, robot.seed)
+        self._planner = make_planner(params.planner, params.sensor, params.seed)
         self._pose = Pose2D(0.0, 0.0)
         self._counts: Counter[str] = Counter()
 
-    def on(self, reader: BagReader, topic: str) -> Redecided:
+    def decide_all(self, reader: BagReader, topic: str) -> Redecided:
         decided = []
         for stamp, message in _rising(reader, topic, self._faults):
             decision = self._decide(stamp, message.log_time_ns, message.message)
@@ -213,16 +221,16 @@ class _Decider:
             decided=tuple(decided),
             faults=tuple(self._faults),
             notes=(
-                *self._mounted.notes,
+                *self._scan_yaw.notes,
                 *(f"{count} scans {what}" for what, count in self._counts.items()),
             ),
         )
 
     def _decide(self, stamp: int, log_time_ns: int, scan: Any) -> Decision | None:
         if stamp in self._poses.by_stamp:
-            posed_ns, pose = stamp, self._poses.by_stamp[stamp]
+            pose_stamp, pose = stamp, self._poses.by_stamp[stamp]
         elif newest := self._poses.newest(log_time_ns):
-            posed_ns, pose = newest
+            pose_stamp, pose = newest
             self._counts["without odometry of their stamp: the newest before them was taken"] += 1
         else:
             self._counts["before the first odometry: not decided"] += 1
@@ -231,18 +239,18 @@ class _Decider:
         if isinstance(ranges, str):
             self._counts["that the sensor refuses"] += 1
         goal = next((g for t, g in reversed(self._goals) if t <= log_time_ns), None)
-        seen = observe(stamp, pose, ranges, goal, self._pose, max(stamp - posed_ns, 0))
-        self._pose = seen.pose
-        if self._robot.planner.tracks_scan and not seen.refused:
-            yaw = seen.pose.yaw + self._mounted.yaw_rad(scan)
-            seen = replace(seen, scan=aligned(laser_scan(scan), yaw))
-        return self._path_planner.plan(seen)
+        observation = observe(stamp, pose, ranges, goal, self._pose, max(stamp - pose_stamp, 0))
+        self._pose = observation.pose
+        if self._params.planner.tracks_scan and not observation.refused:
+            yaw = observation.pose.yaw + self._scan_yaw.yaw_rad(scan)
+            observation = replace(observation, scan=aligned(laser_scan(scan), yaw))
+        return self._planner.plan(observation)
 
     def _measure(self, pose: Pose2D | Refused, scan: Any) -> Ranges | Refused:
         if isinstance(pose, str):
             return pose
-        robot = self._robot
-        yaw = pose.yaw + self._mounted.yaw_rad(scan)
-        return or_refused(
-            lambda x: sense_scan(laser_scan(x), yaw, robot.robot_radius_m, robot.sensor), scan
+        params = self._params
+        yaw = pose.yaw + self._scan_yaw.yaw_rad(scan)
+        return value_or_refusal(
+            lambda x: sense_scan(laser_scan(x), yaw, params.robot_radius_m, params.sensor), scan
         )

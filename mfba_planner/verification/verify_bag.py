@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decide again on what a bag recorded, and hold every recorded answer against it."""
+"""Verify a bag: decide again on the recorded inputs and compare with the recording."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ..recording.bag_reader import BagReader
 from ..recording.file_integrity import check_data
 from ..recording.from_messages import (
     body_velocity,
-    decision_value,
+    decision_field,
     laser_scan,
     obstacle_centers,
-    or_refused,
     robot_pose,
     sector_ranges,
+    value_or_refusal,
     velocity,
 )
 from ..recording.from_messages import decision as read_decision
@@ -45,16 +45,16 @@ from .tick_records import (
     VECTOR,
     Tick,
     TickRecords,
-    collect,
-    gather,
+    join_ticks,
+    read_tick_messages,
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """What a check of a bag has found; identical when nothing speaks against it.
+    """Result of the verification of one robot's recording.
 
-    divergence is the first recorded decision that is not what the planner decides.
+    `divergence` is the first recorded decision that differs from the planner's.
     """
 
     setup: Setup
@@ -66,38 +66,40 @@ class Report:
 
     @property
     def is_identical(self) -> bool:
-        """Whether all decisions are equal and nothing else in the bag contradicts them."""
+        """Whether all decisions are equal and the bag has no faults."""
         return not self.faults and self.divergence is None
 
     @property
     def digest(self) -> str:
-        """Decision digest of what was recorded."""
+        """Digest of the recorded decisions."""
         return digest(self.recorded)
 
 
 def verify(path: str | Path) -> Report:
-    """Check a bag of one robot. Raises BagError for one that cannot be checked at all."""
+    """Verify a bag of one robot. Raises BagError for a bag that cannot be checked."""
     with BagReader(path) as reader:
         read_setup(reader)
     return verify_each(path)[NO_NAMESPACE]
 
 
 def verify_each(path: str | Path, robots: Sequence[str] = ()) -> dict[str, Report]:
-    """Check a bag of ours: every robot's decisions, or those of the robots named.
+    """Verify a bag of mfba: the decisions of every robot, or of the robots named.
 
-    Raises BagError for a bag that cannot be checked at all, and for a robot that is not there.
+    Raises BagError for a bag that cannot be checked, and for an unknown robot.
     """
     with BagReader(path) as reader:
         for file in reader.file_paths:
             check_data(file)
         setups = read_setups(reader).by_robot
         names = chosen(reader.path, list(setups), robots)
-        messages = collect(reader, names)
+        messages = read_tick_messages(reader, names)
     found = {}
     for name in names:
         setup = setups[name]
         tick_ns = setup.planner.tick_ns if setup.lockstep else None
-        tick_records = gather(messages.pop(name), tick_ns, setup.odom_frame, inputs=_inputs(setup))
+        tick_records = join_ticks(
+            messages.pop(name), tick_ns, setup.odom_frame, inputs=_inputs(setup)
+        )
         found[name] = _check(setup, tick_records)
     return found
 
@@ -113,44 +115,48 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
     recorded, decided = [], []
     unchecked, goal_id = 0, ""
     for tick in tick_records.ticks:
-        if DECISION not in tick.said or tick.stamp_ns in tick_records.left_out:
-            continue  # named by evidence where it must not be
-        if SECTORS not in tick.said:
-            if not setup.lockstep:  # there evidence names it
+        if DECISION not in tick.messages or tick.stamp_ns in tick_records.omitted_stamps:
+            continue  # join_ticks has reported it if needed
+        if SECTORS not in tick.messages:
+            if not setup.lockstep:  # in lockstep join_ticks has reported it
                 faults.append(f"stamp {tick.stamp_ns} ns: no {SECTORS}")
             continue
-        ranges = or_refused(read_sectors, tick.said[SECTORS])
+        ranges = value_or_refusal(read_sectors, tick.messages[SECTORS])
         try:
-            was = read_decision(tick.said[DECISION], () if isinstance(ranges, str) else ranges)
+            decision = read_decision(
+                tick.messages[DECISION], () if isinstance(ranges, str) else ranges
+            )
         except InputError as error:
             faults.append(f"stamp {tick.stamp_ns} ns: {error}")
             continue
-        before, goal_id = goal_id, decision_value(tick.said[DECISION], "goal_id")
-        if goal_id != before:
-            planner.reset()  # ordered anew, be it to the same goal, or cancelled
-            goal = goal if was.goal else None
-        if was.goal != goal:
-            while goals and goal != was.goal:
+        last_goal_id, goal_id = goal_id, decision_field(tick.messages[DECISION], "goal_id")
+        if goal_id != last_goal_id:
+            planner.reset()  # a new goal, even to the same point, or a cancel
+            goal = goal if decision.goal else None
+        if decision.goal != goal:
+            while goals and goal != decision.goal:
                 goal = goals.popleft()
-            if goal != was.goal:
-                what = (
-                    "without the goal that was known (a planner that was restarted?)"
-                    if was.goal is None
-                    else "for a goal that no /goal_pose gave"
+            if goal != decision.goal:
+                reason = (
+                    "without the known goal (was the planner restarted?)"
+                    if decision.goal is None
+                    else "for a goal that was not in any /goal_pose"
                 )
-                faults.append(f"stamp {tick.stamp_ns} ns: decided {what}")
-                goal = was.goal
-        seen: Any = was.pose
+                faults.append(f"stamp {tick.stamp_ns} ns: decided {reason}")
+                goal = decision.goal
+        pose_input: Any = decision.pose
         if setup.lockstep:
-            seen = or_refused(read_odom, tick.said[ODOM]) if ODOM in tick.said else pose
-        elif was.mode is Mode.STOPPED:
-            unchecked += 1  # what was refused or how old it was is not recorded
+            pose_input = (
+                value_or_refusal(read_odom, tick.messages[ODOM]) if ODOM in tick.messages else pose
+            )
+        elif decision.mode is Mode.STOPPED:
+            unchecked += 1  # the refused or stale input is not recorded
             continue
-        observation = observe(tick.stamp_ns, seen, ranges, goal, pose)
+        observation = observe(tick.stamp_ns, pose_input, ranges, goal, pose)
         pose = observation.pose
-        recorded.append(was)
+        recorded.append(decision)
         decided.append(planner.plan(_with_scan(setup, tick, observation)))
-        faults += _contradictions(setup, tick, was)
+        faults += _contradictions(setup, tick, decision)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
     return Report(
@@ -164,70 +170,72 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
 
 
 def _inputs(setup: Setup) -> list[str]:
-    """What a decision is decided again on, of its own stamp."""
+    """The topics whose messages of the same stamp are the input of a decision."""
     return [
         SECTORS,
-        *([ODOM] if setup.lockstep else []),  # otherwise the decision says where it was
+        *([ODOM] if setup.lockstep else []),  # in real time the pose of the decision is used
         *([SCAN] if setup.planner.tracks_scan else []),
     ]
 
 
 def _with_scan(setup: Setup, tick: Tick, obs: Observation) -> Observation:
-    """What a planner that tracks scans was shown besides."""
-    if not setup.planner.tracks_scan or obs.refused or SCAN not in tick.said:
+    """The observation with the scan, for a planner that tracks scans."""
+    if not setup.planner.tracks_scan or obs.refused or SCAN not in tick.messages:
         return obs
     yaw = obs.pose.yaw + setup.scenario.robot.lidar.yaw_rad
-    return replace(obs, scan=aligned(laser_scan(tick.said[SCAN]), yaw))
+    return replace(obs, scan=aligned(laser_scan(tick.messages[SCAN]), yaw))
 
 
-def _contradictions(setup: Setup, tick: Tick, was: Decision) -> list[str]:
-    """What other topics say about the same tick, where it is not what the decision says."""
+def _contradictions(setup: Setup, tick: Tick, decision: Decision) -> list[str]:
+    """Faults: the topics of a tick that do not match its decision."""
     found = []
-    for topic, is_so in (
+    for topic, agrees in (
         (SECTORS, _intensities_agree),
         (VECTOR, _vector_agrees),
-        (STEP, _step_agrees),
+        (STEP, _goal_step_agrees),
         (TWIST, partial(_twist_agrees, setup)),
     ):
-        if topic in tick.said and not is_so(tick.said[topic], was):
-            found.append(f"stamp {tick.stamp_ns} ns: {topic} is not what the decision says")
+        if topic in tick.messages and not agrees(tick.messages[topic], decision):
+            found.append(f"stamp {tick.stamp_ns} ns: {topic} does not match the decision")
     source = SCAN if setup.scenario.robot.lidar.beams else OBSTACLES
-    if {source, ODOM} <= tick.said.keys() and not _is_sensed(setup, tick, was):
-        found.append(f"stamp {tick.stamp_ns} ns: {SECTORS} is not what the sensor measures")
+    if {source, ODOM} <= tick.messages.keys() and not _sectors_match_sensor(setup, tick, decision):
+        found.append(f"stamp {tick.stamp_ns} ns: {SECTORS} does not match the sensor")
     return found
 
 
-def _intensities_agree(sectors: Any, was: Decision) -> bool:
-    return not was.ranges_m or tuple(sectors.intensities) == sensory_vector(was.ranges_m)
+def _intensities_agree(sectors: Any, decision: Decision) -> bool:
+    return not decision.ranges_m or tuple(sectors.intensities) == sensory_vector(decision.ranges_m)
 
 
-def _vector_agrees(vector: Any, was: Decision) -> bool:
-    return tuple(vector.data) == sensory_vector(was.ranges_m)
+def _vector_agrees(vector: Any, decision: Decision) -> bool:
+    return tuple(vector.data) == sensory_vector(decision.ranges_m)
 
 
-def _step_agrees(step: Any, was: Decision) -> bool:
-    return (step.pose.position.x, step.pose.position.y) == was.waypoint
+def _goal_step_agrees(goal_step: Any, decision: Decision) -> bool:
+    return (goal_step.pose.position.x, goal_step.pose.position.y) == decision.waypoint
 
 
-def _twist_agrees(setup: Setup, twist: Any, was: Decision) -> bool:
-    told = body_velocity(was, setup.scenario.robot, setup.planner.tick_ns)
-    return bool(or_refused(velocity, twist) == told)
+def _twist_agrees(setup: Setup, twist: Any, decision: Decision) -> bool:
+    command = body_velocity(decision, setup.scenario.robot, setup.planner.tick_ns)
+    return bool(value_or_refusal(velocity, twist) == command)
 
 
-def _is_sensed(setup: Setup, tick: Tick, was: Decision) -> bool:
-    """Whether the obstacles, or the scan, of this tick give these sectors."""
+def _sectors_match_sensor(setup: Setup, tick: Tick, decision: Decision) -> bool:
+    """Whether the obstacles, or the scan, of this tick give the ranges of the decision."""
     scenario, lidar = setup.scenario, setup.scenario.robot.lidar
     try:
-        pose = robot_pose(tick.said[ODOM])
+        pose = robot_pose(tick.messages[ODOM])
         if lidar.beams:
-            scan, yaw = laser_scan(tick.said[SCAN], setup.scan_frame), pose.yaw + lidar.yaw_rad
-            return sense_scan(scan, yaw, scenario.robot_radius_m, setup.sensor) == was.ranges_m
-        centers = obstacle_centers(tick.said[OBSTACLES])
+            scan, yaw = laser_scan(tick.messages[SCAN], setup.scan_frame), pose.yaw + lidar.yaw_rad
+            return (
+                sense_scan(scan, yaw, scenario.robot_radius_m, setup.sensor) == decision.ranges_m
+            )
+        centers = obstacle_centers(tick.messages[OBSTACLES])
     except InputError:
-        return not was.ranges_m  # blind, as it must be
+        return not decision.ranges_m  # a blind sensor has no ranges
     position = pose.position
     radii = [o.radius_m + scenario.robot_radius_m for o in scenario.obstacles]
     if len(radii) != len(centers):
         return False
     ranges = sense_circles(position, list(zip(centers, radii)), setup.sensor)
-    return ranges == was.ranges_m or (not was.ranges_m and any(map(math.isnan, ranges)))
+    return ranges == decision.ranges_m or (not decision.ranges_m and any(map(math.isnan, ranges)))

@@ -80,7 +80,7 @@ def test_closed_loop_finds_a_world_that_was_not_simulated(
     late = rewrite(bag, tmp_path / "late", only_half)
     with pytest.raises(BagError, match="tick 0 is not what the simulated world leads to"):
         cli.main(["verify", str(late), "--closed-loop"])
-    assert "note: the recording begins at stamp" in capsys.readouterr().out
+    assert "note: the recording starts at stamp" in capsys.readouterr().out
 
 
 def test_what_if(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,7 +22,7 @@ COORDINATES = st.floats(-20.0, 20.0)
 POINTS = st.tuples(COORDINATES, COORDINATES)
 
 
-def test_a_pose_without_yaw_looks_along_x() -> None:
+def test_the_yaw_of_a_pose_defaults_to_0() -> None:
     assert Pose2D(1.0, 2.0) == (1.0, 2.0, 0.0)
     assert Pose2D(1.0, 2.0, 3.0).position == (1.0, 2.0)
 
@@ -91,7 +91,7 @@ def test_tangents_of_a_circle(d: float, radius: float, degrees: float) -> None:
     assert math.degrees(tangent_half_angle(d, radius)) == pytest.approx(degrees)
 
 
-def test_inside_a_circle_half_of_all_directions_lead_further_in() -> None:
+def test_inside_a_circle_the_tangent_half_angle_is_90_degrees() -> None:
     assert tangent_half_angle(0.5, 1.0) == math.pi / 2.0
     assert tangent_half_angle(0.0, 0.0) == math.pi / 2.0
 
@@ -107,15 +107,15 @@ def test_ray_to_a_circle_by_hand() -> None:
     assert ray_circle_distance(d, 5.0, math.radians(-45.0)) == pytest.approx(expected)
 
 
-def test_a_ray_that_misses_sees_nothing() -> None:
+def test_a_ray_that_misses_has_distance_inf() -> None:
     assert ray_circle_distance(2.0, 1.0, math.radians(30.1)) == math.inf
     assert ray_circle_distance(2.0, 1.0, math.radians(90.0)) == math.inf
-    assert ray_circle_distance(2.0, 1.0, math.radians(180.0)) == math.inf, "behind is not ahead"
+    assert ray_circle_distance(2.0, 1.0, math.radians(180.0)) == math.inf, "the circle is behind"
     assert ray_circle_distance(0.6, 0.5, math.radians(180.0)) == math.inf
 
 
 def test_a_tangent_touches() -> None:
-    radius = 2.0 * math.sin(0.5)  # the very float that the ray's distance aside is
+    radius = 2.0 * math.sin(0.5)  # the same float as the lateral distance of the ray
     assert ray_circle_distance(2.0, radius, 0.5) == 2.0 * math.cos(0.5)
 
 
@@ -125,11 +125,11 @@ def test_on_or_inside_a_circle_every_ray_hits_at_once() -> None:
 
 
 @given(st.floats(0.1, 20.0), st.floats(0.01, 1.0), st.floats(-1.0, 1.0))
-def test_the_point_a_ray_meets_lies_on_the_near_side_of_the_circle(
-    d: float, part: float, offset_part: float
+def test_a_ray_hits_the_near_side_of_the_circle(
+    d: float, share: float, offset_share: float
 ) -> None:
-    radius = 0.99 * part * d
-    offset = 0.999 * offset_part * tangent_half_angle(d, radius)
+    radius = 0.99 * share * d
+    offset = 0.999 * offset_share * tangent_half_angle(d, radius)
     r = ray_circle_distance(d, radius, offset)
     hit = towards((0.0, 0.0), offset, r)
     assert distance(hit, (d, 0.0)) == pytest.approx(radius, rel=1e-6, abs=1e-6)
@@ -167,5 +167,5 @@ def test_closest_approach_is_below_every_sample_and_reached_by_one(
     smallest = closest_approach(a0, a1, b0, b1)
     assume(max(samples) < 1e3)
     assert smallest <= min(samples) + 1e-9
-    way = distance(a0, a1) + distance(b0, b1)
-    assert smallest >= min(samples) - way / 400 - 1e-9
+    path_length = distance(a0, a1) + distance(b0, b1)
+    assert smallest >= min(samples) - path_length / 400 - 1e-9

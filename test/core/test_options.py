@@ -37,7 +37,7 @@ class Outer:
     high: float = option(0.0, "bounded above", unit="s", maximum=0.0)
     count: int = option(2, "how many")
     bold: bool = option(False, "how loud")
-    label: str = option("x", "what it says")
+    label: str = option("x", "its text")
     colour: Colour = option(Colour.RED, "which")
     inner: Inner = field(default_factory=Inner)
     plain: tuple[int, ...] = ()
@@ -169,9 +169,9 @@ def test_override_checks_changes_as_a_whole() -> None:
         override(old, {"f_min": 5.0})
 
 
-def test_far_off_words_get_the_whole_list() -> None:
+def test_without_a_similar_word_all_known_words_are_listed() -> None:
     assert did_you_mean("zzzz", ["b", "a"]) == "known: a, b"
-    assert did_you_mean("coat", ["case1"]) == "known: case1", "two letters of five are too few"
+    assert did_you_mean("coat", ["case1"]) == "known: case1", "2 of 5 characters match: too few"
     assert did_you_mean("case", ["case1", "empty"]) == "did you mean 'case1'?"
 
 

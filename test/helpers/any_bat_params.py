@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Any reading of the swarm's gaps, for hypothesis."""
+"""Hypothesis strategy: BatParams with any combination of options."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ READINGS: dict[str, Any] = {
     "initial": Initial,
     "walk": Walk,
 }
-OURS: dict[str, Any] = {  # not in the paper's gaps
+OURS: dict[str, Any] = {  # options that are not readings of the paper
     "step": Step,
     "acceptance": Acceptance,
     "update": Update,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bag of a real run, and copies of it that somebody has edited."""
+"""Record a bag of a real run, and make edited copies of it."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -22,11 +22,11 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 
 
 def record(directory: Path, scenario: str, seed: int) -> Path:
-    """Record a run of a scenario (name or text) in a domain of its own; return the bag."""
+    """Record a run of a scenario (name or text) in its own ROS domain; return the bag."""
     domain, lock = claim_domain()
-    told = RunConfig(scenario=load_scenario(scenario), driver=Driver.IN_PROCESS, seed=seed)
+    config = RunConfig(scenario=load_scenario(scenario), driver=Driver.IN_PROCESS, seed=seed)
     with lock:
-        run_in_process(told, directory, domain_id=domain)
+        run_in_process(config, directory, domain_id=domain)
     return directory
 
 
@@ -34,7 +34,7 @@ KINDS = {f"/{topic.name.lstrip('/')}": topic.type for topic in topics.GRAPH}
 
 
 def kind_of(topic: str) -> Any:
-    """The message class of a topic, of a fleet's robot too."""
+    """The message class of a topic, with or without a robot's namespace."""
     return KINDS.get(topic) or KINDS["/" + topic.split("/", 2)[2]]
 
 
@@ -44,7 +44,7 @@ Edit = Callable[[list[RawMessage]], Iterable[RawMessage]]
 def rewrite(
     bag: Path, out: Path, edit: Edit, *, configure: Callable[[Any], Any] = lambda content: content
 ) -> Path:
-    """A whole, sound bag with other messages and configuration (None: without)."""
+    """A complete bag with edited messages and configuration (None: without)."""
     with BagReader(bag) as reader, BagWriter(out) as writer:
         for topic in reader.topics.values():
             writer.add_topic(topic.name, topic.type_name, topic.qos)
@@ -62,25 +62,25 @@ def rewrite(
 
 
 def changed(message: RawMessage, change: Callable[[Any], None]) -> RawMessage:
-    """The message with something changed in it."""
+    """The message after `change` was applied to it."""
     decoded = deserialize_message(message.data, kind_of(message.topic))
     change(decoded)
     return message._replace(data=serialize_message(decoded))
 
 
 def one_changed(topic: str, index: int, change: Callable[[Any], None]) -> Edit:
-    """Change the index-th message of a topic."""
+    """Edit: change the index-th message of a topic."""
 
     def edit(messages: list[RawMessage]) -> list[RawMessage]:
-        place = [k for k, message in enumerate(messages) if message.topic == topic][index]
-        messages[place] = changed(messages[place], change)
+        position = [k for k, message in enumerate(messages) if message.topic == topic][index]
+        messages[position] = changed(messages[position], change)
         return messages
 
     return edit
 
 
 def each_changed(change: Callable[[str, Any], Any]) -> Edit:
-    """Change every message: change(topic, message) returns it, or None to leave it out."""
+    """Edit: change every message; change(topic, message) returns it, or None to remove it."""
 
     def edit(messages: list[RawMessage]) -> Iterable[RawMessage]:
         for raw in messages:
@@ -92,7 +92,7 @@ def each_changed(change: Callable[[str, Any], Any]) -> Edit:
 
 
 def swapped(topic: str, index: int) -> Edit:
-    """Two messages change places: under the same log times, or a reader puts them right."""
+    """Edit: swap two messages but not their log times, by which readers would sort them."""
 
     def edit(messages: list[RawMessage]) -> list[RawMessage]:
         a, b = [k for k, m in enumerate(messages) if m.topic == topic][index : index + 2]
@@ -105,7 +105,7 @@ def swapped(topic: str, index: int) -> Edit:
 
 
 def set_field(key: str, alter: Callable[[str], str]) -> Callable[[Any], None]:
-    """Change one value of a planner/decision."""
+    """A change of one value of a planner/decision."""
 
     def change(message: Any) -> None:
         (item,) = (item for item in message.status[0].values if item.key == key)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bags for the recording tests: messages, a small bag, a foreign writer, independent readers."""
+"""Bags for tests: messages, a small bag, a foreign writer, four independent readers."""
 
 import random
 from collections import Counter
@@ -33,7 +33,7 @@ SENSOR = OfferedQos(depth=5, reliability="best_effort", deadline_ns=SECOND // 10
 
 
 def odometry(index: int) -> Odometry:
-    """Distinct content, and fixed arrays of which every element matters."""
+    """An Odometry with distinct content in every element of its fixed arrays."""
     message = Odometry()
     message.header.stamp.sec = index
     message.header.frame_id = "odom"
@@ -44,7 +44,7 @@ def odometry(index: int) -> Odometry:
 
 
 def scan(index: int, beams: int = 12) -> LaserScan:
-    """A scan whose ranges do not compress to nothing."""
+    """A scan with random ranges, which compress badly."""
     generator = random.Random(index)
     message = LaserScan(angle_max=6.0, range_max=10.0)
     message.header.stamp.sec = index
@@ -95,7 +95,7 @@ def foreign_mcap(
     topic: str = "/chatter",
     **options: Any,
 ) -> Path:
-    """A file as another program may write it: other options, messages out of order."""
+    """A file as another program may write it: other options, unsorted messages."""
     definition = definition_of("std_msgs/msg/String")
     name, encoding, data = schema or (
         definition.type_name,
@@ -104,7 +104,7 @@ def foreign_mcap(
     )
     with path.open("wb") as stream:
         writer = Writer(stream, compression=compression, **options)
-        writer.start(profile=profile, library="somebody else")
+        writer.start(profile=profile, library="other program")
         schema_id = writer.register_schema(name, encoding, data) if name else 0
         channel_id = writer.register_channel(
             topic, message_encoding, schema_id, channel_metadata or {}
@@ -116,7 +116,7 @@ def foreign_mcap(
 
 
 def count_with_rosbags(directory: Path) -> Counter[str]:
-    """Every message deserialized; the counts must be those of metadata.yaml."""
+    """Counts by topic; deserializes every message and checks the counts of metadata.yaml."""
     found: Counter[str] = Counter()
     with AnyReader([directory]) as reader:
         for connection, _, data in reader.messages():
@@ -152,7 +152,7 @@ def count_with_small_mcap(file: Path) -> Counter[str]:
         for schema, channel, message in messages:
             decode = factory.decoder_for(channel.message_encoding, schema)
             assert decode is not None
-            decode(bytes(message.data))  # it hands out a memoryview
+            decode(bytes(message.data))  # message.data is a memoryview
             found[channel.topic] += 1
     return found
 
@@ -165,7 +165,7 @@ FILE_READERS: tuple[Callable[[Path], Counter[str]], ...] = (
 
 
 def count_with_all(directory: Path) -> Counter[str]:
-    """The counts of a bag directory, on which four independent readers agree."""
+    """Counts by topic of a bag directory; four independent readers must agree."""
     found = count_with_rosbags(directory)
     for count in FILE_READERS:
         assert count(directory / f"{directory.name}_0.mcap") == found, count.__name__

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a written report holds, as its own readers tell."""
+"""Read reports back: the data of an HTML page, the rows of a .rrd file."""
 
 import json
 import re
@@ -24,7 +24,7 @@ ROWS = re.compile(r"^Chunk\(\w+\) with (\d+) rows .*? - (/\S+)", re.MULTILINE)
 
 
 def rows_of(path: Path) -> Counter[str]:
-    """How often each entity was logged, as `rerun rrd print` says."""
+    """Rows per entity, from `rerun rrd print`."""
     done = subprocess.run(
         [RERUN, "rrd", "print", path], capture_output=True, text=True, timeout=120, check=True
     )

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fleet of three robots with errors of odometry."""
+"""A scenario with a fleet of three robots and odometry noise."""
 
 from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.robot_model import Noise, Robot
 from mfba_planner.simulation.scenario import Member, Scenario
 
-# b has arrived long before the others; odometry errs, so that truth is recorded as well.
+# b arrives long before the others. Odometry has noise, so ground truth is recorded too.
 TRIO = Scenario(
     name="trio",
     start_m=(-2.0, 0.0),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tracker against circles whose motion is known: places, velocities, turns, shapes."""
+"""Tracker against circles of known motion: positions, velocities, turns, shapes."""
 
 import math
 
@@ -19,11 +19,14 @@ LONGEST_M = 1.1
 
 
 def scan_of(
-    here: Point, circles: list[tuple[float, float, float]], beams: int, noise: np.ndarray | float
+    robot_position: Point,
+    circles: list[tuple[float, float, float]],
+    beams: int,
+    noise: np.ndarray | float,
 ) -> Scan:
     increment = 2.0 * math.pi / beams
     return Scan(
-        ranges_m=cast_rays(here, circles, beams, LONGEST_M) + noise,
+        ranges_m=cast_rays(robot_position, circles, beams, LONGEST_M) + noise,
         angle_min_rad=0.5 * increment,
         angle_increment_rad=increment,
         range_min_m=0.0,
@@ -31,7 +34,7 @@ def scan_of(
     )
 
 
-def follow(
+def track_circle(
     start: Point,
     velocity: Point,
     beams: int,
@@ -41,19 +44,19 @@ def follow(
     robot: Point = (0.0, 0.0),
     turns_at: int = 10**9,
 ) -> list[tuple[Circle, ...]]:
-    """What is tracked of one circle of 0.3 m, tick by tick; it turns back at one of them."""
+    """The tracked circles of each tick; the obstacle of 0.3 m turns back at tick turns_at."""
     tracker, rng = Tracker(), np.random.default_rng(7)
     (x, y), (vx, vy) = start, velocity
-    seen = []
+    tracked = []
     for k in range(ticks):
         t = k * TICK_NS * 1e-9
         along = t if k <= turns_at else (2 * turns_at - k) * TICK_NS * 1e-9
-        here = (robot[0] * t, robot[1] * t)
+        robot_position = (robot[0] * t, robot[1] * t)
         noise = rng.normal(0.0, noise_m, beams) if noise_m else 0.0
-        scan = scan_of(here, [(x + vx * along, y + vy * along, 0.3)], beams, noise)
-        tracker.update((k + 1) * TICK_NS, Pose2D(*here), scan)
-        seen.append(tracker.circles((k + 1) * TICK_NS, 0.3))
-    return seen
+        scan = scan_of(robot_position, [(x + vx * along, y + vy * along, 0.3)], beams, noise)
+        tracker.update((k + 1) * TICK_NS, Pose2D(*robot_position), scan)
+        tracked.append(tracker.circles((k + 1) * TICK_NS, 0.3))
+    return tracked
 
 
 @given(
@@ -62,40 +65,40 @@ def follow(
     speed=st.floats(0.0, 0.3),
 )
 @settings(max_examples=40)
-def test_noiseless_scans_give_place_and_velocity(
+def test_noiseless_scans_give_position_and_velocity(
     bearing_rad: float, heading_rad: float, speed: float
 ) -> None:
     start = (0.9 * math.cos(bearing_rad), 0.9 * math.sin(bearing_rad))
     velocity = (speed * math.cos(heading_rad), speed * math.sin(heading_rad))
-    (circle,) = follow(start, velocity, 360, 8)[-1]
+    (circle,) = track_circle(start, velocity, 360, 8)[-1]
     truth = (start[0] + 0.7 * velocity[0], start[1] + 0.7 * velocity[1])
     assert math.dist(circle.center_m, truth) < 0.02
     assert math.dist(circle.velocity_mps, velocity) < 0.04
     assert 0.6 <= circle.radius_m < 0.7
 
 
-@pytest.mark.parametrize(("beams", "within"), [(360, 0.06), (12, 0.12)])
-def test_two_centimetres_of_noise_and_few_beams_still_tell_where_it_goes(
-    beams: int, within: float
+@pytest.mark.parametrize(("beams", "tolerance"), [(360, 0.06), (12, 0.12)])
+def test_velocity_and_position_with_2_cm_of_noise_and_few_beams(
+    beams: int, tolerance: float
 ) -> None:
-    (circle,) = follow((0.9, -0.4), (-0.05, 0.25), beams, 25, noise_m=0.02)[-1]
-    assert math.dist(circle.velocity_mps, (-0.05, 0.25)) < within
-    assert math.dist(circle.center_m, (0.9 - 0.12, -0.4 + 0.6)) < within
+    (circle,) = track_circle((0.9, -0.4), (-0.05, 0.25), beams, 25, noise_m=0.02)[-1]
+    assert math.dist(circle.velocity_mps, (-0.05, 0.25)) < tolerance
+    assert math.dist(circle.center_m, (0.9 - 0.12, -0.4 + 0.6)) < tolerance
 
 
-def test_a_robot_on_the_move_sees_the_obstacle_s_velocity_not_its_own() -> None:
-    (circle,) = follow((1.0, 0.9), (0.1, -0.2), 360, 12, robot=(0.5, 0.0))[-1]
+def test_a_moving_robot_measures_the_obstacle_s_velocity_not_its_own() -> None:
+    (circle,) = track_circle((1.0, 0.9), (0.1, -0.2), 360, 12, robot=(0.5, 0.0))[-1]
     assert math.dist(circle.velocity_mps, (0.1, -0.2)) < 0.03
 
 
-def test_an_obstacle_that_turns_back_is_understood_within_half_a_second() -> None:
-    seen = follow((0.9, -0.4), (0.0, 0.3), 360, 16, turns_at=10)
-    (before,), (after,) = seen[10], seen[15]
+def test_an_obstacle_that_turns_back_is_tracked_within_half_a_second() -> None:
+    tracked = track_circle((0.9, -0.4), (0.0, 0.3), 360, 16, turns_at=10)
+    (before,), (after,) = tracked[10], tracked[15]
     assert before.velocity_mps[1] == pytest.approx(0.3, abs=0.03)
     assert after.velocity_mps[1] == pytest.approx(-0.3, abs=0.1)
 
 
-def test_two_obstacles_are_two() -> None:
+def test_two_obstacles_give_two_tracks() -> None:
     tracker = Tracker()
     for k in range(8):
         t = 0.1 * k
@@ -106,7 +109,7 @@ def test_two_obstacles_are_two() -> None:
     assert math.dist(right.velocity_mps, (0.0, 0.2)) < 0.04
 
 
-def test_a_wall_is_points_at_rest_where_it_is() -> None:
+def test_a_wall_gives_points_at_rest() -> None:
     angles = (np.arange(360) + 0.5) * (2.0 * math.pi / 360)
     with np.errstate(divide="ignore"):
         ranges = np.where(np.cos(angles) > 0.35, 0.5 / np.cos(angles), np.inf)
@@ -126,7 +129,7 @@ def test_a_wall_is_points_at_rest_where_it_is() -> None:
         assert (circle.radius_m, circle.velocity_mps) == (0.3, (0.0, 0.0))
 
 
-def test_what_is_gone_is_forgotten() -> None:
+def test_a_track_without_returns_is_dropped() -> None:
     tracker, empty = Tracker(), scan_of((0.0, 0.0), [], 360, 0.0)
     tracker.update(TICK_NS, Pose2D(0.0, 0.0), scan_of((0.0, 0.0), [(0.8, 0.0, 0.3)], 360, 0.0))
     assert len(tracker.circles(TICK_NS, 0.3)) == 1
@@ -135,7 +138,7 @@ def test_what_is_gone_is_forgotten() -> None:
     assert tracker.circles(40 * TICK_NS, 0.3) == ()
 
 
-def test_what_is_late_is_moved_on_to_now() -> None:
+def test_circles_are_predicted_to_now() -> None:
     tracker = Tracker()
     for k in range(8):
         circle = (0.9, -0.3 + 0.03 * k, 0.3)
@@ -144,7 +147,7 @@ def test_what_is_late_is_moved_on_to_now() -> None:
     assert now.center_m[1] - then.center_m[1] == pytest.approx(0.06, abs=0.01)
 
 
-def test_time_that_goes_back_begins_anew() -> None:
+def test_an_older_stamp_drops_all_tracks() -> None:
     tracker = Tracker()
     scan = scan_of((0.0, 0.0), [(0.8, 0.0, 0.3)], 360, 0.0)
     tracker.update(5 * TICK_NS, Pose2D(0.0, 0.0), scan)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sensory vector against the paper's example, against brute force, and at its edges."""
+"""Sensory vector and sector ranges: the paper's example, brute force, limits, scans."""
 
 import math
 from collections.abc import Sequence
@@ -89,16 +89,18 @@ def test_spans_by_hand(degrees: float, half: float, expected: str) -> None:
      ((-1.0, -0.0), 5), ((-1.0, -1.0), 6), ((0.0, -1.0), 7), ((1.0, -1.0), 8), ((1.0, -0.0), 1)],
 )  # fmt: skip
 def test_sectors_are_half_open(direction: Point, sector: int) -> None:
-    # a point has one direction, and 8 sectors have bounds that floats hold exactly
+    # radius 0 gives a single direction; the bounds of 8 sectors are exact floats
     ring = sense_circles(ORIGIN, [(direction, 0.0)], SensorParams(sectors=8, sensing_range_m=9.0))
     assert [i for i, r in enumerate(ring, start=1) if r < math.inf] == [sector]
 
 
-def test_a_tangent_on_a_bound_belongs_to_the_sector_that_begins_there() -> None:
+def test_a_tangent_on_a_bound_belongs_to_the_sector_that_starts_with_it() -> None:
     # inside a circle the span is half a turn: from -90 to 90 degrees, both included
     ring = sense_circles(ORIGIN, [((0.5, 0.0), 1.0)], SensorParams(sectors=8))
     assert sensory_vector(ring) == (1, 1, 1, 0, 0, 0, 1, 1)
-    assert {r for r in ring if r < math.inf} == {0.0}, "already there, whatever the sector"
+    assert {r for r in ring if r < math.inf} == {0.0}, (
+        "inside the circle: range 0 in every set sector"
+    )
 
 
 def test_at_the_very_centre_of_a_circle() -> None:
@@ -115,30 +117,30 @@ def test_inside_a_circle_half_of_any_ring_is_set(sectors: int) -> None:
 
 def test_sensing_range_is_measured_to_the_enlarged_edge_and_includes_it() -> None:
     params = SensorParams(sensing_range_m=0.75)
-    for d, seen in ((1.25, True), (math.nextafter(1.25, 2.0), False), (1.3, False)):
+    for d, visible in ((1.25, True), (math.nextafter(1.25, 2.0), False), (1.3, False)):
         ring = sense_circles(ORIGIN, [((d, 0.0), 0.5)], params)
-        assert any(sensory_vector(ring)) is seen
+        assert any(sensory_vector(ring)) is visible
 
 
 def test_ranges_by_hand() -> None:
-    # dead ahead of S2's middle, tangents at 45 -+ asin(0.5 / 1)
+    # in the middle of S2, tangents at 45 -+ asin(0.5 / 1)
     ring = sense_circles(ORIGIN, [polar(45.0, 1.0, 0.5)], PAPER)
     aside = math.cos(math.radians(15.0)) - math.sqrt(0.25 - math.sin(math.radians(15.0)) ** 2)
     assert ring[:3] == pytest.approx((aside, 0.5, aside), abs=1e-6)
     assert set(ring[3:]) == {math.inf}
 
 
-def test_the_nearest_of_several_obstacles_counts_in_any_order() -> None:
+def test_the_nearest_of_several_obstacles_counts_in_any_sequence() -> None:
     near, far, aside = polar(45.0, 1.0, 0.4), polar(45.0, 1.2, 0.6), polar(200.0, 1.0, 0.4)
     ring = sense_circles(ORIGIN, [near, far, aside], PAPER)
     assert ring == sense_circles(ORIGIN, [aside, far, near], PAPER)
     assert ring[1] == pytest.approx(0.6, abs=1e-6)
-    alone = sense_circles(ORIGIN, [far], PAPER)
-    assert ring[0] == alone[0] < math.inf, "the smaller one does not reach S1"
+    each = sense_circles(ORIGIN, [far], PAPER)
+    assert ring[0] == each[0] < math.inf, "the smaller one does not reach S1"
     assert ring[6] == pytest.approx(0.6, abs=1e-6)
 
 
-def test_ranges_are_what_a_message_can_carry() -> None:
+def test_ranges_are_rounded_to_float32_as_in_a_message() -> None:
     ring = sense_circles(ORIGIN, [polar(45.0, 1.0, 0.3)], PAPER)
     assert ring[1] == float(np.float32(0.7))
     assert ring[1] != 0.7
@@ -194,8 +196,8 @@ def cast_rays(
 @given(CIRCLES, SECTORS)
 def test_a_ring_of_several_circles_is_the_least_of_each(circles: list[Circle], n: int) -> None:
     params = SensorParams(sectors=n)
-    alone = [sense_circles(ORIGIN, [circle], params) for circle in circles]
-    expected = tuple(map(min, zip(*alone))) if alone else (math.inf,) * n
+    each = [sense_circles(ORIGIN, [circle], params) for circle in circles]
+    expected = tuple(map(min, zip(*each))) if each else (math.inf,) * n
     assert sense_circles(ORIGIN, circles, params) == expected
 
 
@@ -206,23 +208,29 @@ def test_ring_against_many_rays(position: Point, around: Circle, n: int) -> None
     ring = sense_circles(position, circles, SensorParams(sectors=n))
     rays = 500
     angles = (np.arange(n * rays) + 0.5) * (2.0 * math.pi / (n * rays))
-    seen = cast_rays(position, circles, 0.8, angles)
+    ray_ranges = cast_rays(position, circles, 0.8, angles)
     for sector, r in enumerate(ring):
-        within = seen[sector * rays : (sector + 1) * rays]
-        nearest = within.min()
-        assert r <= nearest + 1e-6, "no ray sees anything nearer"
+        in_sector = ray_ranges[sector * rays : (sector + 1) * rays]
+        nearest = in_sector.min()
+        assert r <= nearest + 1e-6, "no ray hits anything nearer"
         if nearest < math.inf:
-            assert nearest == pytest.approx(r, abs=2e-3) or grazing(within)
+            assert nearest == pytest.approx(r, abs=2e-3) or grazing(in_sector)
             assert nearest <= r + 0.2
-        elif r < math.inf:  # a sliver between the sector's bound and its first ray
-            assert min(seen[sector * rays - 1], seen[(sector + 1) * rays % len(seen)]) < math.inf
+        elif r < math.inf:  # the circle is between the sector's bound and its first ray
+            assert (
+                min(
+                    ray_ranges[sector * rays - 1],
+                    ray_ranges[(sector + 1) * rays % len(ray_ranges)],
+                )
+                < math.inf
+            )
 
 
-def grazing(seen: np.ndarray) -> bool:
-    """Tell whether the nearest ray is next to one that misses: there the range is steep."""
-    index = int(seen.argmin())
-    nearby = seen[max(0, index - 2) : index + 3]
-    return bool(np.isinf(nearby).any() or index in (0, len(seen) - 1))
+def grazing(ray_ranges: np.ndarray) -> bool:
+    """Whether a ray next to the nearest one misses: the range changes steeply there."""
+    index = int(ray_ranges.argmin())
+    nearby = ray_ranges[max(0, index - 2) : index + 3]
+    return bool(np.isinf(nearby).any() or index in (0, len(ray_ranges) - 1))
 
 
 @given(CIRCLES, SECTORS, st.integers(1, 40))
@@ -259,7 +267,7 @@ def test_no_range_exceeds_the_tangent_of_a_circle_at_the_edge(
 
 def test_the_longest_range_by_hand() -> None:
     assert longest_range_m(SensorParams(sensing_range_m=0.2), 0.3) == pytest.approx(0.4)
-    # that range is reported where a tangent only just reaches into a sector
+    # that range occurs where a tangent barely reaches into a sector
     half = math.degrees(math.asin(0.3 / 0.5))
     ring = sense_circles(
         ORIGIN, [polar(half - 1e-7, 0.5, 0.3)], SensorParams(sensing_range_m=0.2001)
@@ -324,9 +332,9 @@ def test_yaw_turns_the_scan_into_the_frame_of_the_sectors() -> None:
 
 def test_the_range_of_a_scan_is_measured_to_the_enlarged_point_and_includes_it() -> None:
     params = SensorParams(sensing_range_m=0.75)
-    for d, seen in ((1.0, True), (1.0 + 1e-9, False)):
+    for d, visible in ((1.0, True), (1.0 + 1e-9, False)):
         ring = sense_scan(scan([d]), 0.0, 0.25, params)
-        assert any(sensory_vector(ring)) is seen
+        assert any(sensory_vector(ring)) is visible
 
 
 def test_rep_117() -> None:
@@ -340,15 +348,15 @@ def test_rep_117() -> None:
 
 def test_the_limits_of_a_scan_are_valid_ranges() -> None:
     wide = SensorParams(sensing_range_m=9.0)
-    for r, seen in ((0.1, True), (0.0999, False), (5.0, True), (5.001, False)):
+    for r, visible in ((0.1, True), (0.0999, False), (5.0, True), (5.001, False)):
         ring = sense_scan(scan([r, math.inf]), 0.0, 0.01, wide)
-        assert any(sensory_vector(ring)) is seen
+        assert any(sensory_vector(ring)) is visible
 
 
 @pytest.mark.parametrize(
     "ranges", [[], [math.nan], [math.nan, 6.0], [0.05], [0.0, 0.0, 99.0], [-1.0]], ids=str
 )
-def test_blind_is_not_free(ranges: list[float]) -> None:
+def test_a_scan_without_usable_ranges_is_refused(ranges: list[float]) -> None:
     with pytest.raises(InputError, match=f"^scan of {len(ranges)} beams without one usable range"):
         sense_scan(scan(ranges), 0.0, 0.3, PAPER)
 
@@ -381,7 +389,7 @@ def test_a_scan_may_have_no_upper_limit_and_start_at_0() -> None:
 
 
 def lidar(position: Point, circles: Sequence[Circle], beams: int, yaw: float) -> Scan:
-    """A scan of real surfaces by a robot that looks along yaw."""
+    """A scan of the circles' surfaces by a robot with this yaw."""
     angles = -math.pi + np.arange(beams) * (2.0 * math.pi / beams)
     return Scan(
         ranges_m=cast_rays(position, circles, math.inf, angles + yaw).astype(np.float32),
@@ -400,7 +408,7 @@ def lidar(position: Point, circles: Sequence[Circle], beams: int, yaw: float) ->
     ),
     st.floats(-3.0, 3.0),
 )
-def test_scan_and_obstacles_give_the_same_picture(
+def test_scan_and_circles_give_the_same_sectors(
     position: Point, around: list[Circle], yaw: float
 ) -> None:
     robot = 0.3
@@ -410,17 +418,19 @@ def test_scan_and_obstacles_give_the_same_picture(
     enlarged = [(c, r + robot) for c, r in circles]
     truth = sense_circles(position, enlarged, PAPER)
     wider = sense_circles(position, [(c, r + 0.01) for c, r in enlarged], PAPER)
-    for seen, true, most in zip(from_scan, truth, wider):
-        assert seen == math.inf or most < math.inf, "the scan invents no obstacle"
-        assert seen >= min(true, most) - 0.01, "nor brings one nearer"
+    for scanned, true, most in zip(from_scan, truth, wider):
+        assert scanned == math.inf or most < math.inf, "the scan adds no obstacle"
+        assert scanned >= min(true, most) - 0.01, "and no obstacle is nearer"
 
-    def whole(circle: Circle) -> bool:  # all that is seen of it lies within SR, to the tangents
+    def fully_in_range(
+        circle: Circle,
+    ) -> bool:  # its visible side, up to the tangents, lies within SR
         (x, y), r = circle
         return math.sqrt(x * x + y * y - r * r) - robot < 0.8 - 0.01
 
-    # a lone obstacle hides nothing of another: then the scan must find all of it
-    if len(around) == 1 and whole(around[0]):
+    # a single obstacle is not occluded: the scan must show all of it
+    if len(around) == 1 and fully_in_range(around[0]):
         narrower = sense_circles(position, [(c, r - 0.02) for c, r in enlarged], PAPER)
-        for seen, least in zip(from_scan, narrower):
-            assert seen < math.inf or least == math.inf
-            assert seen <= least + 0.1
+        for scanned, least in zip(from_scan, narrower):
+            assert scanned < math.inf or least == math.inf
+            assert scanned <= least + 0.1

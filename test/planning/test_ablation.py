@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each ablation lacks what its name says, and nothing else keeps it from driving."""
+"""Ablations of the predictive planner: each lacks the named component, and arrives."""
 
 import math
 from typing import Any
@@ -31,9 +31,9 @@ NAMES = (
 
 def drive(name: str, suite: str = "random-30", world: int = 0) -> Episode:
     planner = name if name == "predictive" else f"{ablation.__name__}:{name}"
-    played = run_one(Run(suite, world, planner, 0), SETTING)
-    assert played.fault == ""
-    return played.episode
+    outcome = run_one(Run(suite, world, planner, 0), SETTING)
+    assert outcome.fault == ""
+    return outcome.episode
 
 
 def decide(name: str, *circles: Circle) -> Any:
@@ -47,12 +47,12 @@ def decide(name: str, *circles: Circle) -> Any:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_all_of_them_arrive_somewhere_and_go_another_way_than_the_whole(name: str) -> None:
+def test_every_ablation_arrives_by_another_path_than_the_full_planner(name: str) -> None:
     results = [evaluate(drive(name, world=world)) for world in range(3)]
     assert {r.outcome for r in results} == {Outcome.GOAL_REACHED}
-    whole = [evaluate(drive("predictive", world=world)) for world in range(3)]
-    if name not in ("NoWaiting", "no_memory"):  # which are seldom missed among so few
-        assert [r.length_m for r in results] != [r.length_m for r in whole]
+    full_planner = [evaluate(drive("predictive", world=world)) for world in range(3)]
+    if name not in ("NoWaiting", "no_memory"):  # with so few obstacles they may not matter
+        assert [r.length_m for r in results] != [r.length_m for r in full_planner]
 
 
 def test_without_bats_no_candidates() -> None:
@@ -61,15 +61,15 @@ def test_without_bats_no_candidates() -> None:
 
 
 @pytest.mark.parametrize("name", ["NoWaiting", "BitsOnly"])
-def test_full_speed_unless_blocked_or_nearly_there(name: str) -> None:
+def test_full_speed_unless_blocked_or_near_the_goal(name: str) -> None:
     for world in range(3):
         for tick in drive(name, "random-30", world).ticks:
             left = math.dist(tick.waypoint, tick.pose.position)
-            if left > 0.08 * (1.0 + 1e-6):  # what a tick takes it
+            if left > 0.08 * (1.0 + 1e-6):  # farther than one tick
                 assert math.hypot(*tick.velocity) == pytest.approx(0.8)
 
 
-def test_bits_only_takes_the_nearest_free_heading_and_stands_among_none() -> None:
+def test_bits_only_takes_the_nearest_free_heading_and_stops_without_one() -> None:
     ahead = Circle(center_m=(1.0, 0.1), radius_m=0.6)
     decision = decide("BitsOnly", ahead)
     assert decision.mode is Mode.OBSTACLE_AVOIDANCE
@@ -89,26 +89,26 @@ def test_bits_only_takes_the_nearest_free_heading_and_stands_among_none() -> Non
         Circle(center_m=(0.7 * math.cos(a), 0.7 * math.sin(a)), radius_m=0.6)
         for a in (k * math.pi / 6 for k in range(12))
     ]
-    among = decide("BitsOnly", *ring)
-    assert among.velocity == (0.0, 0.0)
-    assert among.mode is Mode.BLOCKED
+    enclosed = decide("BitsOnly", *ring)
+    assert enclosed.velocity == (0.0, 0.0)
+    assert enclosed.mode is Mode.BLOCKED
 
 
-def test_without_velocities_whoever_comes_across_is_not_seen_coming() -> None:
+def test_without_velocities_a_crossing_obstacle_is_not_avoided() -> None:
     across = Circle(center_m=(1.2, 1.2), radius_m=0.6, velocity_mps=(0.0, -0.8))
     assert decide("NoVelocities", across).velocity == pytest.approx((0.8, 0.0))
     assert decide("NoBats", across).velocity != pytest.approx((0.8, 0.0))
 
 
-def test_without_margins_a_close_pass_is_as_good_as_any() -> None:
+def test_without_margins_a_close_pass_costs_nothing() -> None:
     beside = Circle(center_m=(1.0, 0.6 + 1e-4), radius_m=0.6)
     assert decide("no_margins", beside).velocity == pytest.approx((0.8, 0.0))
     assert decide("NoBats", beside).velocity != pytest.approx((0.8, 0.0))
 
 
-def test_without_memory_who_is_out_of_sight_is_out_of_mind() -> None:
+def test_without_memory_a_circle_out_of_range_is_ignored() -> None:
     ahead = Circle(center_m=(1.35, 0.0), radius_m=0.6)
-    goes = {}
+    velocities = {}
     for make in (Predictive, ablation.no_memory):
         planner = make(SETTING.params, SensorParams(), 0)
         for stamp, x, circles in ((1, 0.0, (ahead,)), (2, -0.1, ())):
@@ -119,6 +119,6 @@ def test_without_memory_who_is_out_of_sight_is_out_of_mind() -> None:
                     goal=(10.0, 0.0), circles=circles,
                 )
             )  # fmt: skip
-        goes[make] = decision.velocity
-    assert goes[ablation.no_memory] == pytest.approx((0.8, 0.0))
-    assert goes[Predictive] != pytest.approx((0.8, 0.0), abs=0.01)
+        velocities[make] = decision.velocity
+    assert velocities[ablation.no_memory] == pytest.approx((0.8, 0.0))
+    assert velocities[Predictive] != pytest.approx((0.8, 0.0), abs=0.01)

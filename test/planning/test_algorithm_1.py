@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Algorithm 1: the table of modes, every event's decision, and the streams of randomness."""
+"""Algorithm 1: mode table, decision of every event, random streams, persistent swarm, readings."""
 
 import math
 from dataclasses import replace
@@ -48,18 +48,20 @@ def observe(**changes: Any) -> Observation:
     return Observation(**{**plain, **changes})
 
 
-def never(position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
-    raise AssertionError("the bats were asked")
+def no_bats_expected(position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
+    raise AssertionError("the bats were called")
 
 
-def answer(mode: Mode = Mode.IDLE, params: PlannerParams = PARAMS, **changes: Any) -> Decision:
+def decide_without_bats(
+    mode: Mode = Mode.IDLE, params: PlannerParams = PARAMS, **changes: Any
+) -> Decision:
     """The decision on an observation that needs no bats."""
-    return decide(observe(**changes), mode, params, never)
+    return decide(observe(**changes), mode, params, no_bats_expected)
 
 
 # --- the table ------------------------------------------------------------------------------
 
-RESTLESS = {
+NOT_ARRIVED = {
     Event.NO_GOAL: Mode.IDLE,
     Event.NEW_GOAL: Mode.IDLE,
     Event.INVALID: Mode.STOPPED,
@@ -69,11 +71,11 @@ RESTLESS = {
     Event.OBSTACLE: Mode.OBSTACLE_AVOIDANCE,
     Event.NO_GAP: Mode.BLOCKED,
 }
-AT_REST = dict.fromkeys(Event, Mode.ARRIVED) | {
+ARRIVED = dict.fromkeys(Event, Mode.ARRIVED) | {
     Event.NO_GOAL: Mode.IDLE,
     Event.NEW_GOAL: Mode.IDLE,
 }
-TABLE = {mode: AT_REST if mode is Mode.ARRIVED else RESTLESS for mode in Mode}
+TABLE = {mode: ARRIVED if mode is Mode.ARRIVED else NOT_ARRIVED for mode in Mode}
 
 
 @pytest.mark.parametrize("event", Event)
@@ -110,10 +112,10 @@ def test_transition(mode: Mode, event: Event) -> None:
         ({"stamp_ns": -1}, Mode.STOPPED, "refused input: stamp -1 ns is negative"),
     ],
 )  # fmt: skip
-def test_whoever_does_not_plan_stands_still(
+def test_the_robot_stops_in_every_mode_that_does_not_move(
     changes: dict[str, Any], mode: Mode, reason: str
 ) -> None:
-    decision = answer(**changes)
+    decision = decide_without_bats(**changes)
     assert (decision.mode, decision.reason) == (mode, reason)
     assert decision.velocity == (0.0, 0.0)
     assert decision.gap == 0
@@ -131,7 +133,7 @@ ALL_AT_ONCE = {
 
 
 @pytest.mark.parametrize(
-    ("mended", "reason"),
+    ("changes", "reason"),
     [
         ({}, "refused input: x"),
         ({"refused": ""}, "input is 995.000 s old"),
@@ -141,61 +143,66 @@ ALL_AT_ONCE = {
          "refused input: stamp -5 ns is negative"),
     ],
 )  # fmt: skip
-def test_of_several_events_the_gravest_counts(mended: dict[str, Any], reason: str) -> None:
-    assert answer(**{**ALL_AT_ONCE, **mended}).reason == reason
+def test_of_several_events_the_most_severe_counts(changes: dict[str, Any], reason: str) -> None:
+    assert decide_without_bats(**{**ALL_AT_ONCE, **changes}).reason == reason
 
 
 def test_input_as_old_as_the_timeout_is_not_stale() -> None:
     gap: dict[str, Any] = {"ranges_m": ranges("110000000000")}
-    assert answer(now_ns=6_000_000_000, **gap).mode is Mode.OBSTACLE_AVOIDANCE
+    assert decide_without_bats(now_ns=6_000_000_000, **gap).mode is Mode.OBSTACLE_AVOIDANCE
     slow = replace(PARAMS, input_timeout_s=3.0)
-    assert answer(params=slow, now_ns=8_000_000_000, **gap).mode is Mode.OBSTACLE_AVOIDANCE
-    assert answer(params=slow, now_ns=8_000_000_001, **gap).mode is Mode.STOPPED
+    assert (
+        decide_without_bats(params=slow, now_ns=8_000_000_000, **gap).mode
+        is Mode.OBSTACLE_AVOIDANCE
+    )
+    assert decide_without_bats(params=slow, now_ns=8_000_000_001, **gap).mode is Mode.STOPPED
 
 
 def test_the_goal_tolerance_includes_its_edge() -> None:
     near: dict[str, Any] = {"pose": Pose2D(0.0, 0.0), "ranges_m": ranges("1" * 12)}
     params = replace(PARAMS, goal_tolerance_m=0.25)
-    assert answer(params=params, goal=(0.0, -0.25), **near).mode is Mode.ARRIVED
-    assert answer(params=params, goal=(0.0, -0.2500001), **near).mode is Mode.BLOCKED
+    assert decide_without_bats(params=params, goal=(0.0, -0.25), **near).mode is Mode.ARRIVED
+    assert decide_without_bats(params=params, goal=(0.0, -0.2500001), **near).mode is Mode.BLOCKED
 
 
 def test_obstacle_avoidance_takes_the_gap_nearest_to_the_goal() -> None:
     # Fig. 5, goal at 45 degrees
-    decision = answer(pose=Pose2D(1.0, 2.0, 0.5), goal=(5.0, 6.0), ranges_m=ranges("110000111000"))
+    decision = decide_without_bats(
+        pose=Pose2D(1.0, 2.0, 0.5), goal=(5.0, 6.0), ranges_m=ranges("110000111000")
+    )
     assert decision.mode is Mode.OBSTACLE_AVOIDANCE
     assert decision.reason == "sectors 1+2+7+8+9 set: gap 3 is nearest to the goal"
     assert "".join(map(str, decision.vs)) == "110000111000"
     assert "".join(map(str, decision.vg)) == "110001111001"
     assert decision.gap == 3
-    assert decision.waypoint == pytest.approx((1.0, 2.3)), "gap 3 is 90 degrees, whatever the yaw"
+    assert decision.waypoint == pytest.approx((1.0, 2.3)), "gap 3 is 90 degrees for any yaw"
     dt = PARAMS.tick_ns * 1e-9
     assert decision.velocity == pytest.approx((0.0, 0.3 / dt))
     assert math.hypot(*decision.velocity) == pytest.approx(0.785)
     assert decision.candidates == ()
 
 
-def test_obstacle_avoidance_never_steps_further_than_the_goal_is() -> None:
-    decision = answer(goal=(1.0, 2.125), ranges_m=ranges("110000111000"))
+def test_obstacle_avoidance_never_moves_farther_than_the_goal_is() -> None:
+    decision = decide_without_bats(goal=(1.0, 2.125), ranges_m=ranges("110000111000"))
     assert decision.waypoint == pytest.approx((1.0, 2.125))
 
 
-def test_a_decision_carries_what_it_was_made_from() -> None:
+def test_a_decision_contains_its_inputs() -> None:
     obs = observe(ranges_m=ranges("010000000000"))
-    decision = decide(obs, Mode.IDLE, PARAMS, never)
+    decision = decide(obs, Mode.IDLE, PARAMS, no_bats_expected)
     for name in ("stamp_ns", "pose", "goal", "ranges_m"):
         assert getattr(decision, name) == getattr(obs, name)
 
 
-def test_path_generation_asks_the_bats() -> None:
-    asked: list[tuple[Point, Point]] = []
+def test_path_generation_calls_the_bats() -> None:
+    calls: list[tuple[Point, Point]] = []
 
     def generate(position: Point, goal: Point) -> tuple[Point, tuple[Point, ...]]:
-        asked.append((position, goal))
+        calls.append((position, goal))
         return (1.1, 2.2), ((7.0, 8.0),)
 
     decision = decide(observe(), Mode.BLOCKED, PARAMS, generate)
-    assert asked == [((1.0, 2.0), GOAL)]
+    assert calls == [((1.0, 2.0), GOAL)]
     assert (decision.mode, decision.gap) == (Mode.PATH_GENERATION, 0)
     assert decision.reason == "no obstacle within SR"
     assert decision.waypoint == (1.1, 2.2)
@@ -214,8 +221,8 @@ def test_path_generation_asks_the_bats() -> None:
         ({"goal": (1.0, 2.0)}, "goal reached"),
     ],
 )  # fmt: skip
-def test_after_arrival_the_loop_is_over(changes: dict[str, Any], reason: str) -> None:
-    decision = answer(Mode.ARRIVED, **changes)
+def test_after_arrival_the_mode_stays_arrived(changes: dict[str, Any], reason: str) -> None:
+    decision = decide_without_bats(Mode.ARRIVED, **changes)
     assert (decision.mode, decision.reason) == (Mode.ARRIVED, reason)
     assert (decision.velocity, decision.gap) == ((0.0, 0.0), 0)
 
@@ -238,7 +245,7 @@ def test_a_tick_lasts_as_long_as_a_step_at_full_speed() -> None:
     st.sampled_from(Swarm),
     st.integers(0, 2**63),
 )
-def test_the_velocity_leads_to_the_waypoint_and_never_too_fast(
+def test_the_velocity_reaches_the_waypoint_within_the_speed_limit(
     x: float,
     y: float,
     gx: float,
@@ -263,7 +270,7 @@ def test_the_velocity_leads_to_the_waypoint_and_never_too_fast(
     assert math.hypot(*decision.velocity) <= speed * (1.0 + 1e-4)
 
 
-# --- the bats' step -------------------------------------------------------------------------
+# --- path generation ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", Swarm)
@@ -282,13 +289,13 @@ NUMBERS = st.one_of(
 
 
 @given(NUMBERS, NUMBERS)
-def test_the_words_a_stream_is_made_of_are_those_numpy_makes_itself(seed: int, stamp: int) -> None:
+def test_stream_equals_seed_sequence_with_spawn_key(seed: int, stamp: int) -> None:
     sequence = np.random.SeedSequence(seed, spawn_key=(1, stamp))
     expected = np.random.Generator(np.random.PCG64(sequence))
     assert stream(seed, stamp).random(8).tolist() == expected.random(8).tolist()
 
 
-def test_the_stream_of_a_decision_is_named_by_seed_purpose_and_stamp() -> None:
+def test_the_stream_of_a_decision_depends_on_seed_purpose_and_stamp() -> None:
     expected = np.random.Generator(
         np.random.PCG64(np.random.SeedSequence(4, spawn_key=(1, 123456789012)))
     )
@@ -303,11 +310,11 @@ def test_negative_seeds_are_refused() -> None:
     assert Algorithm1(PARAMS, 0).mode is Mode.IDLE
 
 
-# --- memory ---------------------------------------------------------------------------------
+# --- state ----------------------------------------------------------------------------------
 
 
 def drive(planner: Algorithm1, scenario: Scenario, ticks: int) -> list[Decision]:
-    """Drive a planner as the core driver does, for so many ticks."""
+    """The decisions of the first ticks, as simulation.run_episode makes them."""
     world = World(scenario, planner.params.tick_ns, planner.params.goal_tolerance_m)
     decisions = []
     for _ in range(ticks):
@@ -324,7 +331,7 @@ def drive(planner: Algorithm1, scenario: Scenario, ticks: int) -> list[Decision]
 
 
 @pytest.mark.parametrize("name", ["case1", "case2"])
-def test_a_planner_that_is_restarted_decides_as_the_first_one_did(name: str) -> None:
+def test_a_restarted_planner_makes_the_same_decisions(name: str) -> None:
     episode = run(load_scenario(name), seed=5)
     for k in (1, 7, 20, len(episode.ticks) - 1):
         restarted = Algorithm1(PARAMS, 5)
@@ -342,15 +349,15 @@ def test_a_planner_that_is_restarted_decides_as_the_first_one_did(name: str) -> 
 
 
 def test_decisions_depend_on_the_seed_and_on_the_stamp() -> None:
-    ways = {
+    waypoints = {
         Algorithm1(PARAMS, seed).plan(observe(stamp_ns=stamp, now_ns=stamp)).waypoint
         for seed in range(5)
         for stamp in (1, 2, 10**18)
     }
-    assert len(ways) == 15
+    assert len(waypoints) == 15
 
 
-def test_a_planner_remembers_its_mode_until_the_goal_changes() -> None:
+def test_the_mode_arrived_lasts_until_the_goal_changes() -> None:
     planner = Algorithm1(PARAMS, 0)
     assert planner.plan(observe(goal=(1.0, 2.0))).mode is Mode.ARRIVED
     away = {"pose": Pose2D(5.0, 5.0)}
@@ -362,7 +369,7 @@ def test_a_planner_remembers_its_mode_until_the_goal_changes() -> None:
     assert planner.plan(observe(goal=(1.0, 2.0), **away)).mode is Mode.PATH_GENERATION
 
 
-def test_reset_forgets_arrival() -> None:
+def test_reset_ends_the_mode_arrived() -> None:
     planner = Algorithm1(PARAMS, 0)
     planner.plan(observe(goal=(1.0, 2.0)))
     planner.reset()
@@ -385,25 +392,25 @@ def test_fig_1_keeps_its_swarm_over_the_trip() -> None:
     obs = observe(
         stamp_ns=tick.stamp_ns, now_ns=tick.stamp_ns, pose=tick.pose, goal=scenario.goal_m
     )
-    assert Algorithm1(FIG1, 3).plan(obs).candidates != tick.candidates, "it has a memory"
+    assert Algorithm1(FIG1, 3).plan(obs).candidates != tick.candidates, "the swarm is kept"
     for restart in (fresh.reset, lambda: fresh.plan(replace(obs, goal=(0.0, 9.0)))):
         restart()
         assert fresh.plan(obs) == Algorithm1(FIG1, 3).plan(obs)
 
 
-def test_fig_1_steps_one_bat_iteration_at_a_time_to_the_best_point_seen() -> None:
+def test_fig_1_moves_to_the_best_point_after_each_bat_iteration() -> None:
     planner = Algorithm1(FIG1, 3)
     best = math.inf
     for decision in drive(planner, load_scenario("empty"), 12):
         assert len(decision.candidates) == 5
         reach = [math.dist(decision.pose.position, c) for c in decision.candidates]
         assert max(reach) <= 0.1 + 1e-9
-        here = math.dist(decision.pose.position, GOAL)
-        best = min([here, *(math.dist(c, GOAL) for c in decision.candidates)])
+        distance_m = math.dist(decision.pose.position, GOAL)
+        best = min([distance_m, *(math.dist(c, GOAL) for c in decision.candidates)])
         assert math.dist(decision.waypoint, GOAL) <= best + 1e-9
 
 
-def test_fig_1_with_more_iterations_goes_straighter() -> None:
+def test_fig_1_with_more_iterations_gives_shorter_paths() -> None:
     def length(iterations: int) -> float:
         params = replace(FIG1, bat=BatParams(iterations=iterations))
         return evaluate(run(load_scenario("empty"), planner=params)).length_m
@@ -412,7 +419,7 @@ def test_fig_1_with_more_iterations_goes_straighter() -> None:
 
 
 def test_fig_1_spreads_the_schedule_of_eq_10_over_the_trip() -> None:
-    """With f = f_max beta and no walk, the second step of a bat shows T."""
+    """With f = f_max beta and no walk, the second step of a bat depends on T."""
     bat = BatParams(iterations=1, population=2, r0=1.0, rho=0.0, f_max=1.0, bounds=Bounds.NONE)
     params = replace(FIG1, bat=bat)
     # 0.95 m to go in steps of 0.1 m: T = 10
@@ -467,5 +474,5 @@ def test_every_swarm_reading_can_plan(name: str) -> None:
     bat = replace(readings.swarm(name), population=5, iterations=5)
     result = evaluate(run(load_scenario("empty"), planner=PlannerParams(bat=bat)))
     assert result.outcome in (Outcome.GOAL_REACHED, Outcome.TIME_LIMIT)
-    if name != "literal":  # which flies away from the best
+    if name != "literal":  # its bats move away from the best
         assert result.success

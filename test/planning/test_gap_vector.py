@@ -133,7 +133,7 @@ def test_every_gap_closed() -> None:
     assert nearest_free_gap(bits("111111111111"), 0.3) is None
 
 
-def test_a_gap_may_lead_along_the_middle_of_its_first_sector() -> None:
+def test_a_gap_may_head_along_the_middle_of_its_first_sector() -> None:
     assert gap_heading(1, 12, GapHeading.MIDDLE) == pytest.approx(math.radians(15.0))
     assert gap_heading(12, 12, GapHeading.MIDDLE) == pytest.approx(math.radians(-15.0))
     vg = (1, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One step of path generation: in the disc of one step, and the same alone or among many."""
+"""Goal steps of path generation, computed one by one and for many planners at once."""
 
 import math
 from collections.abc import Sequence
@@ -14,8 +14,13 @@ from mfba_planner.core.geometry import Point, Pose2D
 from mfba_planner.core.random_streams import stream
 from mfba_planner.core.types import Observation
 from mfba_planner.planning import algorithm_1 as module
-from mfba_planner.planning.algorithm_1 import FEW, Algorithm1, generate_paths_together
-from mfba_planner.planning.path_generation import Start, Step, generate_step, generate_steps
+from mfba_planner.planning.algorithm_1 import MIN_BATCH, Algorithm1, generate_paths_together
+from mfba_planner.planning.path_generation import (
+    GoalStep,
+    StepInput,
+    generate_step,
+    generate_steps,
+)
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.swarm.bat_swarm import BatParams, Bounds, Disc, Schedule, minimize
 
@@ -24,7 +29,7 @@ GOAL = (12.0, 12.0)
 STEP_M = 0.3
 METRES = st.floats(-100.0, 100.0)
 STARTS = st.builds(
-    Start,
+    StepInput,
     st.tuples(METRES, METRES),
     st.tuples(METRES, METRES),
     st.integers(0, 2),
@@ -34,7 +39,7 @@ STARTS = st.builds(
 
 def test_a_fresh_swarm_searches_the_disc_of_one_step() -> None:
     bat = BatParams(population=7, iterations=3)
-    waypoint, candidates = generate_step(Start((1.0, 2.0), (4.0, 6.0), 3, 77), STEP_M, bat)
+    waypoint, candidates = generate_step(StepInput((1.0, 2.0), (4.0, 6.0), 3, 77), STEP_M, bat)
 
     def cost(x: list[float]) -> float:
         return math.hypot(x[0] - 3.0, x[1] - 4.0)
@@ -44,12 +49,12 @@ def test_a_fresh_swarm_searches_the_disc_of_one_step() -> None:
     assert len(candidates) == 7
     for candidate, x in zip(candidates, swarm.candidates):
         assert candidate == pytest.approx((1.0 + x[0], 2.0 + x[1]))
-    assert math.dist(waypoint, (4.0, 6.0)) < 4.8, "nearly the whole step is gained"
+    assert math.dist(waypoint, (4.0, 6.0)) < 4.8, "nearly a whole step nearer to the goal"
 
 
 def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
     bat = BatParams(bounds=Bounds.NONE, schedule=Schedule.RAW)
-    waypoint, candidates = generate_step(Start((1.0, 2.0), GOAL, 0, 1), STEP_M, bat)
+    waypoint, candidates = generate_step(StepInput((1.0, 2.0), GOAL, 0, 1), STEP_M, bat)
     assert max(math.dist((1.0, 2.0), c) for c in candidates) > STEP_M
     assert math.dist((1.0, 2.0), waypoint) == pytest.approx(STEP_M)
     swarm = minimize(
@@ -61,20 +66,22 @@ def test_unbounded_bats_may_leave_the_disc_but_the_robot_may_not() -> None:
 
 @given(st.lists(STARTS, max_size=6), ANY_READING, st.floats(0.001, 3.0))
 def test_many_steps_at_once_are_the_same_steps(
-    starts: list[Start], bat: BatParams, step_m: float
+    starts: list[StepInput], bat: BatParams, step_m: float
 ) -> None:
-    starts.append(Start((1.0, 2.0), (1.0 + 0.9 * step_m, 2.0), 0, 1))  # the last of its trip
+    starts.append(
+        StepInput((1.0, 2.0), (1.0 + 0.9 * step_m, 2.0), 0, 1)
+    )  # the last step to its goal
     assert generate_steps(starts, step_m, bat) == [generate_step(s, step_m, bat) for s in starts]
 
 
-def test_a_start_among_others_of_its_seed_is_the_same() -> None:
-    starts = [Start((0.1 * k, 2.0), GOAL, 5, 2**33) for k in range(20)]
+def test_many_steps_of_one_seed_are_the_same_steps() -> None:
+    starts = [StepInput((0.1 * k, 2.0), GOAL, 5, 2**33) for k in range(20)]
     assert generate_steps(starts, STEP_M, BatParams()) == [
         generate_step(s, STEP_M, BatParams()) for s in starts
     ]
 
 
-# --- planners that let their bats fly together ------------------------------------------------
+# --- steps of many planners at once ---------------------------------------------------------
 
 
 def observed(k: int, ranges_m: tuple[float, ...] = FREE, goal: Point | None = GOAL) -> Observation:
@@ -85,15 +92,15 @@ def observed(k: int, ranges_m: tuple[float, ...] = FREE, goal: Point | None = GO
 
 
 @pytest.fixture
-def alone(monkeypatch: pytest.MonkeyPatch) -> list[Start]:
-    """The steps that were made alone."""
-    made: list[Start] = []
+def single(monkeypatch: pytest.MonkeyPatch) -> list[StepInput]:
+    """The inputs of the steps that were computed one by one."""
+    made: list[StepInput] = []
 
-    def noted(start: Start, step_length_m: float, bat: BatParams) -> Step:
+    def recorded(start: StepInput, step_length_m: float, bat: BatParams) -> GoalStep:
         made.append(start)
         return generate_step(start, step_length_m, bat)
 
-    monkeypatch.setattr(module, "fresh_step", noted)
+    monkeypatch.setattr(module, "generate_step", recorded)
     return made
 
 
@@ -101,52 +108,60 @@ def planners(seeds: Sequence[int], params: PlannerParams | None = None) -> list[
     return [Algorithm1(params or PlannerParams(), seed) for seed in seeds]
 
 
-def test_planners_find_their_bats_flown_and_decide_the_same(alone: list[Start]) -> None:
-    seeds = [k % 3 for k in range(FEW + 3)]
-    seen = [observed(k) for k in range(len(seeds))]
+def test_planners_use_their_batched_steps_and_decide_the_same(single: list[StepInput]) -> None:
+    seeds = [k % 3 for k in range(MIN_BATCH + 3)]
+    observations = [observed(k) for k in range(len(seeds))]
     blocked = (0.5, *FREE[1:])
-    seen[1], seen[2] = observed(1, blocked), observed(2, goal=None)
+    observations[1], observations[2] = observed(1, blocked), observed(2, goal=None)
     ours, theirs = planners(seeds), planners(seeds)
-    generate_paths_together(ours, seen)
-    decided = [planner.plan(obs) for planner, obs in zip(ours, seen)]
-    assert alone == []
-    assert decided == [planner.plan(obs) for planner, obs in zip(theirs, seen)]
-    assert len(alone) == len(seeds) - 2
-    again = [replace(obs, stamp_ns=2 * obs.stamp_ns, now_ns=2 * obs.now_ns) for obs in seen]
-    for planner, other, obs in zip(ours, theirs, again):
-        assert planner.plan(obs) == other.plan(obs), "bats that flew once do not come again"
+    generate_paths_together(ours, observations)
+    decided = [planner.plan(obs) for planner, obs in zip(ours, observations)]
+    assert single == []
+    assert decided == [planner.plan(obs) for planner, obs in zip(theirs, observations)]
+    assert len(single) == len(seeds) - 2
+    later = [
+        replace(obs, stamp_ns=2 * obs.stamp_ns, now_ns=2 * obs.now_ns) for obs in observations
+    ]
+    for planner, other, obs in zip(ours, theirs, later):
+        assert planner.plan(obs) == other.plan(obs), "a batched step is used only once"
 
 
-def test_few_fly_alone(alone: list[Start]) -> None:
-    ours = planners(range(FEW - 1))
-    seen = [observed(k) for k in range(FEW - 1)]
-    generate_paths_together(ours, seen)
-    for planner, obs in zip(ours, seen):
+def test_few_planners_are_not_batched(single: list[StepInput]) -> None:
+    ours = planners(range(MIN_BATCH - 1))
+    observations = [observed(k) for k in range(MIN_BATCH - 1)]
+    generate_paths_together(ours, observations)
+    for planner, obs in zip(ours, observations):
         planner.plan(obs)
-    assert len(alone) == FEW - 1
+    assert len(single) == MIN_BATCH - 1
 
 
-def test_whoever_is_elsewhere_or_has_other_options_flies_alone(alone: list[Start]) -> None:
-    ours = planners(range(FEW))
-    seen = [observed(k) for k in range(FEW)]
-    generate_paths_together(ours, seen)
+def test_a_batched_step_of_another_input_or_other_options_is_not_used(
+    single: list[StepInput],
+) -> None:
+    ours = planners(range(MIN_BATCH))
+    observations = [observed(k) for k in range(MIN_BATCH)]
+    generate_paths_together(ours, observations)
     ours[1].params = replace(ours[1].params, step_length_m=0.2)
     ours[2].params = replace(ours[2].params, bat=BatParams())  # an equal one
     ours[3].seed = 77
-    seen[4] = observed(44)
-    seen[5] = replace(seen[5], goal=(3.0, 3.0))
-    seen[6] = replace(seen[6], stamp_ns=7, now_ns=7)
-    decided = [planner.plan(obs) for planner, obs in zip(ours, seen)]
-    assert [start.seed for start in alone] == [1, 77, 4, 5, 6]
-    for mine, planner, obs in zip(decided, ours, seen):
+    observations[4] = observed(44)
+    observations[5] = replace(observations[5], goal=(3.0, 3.0))
+    observations[6] = replace(observations[6], stamp_ns=7, now_ns=7)
+    decided = [planner.plan(obs) for planner, obs in zip(ours, observations)]
+    assert [start.seed for start in single] == [1, 77, 4, 5, 6]
+    for mine, planner, obs in zip(decided, ours, observations):
         assert mine == Algorithm1(planner.params, planner.seed).plan(obs)
 
 
-def test_a_swarm_that_lives_on_is_not_flown_for_its_planner(alone: list[Start]) -> None:
+def test_persistent_swarms_are_not_batched(single: list[StepInput]) -> None:
     params = PlannerParams(swarm=Swarm.PERSISTENT)
-    ours, theirs = planners(range(FEW), params), planners(range(FEW), params)
-    seen = [observed(k) for k in range(FEW)]
-    generate_paths_together(ours, seen)
-    assert [p.plan(o) for p, o in zip(ours, seen)] == [p.plan(o) for p, o in zip(theirs, seen)]
-    assert [planner.start(obs) for planner, obs in zip(ours, seen)] == [None] * FEW
-    assert alone == []
+    ours, theirs = planners(range(MIN_BATCH), params), planners(range(MIN_BATCH), params)
+    observations = [observed(k) for k in range(MIN_BATCH)]
+    generate_paths_together(ours, observations)
+    assert [p.plan(o) for p, o in zip(ours, observations)] == [
+        p.plan(o) for p, o in zip(theirs, observations)
+    ]
+    assert [planner.step_input(obs) for planner, obs in zip(ours, observations)] == [
+        None
+    ] * MIN_BATCH
+    assert single == []

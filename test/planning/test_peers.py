@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The planners a user could pick instead: APF, VFH, DWA, ORCA."""
+"""The planners for comparison: APF, VFH, DWA, ORCA."""
 
 import math
 import sys
@@ -15,7 +15,7 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Circle, Mode, Observation, Scan
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.observed_circles import discs
+from mfba_planner.planning.observed_circles import circle_rows
 from mfba_planner.planning.peers import apf
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
@@ -27,7 +27,7 @@ from mfba_planner.simulation.scenario import Scenario
 PEERS = ("apf", "vfh", "dwa", "orca")
 PARAMS = PlannerParams(speed_mps=0.8)
 FREE = (math.inf,) * 12
-HERE = Observation(
+OBSERVATION = Observation(
     stamp_ns=PARAMS.tick_ns,
     now_ns=PARAMS.tick_ns,
     pose=Pose2D(1.0, 1.0),
@@ -38,22 +38,22 @@ HERE = Observation(
 
 
 def circle(x: float, y: float, vx: float = 0.0, vy: float = 0.0, radius_m: float = 0.6) -> Circle:
-    """Relative to the robot."""
+    """A circle at (x, y) relative to the robot."""
     return Circle(center_m=(1.0 + x, 1.0 + y), radius_m=radius_m, velocity_mps=(vx, vy))
 
 
 def velocity(name: str, *circles: Circle) -> tuple[float, float]:
-    return make(name, PARAMS).plan(replace(HERE, circles=circles)).velocity
+    return make(name, PARAMS).plan(replace(OBSERVATION, circles=circles)).velocity
 
 
 @pytest.mark.parametrize("name", PEERS)
-def test_with_nothing_around_they_drive_straight(name: str) -> None:
+def test_without_obstacles_they_drive_straight(name: str) -> None:
     assert velocity(name) == pytest.approx((0.8, 0.0))
 
 
 @pytest.mark.parametrize("name", PEERS)
 def test_the_last_step_ends_at_the_goal(name: str) -> None:
-    near = replace(HERE, goal=(1.1, 1.0))
+    near = replace(OBSERVATION, goal=(1.1, 1.0))
     decision = make(name, PARAMS).plan(near)
     assert decision.waypoint == pytest.approx((1.1, 1.0))
 
@@ -71,15 +71,15 @@ NEAR = st.builds(
 @pytest.mark.parametrize("name", PEERS)
 @settings(max_examples=60, deadline=None)
 @given(circles=st.lists(NEAR, max_size=5))
-def test_none_is_ever_faster_than_allowed(name: str, circles: list[Circle]) -> None:
+def test_none_exceeds_the_speed(name: str, circles: list[Circle]) -> None:
     vx, vy = velocity(name, *circles)
     assert math.hypot(vx, vy) <= 0.8 * (1.0 + 1e-6)
 
 
 @pytest.mark.parametrize("name", PEERS)
 @pytest.mark.parametrize("speed_mps", [0.0, 0.2])
-def test_an_obstacle_in_the_way_is_passed(name: str, speed_mps: float) -> None:
-    """A little off the line: exactly on it a potential field may stop."""
+def test_an_obstacle_on_the_path_is_passed(name: str, speed_mps: float) -> None:
+    """Slightly off the straight line; exactly on it a potential field may stop."""
     obstacle = Obstacle(
         center_m=(5.0, 5.2), radius_m=0.3, speed_mps=speed_mps, heading_rad=-0.75 * math.pi
     )
@@ -96,47 +96,49 @@ def test_an_obstacle_in_the_way_is_passed(name: str, speed_mps: float) -> None:
     assert result.length_m < 1.25 * math.dist(world.start_m, world.goal_m)
 
 
-def test_dwa_and_orca_know_who_moves_out_of_the_way() -> None:
+def test_dwa_and_orca_do_not_evade_an_obstacle_that_moves_away() -> None:
     leaving, staying = circle(1.3, 0.0, vx=0.79), circle(1.3, 0.0)
     for name in ("dwa", "orca"):
         assert velocity(name, leaving) == pytest.approx((0.8, 0.0), abs=0.03)
         assert velocity(name, staying) != pytest.approx((0.8, 0.0), abs=0.1)
 
 
-def test_a_potential_field_pushes_harder_the_nearer_it_is() -> None:
+def test_a_potential_field_repels_more_at_a_smaller_distance() -> None:
     vy = [velocity("apf", circle(0.0, -0.6 - gap))[1] for gap in (0.7, 0.4, 0.2, 0.1)]
     assert vy == sorted(vy)
     assert vy[0] > 0.0
     assert velocity("apf", circle(0.0, -0.6 - 0.8)) == pytest.approx((0.8, 0.0))
 
 
-def test_vfh_takes_the_free_heading_nearest_to_the_goal_and_keeps_to_it() -> None:
+def test_vfh_takes_the_free_heading_nearest_to_the_goal_and_keeps_its_side() -> None:
     planner = make("vfh", PARAMS)
-    above = planner.plan(replace(HERE, circles=(circle(1.0, -0.1),)))
-    assert above.velocity[1] > 0.0, "the shorter way round"
-    after = planner.plan(replace(HERE, stamp_ns=2 * PARAMS.tick_ns, circles=(circle(1.0, 0.1),)))
-    assert after.velocity[1] > 0.0, "the heading before counts"
+    above = planner.plan(replace(OBSERVATION, circles=(circle(1.0, -0.1),)))
+    assert above.velocity[1] > 0.0, "the side with the smaller turn"
+    after = planner.plan(
+        replace(OBSERVATION, stamp_ns=2 * PARAMS.tick_ns, circles=(circle(1.0, 0.1),))
+    )
+    assert after.velocity[1] > 0.0, "the last heading counts"
     assert velocity("vfh", circle(1.0, 0.1))[1] < 0.0
 
 
-def test_enclosed_they_stand_and_say_so() -> None:
+def test_enclosed_they_report_blocked() -> None:
     ring = [circle(math.cos(a), math.sin(a), radius_m=0.97) for a in np.linspace(0.0, 6.0, 24)]
     for name in ("vfh", "dwa"):
-        decision = make(name, PARAMS).plan(replace(HERE, circles=tuple(ring)))
+        decision = make(name, PARAMS).plan(replace(OBSERVATION, circles=tuple(ring)))
         assert decision.mode is Mode.BLOCKED, name
     assert velocity("vfh", *ring) == (0.0, 0.0)
 
 
-def test_forces_that_cancel_are_a_stop_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_forces_that_cancel_stop_the_robot_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apf, "REPULSION", 0.4**2 / (1.0 / 0.4 - 1.0 / 0.8))
-    decision = make("apf", PARAMS).plan(replace(HERE, circles=(circle(1.0, 0.0),)))
+    decision = make("apf", PARAMS).plan(replace(OBSERVATION, circles=(circle(1.0, 0.0),)))
     assert (decision.mode, decision.velocity) == (Mode.BLOCKED, (0.0, 0.0))
     assert decision.reason == "1 repelling: forces cancel"
 
 
 @pytest.mark.parametrize("name", ["apf", "vfh", "dwa"])
-def test_a_scan_will_do(name: str) -> None:
-    """The same single surface ahead, by circle and by one beam."""
+def test_a_scan_gives_the_same_velocity_as_circles(name: str) -> None:
+    """One surface ahead, given as a circle and as one beam."""
     ranges = np.full(36, np.inf)
     ranges[0] = 0.9
     scan = Scan(
@@ -146,19 +148,21 @@ def test_a_scan_will_do(name: str) -> None:
         range_min_m=0.0,
         range_max_m=1.1,
     )
-    by_scan = make(name, PARAMS).plan(replace(HERE, circles=None, scan=scan)).velocity
+    by_scan = make(name, PARAMS).plan(replace(OBSERVATION, circles=None, scan=scan)).velocity
     assert by_scan == pytest.approx(velocity(name, circle(0.9, 0.0, radius_m=0.3)))
-    blind = make(name, PARAMS).plan(replace(HERE, circles=None)).velocity
+    blind = make(name, PARAMS).plan(replace(OBSERVATION, circles=None)).velocity
     assert blind == pytest.approx((0.8, 0.0))
 
 
-def test_discs_are_relative_to_the_robot() -> None:
-    found = discs(replace(HERE, circles=(circle(0.5, -0.5, 0.1, 0.2),)))
+def test_circle_rows_are_relative_to_the_robot() -> None:
+    found = circle_rows(replace(OBSERVATION, circles=(circle(0.5, -0.5, 0.1, 0.2),)))
     assert found.tolist() == [[0.5, -0.5, 0.1, 0.2, 0.6]]
-    assert discs(HERE).shape == (0, 5)
+    assert circle_rows(OBSERVATION).shape == (0, 5)
 
 
-def test_orca_without_pyrvo_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_without_pyrvo_names_the_package_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "pyrvo", None)
     with pytest.raises(ConfigError, match="needs pyrvo; pip install"):
         make("orca", PARAMS, SensorParams())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planners by name, what they may see, and what none of them does with bad input."""
+"""Planners by name, their simulated observations, and stop conditions common to all."""
 
 import math
 from dataclasses import replace
@@ -52,7 +52,7 @@ def world_with(*obstacles: Obstacle, walls: Walls | None = None) -> World:
     return World(scenario, PARAMS.tick_ns, 0.02)
 
 
-def test_unknown_names_are_answered_with_the_nearest() -> None:
+def test_the_error_for_an_unknown_name_suggests_the_nearest() -> None:
     with pytest.raises(ConfigError, match="'straigt': unknown; did you mean 'straight'"):
         make("straigt")
     with pytest.raises(ConfigError, match="'scan12': unknown; did you mean 'scan-12'"):
@@ -73,7 +73,7 @@ def test_impossible_perceptions_are_refused(arguments: dict[str, float]) -> None
         Perception("known", **arguments)  # type: ignore[arg-type]
 
 
-def test_paper_is_the_core_s_planner_bit_for_bit_and_ba_differs() -> None:
+def test_paper_and_mfba_equal_algorithm_1_bit_by_bit_and_ba_differs() -> None:
     case1 = load_scenario("case1")
     plain = digest(run(case1, seed=3).ticks)
     assert digest(run(case1, seed=3, path_planner=make("paper", seed=3)).ticks) == plain
@@ -100,7 +100,7 @@ def test_straight_is_the_straight_line() -> None:
         ({"goal": (1.0, 2.01)}, Mode.ARRIVED, "goal reached"),
     ],
 )
-def test_every_planner_stands_for_the_same_reasons(
+def test_every_planner_stops_for_the_same_reasons(
     name: str, changes: dict[str, object], mode: Mode, reason: str
 ) -> None:
     planner = make(name, PARAMS)
@@ -128,16 +128,16 @@ def test_the_last_step_ends_at_the_goal(name: str) -> None:
     assert decision.waypoint == pytest.approx((1.1, 2.05))
 
 
-def test_known_circles_are_those_within_sr_and_move_as_they_do_now() -> None:
+def test_known_circles_are_those_within_sr_with_their_present_velocity() -> None:
     near = Obstacle(center_m=(6.3, 5.0), radius_m=0.3, speed_mps=0.2, heading_rad=math.pi)
     far = Obstacle(center_m=(6.5, 5.0), radius_m=0.3)
-    seen = Perception("known")(world_with(near, far), SENSOR)
-    assert seen.circles is not None
-    (circle,) = seen.circles
+    visible = Perception("known")(world_with(near, far), SENSOR)
+    assert visible.circles is not None
+    (circle,) = visible.circles
     assert circle.center_m == pytest.approx((6.3, 5.0))
     assert circle.radius_m == pytest.approx(0.6)
     assert circle.velocity_mps == pytest.approx((-0.2, 0.0))
-    assert seen.sensed is None
+    assert visible.sensed is None
 
 
 @given(
@@ -145,7 +145,7 @@ def test_known_circles_are_those_within_sr_and_move_as_they_do_now() -> None:
     heading=st.floats(0.0, 2.0 * math.pi),
     speed=st.floats(0.05, 2.0),
 )
-def test_the_velocity_at_a_moment_is_the_motion_s_derivative(
+def test_velocity_at_is_the_derivative_of_center_at(
     t: float, heading: float, speed: float
 ) -> None:
     walls = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 5.0))
@@ -161,7 +161,7 @@ def test_the_velocity_at_a_moment_is_the_motion_s_derivative(
 @given(
     bearing_rad=st.floats(-math.pi, math.pi), d=st.floats(0.31, 3.0), radius=st.floats(0.05, 0.3)
 )
-def test_beams_end_on_surfaces_and_miss_nothing_wide(
+def test_beams_end_on_surfaces_and_miss_no_wide_obstacle(
     bearing_rad: float, d: float, radius: float
 ) -> None:
     x, y = d * math.cos(bearing_rad), d * math.sin(bearing_rad)
@@ -179,43 +179,43 @@ def test_beams_end_on_surfaces_and_miss_nothing_wide(
 
 def test_a_scan_reaches_as_far_as_the_sensing_region() -> None:
     edge = 5.0 + SENSOR.sensing_range_m + 0.6
-    for centre, seen in ((edge - 1e-3, True), (edge + 1e-3, False)):
+    for centre, visible in ((edge - 1e-3, True), (edge + 1e-3, False)):
         world = world_with(Obstacle(center_m=(centre, 5.0), radius_m=0.3))
         scan = Perception("scan-360")(world, SENSOR).scan
         assert scan is not None
-        # The nearest beams look half a degree past the circle's nearest point.
-        assert bool(np.isfinite(scan.ranges_m).any()) is seen
+        # The nearest beams pass half a degree beside the circle's nearest point.
+        assert bool(np.isfinite(scan.ranges_m).any()) is visible
         circles = Perception("known")(world, SENSOR).circles
         assert circles is not None
-        assert bool(circles) is seen
+        assert bool(circles) is visible
 
 
 @pytest.mark.parametrize("name", ["known", "scan-12", "scan-360"])
-def test_latency_shows_what_was_and_says_so(name: str) -> None:
+def test_latency_gives_older_sensor_data_with_its_stamp_and_pose(name: str) -> None:
     obstacle = Obstacle(center_m=(6.0, 5.0), radius_m=0.3, speed_mps=0.3, heading_rad=1.0)
     late, prompt = Perception(name, latency_ticks=2), Perception(name)
     world = world_with(obstacle)
-    was, now = [], []
+    prompt_obs, late_obs = [], []
     for _ in range(4):
-        was.append(prompt(world, SENSOR))
-        now.append(late(world, SENSOR))
+        prompt_obs.append(prompt(world, SENSOR))
+        late_obs.append(late(world, SENSOR))
         world.step((0.1, 0.0))
     for k, n in enumerate([0, 0, 0, 1]):
-        assert now[k].pose == was[k].pose
-        assert now[k].stamp_ns == was[k].stamp_ns
-        assert now[k].circles == was[n].circles
-        assert (now[k].sensed is None) is (k == 0)
+        assert late_obs[k].pose == prompt_obs[k].pose
+        assert late_obs[k].stamp_ns == prompt_obs[k].stamp_ns
+        assert late_obs[k].circles == prompt_obs[n].circles
+        assert (late_obs[k].sensed is None) is (k == 0)
         if k:
-            assert now[k].sensed == (was[n].stamp_ns, was[n].pose)
-        then, sees = was[n].scan, now[k].scan
-        if then is not None and sees is not None:
-            assert np.array_equal(then.ranges_m, sees.ranges_m)
-    anew = late(world_with(obstacle), SENSOR)
-    assert anew.sensed is None
+            assert late_obs[k].sensed == (prompt_obs[n].stamp_ns, prompt_obs[n].pose)
+        then, now_scan = prompt_obs[n].scan, late_obs[k].scan
+        if then is not None and now_scan is not None:
+            assert np.array_equal(then.ranges_m, now_scan.ranges_m)
+    restarted = late(world_with(obstacle), SENSOR)
+    assert restarted.sensed is None
 
 
 @pytest.mark.parametrize("name", ["known", "scan-360"])
-def test_noise_is_the_seed_s_and_as_large_as_told(name: str) -> None:
+def test_noise_depends_on_the_seed_and_has_the_given_deviation(name: str) -> None:
     world = world_with(Obstacle(center_m=(6.0, 5.0), radius_m=0.3))
 
     def errors(seed: int) -> list[float]:
@@ -255,7 +255,7 @@ def test_a_scan_gives_the_paper_s_planner_its_sectors() -> None:
     )
 
 
-def test_what_leads_beyond_the_goal_is_cut() -> None:
+def test_a_velocity_beyond_the_goal_is_reduced() -> None:
     straight = Straight(PARAMS, SENSOR, 0)
     velocity = straight.straight((0.0, 0.0), (0.05, 0.0), 0.8)
     assert distance((0.0, 0.0), velocity) * PARAMS.tick_ns * 1e-9 == pytest.approx(0.05)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The predictive planner: what it avoids, what it leaves alone, and what it never does."""
+"""The predictive planner: evasion, free straight lines, limits, costs, cheapest candidate."""
 
 import math
 from dataclasses import replace
@@ -17,7 +17,12 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
 from mfba_planner.planning.predictive import Predictive, PredictiveParams, preset
-from mfba_planner.planning.trajectory_cost import RiskParams, TrajectoryCost, from_sectors, moved
+from mfba_planner.planning.trajectory_cost import (
+    RiskParams,
+    TrajectoryCost,
+    circles_from_sectors,
+    predicted_circles,
+)
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
@@ -30,7 +35,7 @@ PARAMS = preset(PlannerParams(speed_mps=0.8))
 SENSOR = SensorParams()
 STRAIGHT_M = 12.0 * math.sqrt(2.0)
 GOAL = (9.0, 8.0)
-HERE = Pose2D(1.0, 2.0)
+POSE = Pose2D(1.0, 2.0)
 
 
 def planner(seed: int = 0) -> Predictive:
@@ -42,9 +47,9 @@ def drive(scenario: Scenario, seed: int = 0, name: str = "known", **kw: float) -
     return run(scenario, planner=PARAMS, path_planner=planner(seed), seed=seed, observe=observer)
 
 
-def seeing(*circles: Circle, stamp_ns: int = 10**9, goal: Point = GOAL) -> Observation:
+def observation(*circles: Circle, stamp_ns: int = 10**9, goal: Point = GOAL) -> Observation:
     return Observation(
-        stamp_ns=stamp_ns, now_ns=stamp_ns, pose=HERE, ranges_m=(), goal=goal, circles=circles
+        stamp_ns=stamp_ns, now_ns=stamp_ns, pose=POSE, ranges_m=(), goal=goal, circles=circles
     )
 
 
@@ -84,7 +89,7 @@ def crowd(seed: int, count: int) -> Scenario:
 
 circles = st.builds(
     lambda bearing, d, speed, heading: Circle(
-        center_m=(HERE.x + d * math.cos(bearing), HERE.y + d * math.sin(bearing)),
+        center_m=(POSE.x + d * math.cos(bearing), POSE.y + d * math.sin(bearing)),
         radius_m=0.6,
         velocity_mps=(speed * math.cos(heading), speed * math.sin(heading)),
     ),
@@ -95,30 +100,30 @@ circles = st.builds(
 )
 
 
-@given(seen=st.lists(circles, max_size=12), seed=st.integers(0, 2**32))
+@given(observed=st.lists(circles, max_size=12), seed=st.integers(0, 2**32))
 @settings(max_examples=60)
-def test_whatever_it_sees_it_keeps_to_the_speed_and_to_numbers(
-    seen: list[Circle], seed: int
+def test_among_any_circles_velocities_are_finite_and_within_the_speed(
+    observed: list[Circle], seed: int
 ) -> None:
-    decision = planner(seed).plan(seeing(*seen))
+    decision = planner(seed).plan(observation(*observed))
     assert math.hypot(*decision.velocity) <= PARAMS.speed_mps * (1.0 + 1e-9)
     assert all(map(math.isfinite, (*decision.velocity, *decision.waypoint)))
-    assert decision == planner(seed).plan(seeing(*seen))
+    assert decision == planner(seed).plan(observation(*observed))
 
 
-@given(seen=st.lists(circles, min_size=1, max_size=5))
+@given(observed=st.lists(circles, min_size=1, max_size=5))
 @settings(max_examples=60)
-def test_a_straight_way_that_is_free_is_taken(seen: list[Circle]) -> None:
+def test_a_free_straight_line_is_taken(observed: list[Circle]) -> None:
     off = math.pi / 2.0
-    toward = math.atan2(GOAL[1] - HERE.y, GOAL[0] - HERE.x)
+    toward = math.atan2(GOAL[1] - POSE.y, GOAL[0] - POSE.x)
     behind = [
         c
-        for c in seen
-        if math.cos(math.atan2(c.center_m[1] - HERE.y, c.center_m[0] - HERE.x) - toward) < -0.1
+        for c in observed
+        if math.cos(math.atan2(c.center_m[1] - POSE.y, c.center_m[0] - POSE.x) - toward) < -0.1
         and math.hypot(*c.velocity_mps) < 0.3
-        and distance(c.center_m, HERE.position) > 0.8
+        and distance(c.center_m, POSE.position) > 0.8
     ]
-    decision = planner().plan(seeing(*behind))
+    decision = planner().plan(observation(*behind))
     assert math.remainder(math.atan2(*decision.velocity[::-1]) - toward, 4.0 * off) == (
         pytest.approx(0.0, abs=1e-9)
     )
@@ -128,7 +133,7 @@ def test_a_straight_way_that_is_free_is_taken(seen: list[Circle]) -> None:
 
 @pytest.mark.parametrize("name", ["known", "scan-360", "scan-12"])
 @pytest.mark.parametrize("aside_m", [0.0, 0.2, -0.4])
-def test_who_comes_head_on_is_passed(name: str, aside_m: float) -> None:
+def test_an_obstacle_that_comes_head_on_is_passed(name: str, aside_m: float) -> None:
     scenario = Scenario(
         name="head-on",
         start_m=(0.0, 0.0),
@@ -142,23 +147,23 @@ def test_who_comes_head_on_is_passed(name: str, aside_m: float) -> None:
     assert result.length_m < 8.0 * (1.1 if name == "scan-12" else 1.06)
 
 
-def test_who_stands_still_is_run_into_by_nobody_when_closed_in() -> None:
+def test_enclosed_by_obstacles_at_rest_it_touches_none() -> None:
     ring = [
-        Circle(center_m=(HERE.x + 0.75 * math.cos(k), HERE.y + 0.75 * math.sin(k)), radius_m=0.6)
+        Circle(center_m=(POSE.x + 0.75 * math.cos(k), POSE.y + 0.75 * math.sin(k)), radius_m=0.6)
         for k in np.arange(0.0, 2.0 * math.pi, math.pi / 6.0)
     ]
-    decision = planner().plan(seeing(*ring))
+    decision = planner().plan(observation(*ring))
     assert all(decision.vs)
     assert decision.reason.startswith("every heading closes; the least risk")
     dt = PARAMS.tick_ns * 1e-9
-    x, y = (HERE.x + decision.velocity[0] * dt, HERE.y + decision.velocity[1] * dt)
+    x, y = (POSE.x + decision.velocity[0] * dt, POSE.y + decision.velocity[1] * dt)
     assert min(distance((x, y), c.center_m) for c in ring) > 0.6
 
 
-def test_closed_in_by_movers_it_flees_where_contact_is_latest() -> None:
-    left = Circle(center_m=(HERE.x - 0.7, HERE.y), radius_m=0.6, velocity_mps=(0.3, 0.0))
-    right = Circle(center_m=(HERE.x + 0.9, HERE.y), radius_m=0.6, velocity_mps=(-0.3, 0.0))
-    velocity = planner().plan(seeing(left, right)).velocity
+def test_enclosed_by_moving_obstacles_it_moves_to_the_latest_contact() -> None:
+    left = Circle(center_m=(POSE.x - 0.7, POSE.y), radius_m=0.6, velocity_mps=(0.3, 0.0))
+    right = Circle(center_m=(POSE.x + 0.9, POSE.y), radius_m=0.6, velocity_mps=(-0.3, 0.0))
+    velocity = planner().plan(observation(left, right)).velocity
     assert abs(velocity[1]) > 0.5 * PARAMS.speed_mps
 
 
@@ -173,7 +178,7 @@ def test_the_paper_s_cases_at_nearly_the_optimum(case: str, longest_m: float) ->
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_crowds_are_crossed_unharmed_and_so_is_their_mirror_image(seed: int) -> None:
+def test_crowds_and_their_mirror_images_are_crossed_without_contact(seed: int) -> None:
     scenario = crowd(seed, 15)
     lengths = []
     for world in (scenario, mirrored(scenario)):
@@ -191,16 +196,16 @@ def test_the_same_seed_decides_the_same_and_another_one_differs() -> None:
     assert digest(drive(world, 1).ticks) != digest(drive(world, 2).ticks)
 
 
-def test_a_reset_forgets() -> None:
+def test_reset_drops_all_state() -> None:
     blocking = Circle(center_m=(2.0, 2.8), radius_m=0.6)
     path_planner = planner()
-    first = path_planner.plan(seeing(blocking))
-    path_planner.plan(seeing(blocking, stamp_ns=2 * 10**9))
+    first = path_planner.plan(observation(blocking))
+    path_planner.plan(observation(blocking, stamp_ns=2 * 10**9))
     path_planner.reset()
-    assert path_planner.plan(seeing(blocking)) == first
+    assert path_planner.plan(observation(blocking)) == first
 
 
-def test_without_circles_and_scan_the_sectors_must_do() -> None:
+def test_without_circles_and_scan_the_sectors_are_used() -> None:
     scenario = Scenario(
         name="post",
         start_m=(0.0, 0.0),
@@ -211,13 +216,15 @@ def test_without_circles_and_scan_the_sectors_must_do() -> None:
         run(scenario, planner=PARAMS, path_planner=planner(), observe=Perception("sectors"))
     )
     assert result.success
-    (circle,) = from_sectors((1.0, 1.0), (math.inf, 0.5, math.inf, math.inf), 0.3)
+    (circle,) = circles_from_sectors((1.0, 1.0), (math.inf, 0.5, math.inf, math.inf), 0.3)
     s = 0.8 / math.sqrt(2.0)
     assert circle.center_m == pytest.approx((1.0 - s, 1.0 + s))
 
 
-def test_late_circles_are_moved_on() -> None:
-    (circle,) = moved([Circle(center_m=(1.0, 1.0), radius_m=0.6, velocity_mps=(0.2, -0.1))], 0.5)
+def test_late_circles_are_predicted() -> None:
+    (circle,) = predicted_circles(
+        [Circle(center_m=(1.0, 1.0), radius_m=0.6, velocity_mps=(0.2, -0.1))], 0.5
+    )
     assert circle.center_m == pytest.approx((1.1, 0.95))
 
 
@@ -233,39 +240,42 @@ def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
     risk = RiskParams()
     circle = Circle(center_m=(x, y), radius_m=0.6, velocity_mps=(vx, vy))
     margin = risk.margin_m + risk.margin_ticks * 0.1 * math.hypot(vx, vy)
-    if math.hypot(x, y) < 0.61 + margin:  # who is within it already may leave it for nothing
+    if math.hypot(x, y) < 0.61 + margin:  # within the margin moving out is free
         return
-    way = (0.8 * t1 * math.cos(heading), 0.8 * t1 * math.sin(heading))
+    waypoint = (0.8 * t1 * math.cos(heading), 0.8 * t1 * math.sin(heading))
     goal = (9.0, 1.0)
-    cost = TrajectoryCost((0.0, 0.0), [circle], risk, 0.1).cost(way, t1, goal, 0.8)
-    rest = distance(way, goal)
+    cost = TrajectoryCost((0.0, 0.0), [circle], risk, 0.1).cost(waypoint, t1, goal, 0.8)
+    rest = distance(waypoint, goal)
     length = 0.8 * t1 + rest
-    smallest = surely = math.inf  # within tau, and so early within it that risk has not faded
+    smallest = early_smallest = math.inf  # within tau, and within 0.9 tau
     moment = 0.0
     for t in np.linspace(0.0, risk.horizon_s, 3001).tolist():
         if t <= t1:
-            here = (way[0] * t / t1, way[1] * t / t1)
+            position = (waypoint[0] * t / t1, waypoint[1] * t / t1)
         else:
             share = min(1.0, 0.8 * (t - t1) / rest)
-            here = (way[0] + share * (goal[0] - way[0]), way[1] + share * (goal[1] - way[1]))
-        apart = distance(here, (x + vx * t, y + vy * t)) - 0.6
+            position = (
+                waypoint[0] + share * (goal[0] - waypoint[0]),
+                waypoint[1] + share * (goal[1] - waypoint[1]),
+            )
+        apart = distance(position, (x + vx * t, y + vy * t)) - 0.6
         if apart < smallest:
             smallest, moment = apart, t
         if t < 0.9 * risk.horizon_s:
-            surely = smallest
+            early_smallest = smallest
     if smallest > margin + 1e-3:
         assert cost == pytest.approx(length)
     elif smallest < margin - 2e-3 and moment < 0.9 * risk.horizon_s:
-        assert cost > length  # who still comes nearer then is weighed by later decisions
-    if surely < -2e-3:
+        assert cost > length  # a later closest approach may cost nothing yet
+    if early_smallest < -2e-3:
         assert cost > length + 1e-6
 
 
 @pytest.mark.parametrize("bearing", np.linspace(-math.pi, math.pi, 25).tolist())
-def test_along_the_edge_of_who_is_within_a_margin_is_free_and_deeper_is_not(
+def test_within_a_margin_moving_along_the_circle_is_free_and_closer_is_not(
     bearing: float,
 ) -> None:
-    """Right angles are none to the last bit; what that makes of them is no approach."""
+    """Right angles have rounding errors; these must not count as an approach."""
     post = Circle(
         center_m=(0.605 * math.cos(bearing), 0.605 * math.sin(bearing)), radius_m=0.6
     )  # a margin is 0.015 m
@@ -291,15 +301,15 @@ def test_the_preset_changes_step_and_swarm_only() -> None:
 
 
 @pytest.mark.parametrize(("suite_name", "k"), [("dense", 1074), ("adversarial", 1109)])
-def test_no_waypoint_is_so_near_that_the_tick_leads_beyond_it(suite_name: str, k: int) -> None:
+def test_near_waypoints_are_not_overshot_within_a_tick(suite_name: str, k: int) -> None:
     assert evaluate(drive(suite(suite_name).world(k))).success
 
 
 @pytest.mark.parametrize("waypoint_m", [0.5, 1.0, 1.5])
-def test_a_contact_costs_by_what_is_driven_until_then_whichever_leg_it_is_on(
+def test_the_cost_of_a_contact_depends_on_the_driving_time_on_either_segment(
     waypoint_m: float,
 ) -> None:
-    """x = 1 - s / tau: a contact after 2.1 s, a closest approach, right through, after 2.6 s."""
+    """x = 1 - s / tau: contact after 2.1 s, closest approach (distance 0) after 2.6 s."""
     risk = RiskParams(horizon_s=3.0, contact_m=3.0, urgent_m=100.0, close_m=0.3)
     ahead = Circle(center_m=(2.6, 0.0), radius_m=0.5)
     world = TrajectoryCost((0.0, 0.0), [ahead], risk, 0.1)
@@ -310,7 +320,9 @@ def test_a_contact_costs_by_what_is_driven_until_then_whichever_leg_it_is_on(
 
 
 @pytest.mark.parametrize("waypoint_m", [2.15, 2.3, 2.5])
-def test_a_contact_comes_when_it_begins_wherever_in_it_the_leg_ends(waypoint_m: float) -> None:
+def test_the_cost_of_a_contact_depends_on_its_start_wherever_the_segment_ends(
+    waypoint_m: float,
+) -> None:
     risk = RiskParams(horizon_s=3.0, contact_m=3.0, urgent_m=100.0, close_m=0.3)
     ahead = Circle(center_m=(2.6, 0.0), radius_m=0.5)
     found = TrajectoryCost((0.0, 0.0), [ahead], risk, 0.1).cost(
@@ -332,46 +344,49 @@ def test_a_contact_comes_when_it_begins_wherever_in_it_the_leg_ends(waypoint_m: 
     first=st.integers(0, 35),
 )  # fmt: skip
 @settings(max_examples=150)
-def test_the_cheapest_of_many_ways_is_found_without_weighing_all(
+def test_the_cheapest_candidate_is_found_without_evaluating_all(
     crowd: list[tuple[float, float, float, float]], bound: float, first: int
 ) -> None:
     circles = [
         Circle(center_m=(r * math.cos(b), r * math.sin(b)), radius_m=0.6, velocity_mps=(vx, vy))
         for r, b, vx, vy in crowd
     ]
-    goal, speed, ways = (5.0, 1.0), 0.8, []
+    goal, speed, candidates = (5.0, 1.0), 0.8, []
     for k in range(12):
         for length in (0.4, 1.0, 2.0):
             q = (length * math.cos(k * math.pi / 6.0), length * math.sin(k * math.pi / 6.0))
-            ways.append((length + distance(q, goal), q, length / speed, k))
-    ways = [(-math.inf, *ways[first][1:3], -1), *sorted(ways[:first] + ways[first + 1 :])]
+            candidates.append((length + distance(q, goal), q, length / speed, k))
+    candidates = [
+        (-math.inf, *candidates[first][1:3], -1),
+        *sorted(candidates[:first] + candidates[first + 1 :]),
+    ]
     world = TrajectoryCost((0.0, 0.0), circles, RiskParams(), 0.1, speed)
-    costs = [world.cost(q, t1, goal, speed) for _, q, t1, _ in ways]
-    found = world.cheapest(ways, goal, speed, bound)
+    costs = [world.cost(q, t1, goal, speed) for _, q, t1, _ in candidates]
+    found = world.cheapest(candidates, goal, speed, bound)
     if found is None:
         assert min(costs) >= bound
     else:
-        way, t1, cost = found
+        waypoint, t1, cost = found
         assert cost == min(costs) < bound
-        assert costs[[(q, t) for _, q, t, _ in ways].index((way, t1))] == cost
+        assert costs[[(q, t) for _, q, t, _ in candidates].index((waypoint, t1))] == cost
 
 
-def test_a_longer_way_in_the_same_direction_may_be_the_better_one() -> None:
-    """Who comes nearer slowly is a lesser risk, the later the leg that it is near ends."""
+def test_a_longer_candidate_in_the_same_direction_may_be_cheaper() -> None:
+    """The risk of a slow approach is smaller if the segment ends later."""
     beside = Circle(center_m=(0.0, 0.74), radius_m=0.6, velocity_mps=(0.8, -0.05))
     world = TrajectoryCost((0.0, 0.0), [beside], RiskParams(), 0.1, 0.8)
-    ways = [(5.0, (1.0, 0.0), 1.25, 0), (5.0, (2.0, 0.0), 2.5, 0)]
-    found = world.cheapest(ways, (5.0, 0.0), 0.8, 5.06)
+    candidates = [(5.0, (1.0, 0.0), 1.25, 0), (5.0, (2.0, 0.0), 2.5, 0)]
+    found = world.cheapest(candidates, (5.0, 0.0), 0.8, 5.06)
     assert found is not None
     assert found[0] == (2.0, 0.0)
 
 
-def test_who_is_met_at_the_far_end_of_a_way_is_not_left_out() -> None:
-    """A way beyond the goal and back, as near its bound as may be, and who stands behind it."""
+def test_a_circle_at_the_far_end_of_a_candidate_is_not_left_out() -> None:
+    """A path beyond the goal and back with a cost near the bound, and a circle behind the goal."""
     behind = Circle(center_m=(2.05, 0.0), radius_m=0.6)
     world = TrajectoryCost((0.0, 0.0), [behind], RiskParams(), 0.1, 0.8)
-    ways = [(-math.inf, (0.0, 2.0), 2.5, -1), (2.0, (1.5, 0.0), 1.875, 0)]
-    assert world.cheapest(ways, (1.0, 0.0), 0.8, 2.1) is None
+    candidates = [(-math.inf, (0.0, 2.0), 2.5, -1), (2.0, (1.5, 0.0), 1.875, 0)]
+    assert world.cheapest(candidates, (1.0, 0.0), 0.8, 2.1) is None
 
 
 @pytest.mark.parametrize(
@@ -382,10 +397,10 @@ def test_who_is_met_at_the_far_end_of_a_way_is_not_left_out() -> None:
         ((0.20929865995889174, 1.7257496037770959), (0.3645074657187967, 0.7121336303217678)),
     ],
 )
-def test_who_is_grazed_to_the_last_bit_is_weighed_like_any_other(
+def test_a_circle_touched_to_the_last_bit_is_evaluated_like_any_other(
     center: Point, velocity: Point
 ) -> None:
-    """Rounded one way the closest approach is a contact, rounded the other way it is none."""
+    """The rounding decides whether the closest approach is a contact."""
     world = TrajectoryCost((0.0, 0.0), [Circle(center_m=center, radius_m=0.6)], RiskParams(), 0.1)
-    way = (2.5 * velocity[0], 2.5 * velocity[1])
-    assert 2.0 < world.cost(way, 2.5, way, 0.8) < math.inf
+    waypoint = (2.5 * velocity[0], 2.5 * velocity[1])
+    assert 2.0 < world.cost(waypoint, 2.5, waypoint, 0.8) < math.inf

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way out of a blocked state as a table, within bounded time, and only if asked for."""
+"""Recovery of a blocked robot: phase table, bounded time, room; off by default; speed limit."""
 
 import math
 from dataclasses import replace
@@ -30,10 +30,10 @@ from mfba_planner.planning.supervised_planner import SupervisedPlanner
 S = 1_000_000_000
 INF = math.inf
 PARAMS = RecoveryParams(enabled=True, wait_s=2.0, back_off_s=1.0, attempts=3)
-ONCE = Recovery(phase=Phase.FREE, since_ns=10 * S, free_ns=12 * S, attempt=2)
+OPEN_GAP = Recovery(phase=Phase.FREE, since_ns=10 * S, free_ns=12 * S, attempt=2)
 
 
-def at(phase: Phase, attempt: int = 1) -> Recovery:
+def state_in(phase: Phase, attempt: int = 1) -> Recovery:
     return Recovery(phase=phase, since_ns=10 * S, free_ns=5 * S, attempt=attempt)
 
 
@@ -42,24 +42,24 @@ def at(phase: Phase, attempt: int = 1) -> Recovery:
     [
         (Recovery(), False, 9, Phase.FREE, 0),
         (Recovery(), True, 9, Phase.WAIT, 0),
-        (at(Phase.WAIT), True, 11, Phase.WAIT, 1),
-        (at(Phase.WAIT), True, 12, Phase.BACK_OFF, 2),
-        (at(Phase.WAIT), False, 11, Phase.FREE, 1),
-        (at(Phase.WAIT), False, 12, Phase.FREE, 1),
-        (at(Phase.WAIT, 3), True, 12, Phase.GIVEN_UP, 3),
-        (at(Phase.BACK_OFF), True, 10.5, Phase.BACK_OFF, 1),
-        (at(Phase.BACK_OFF), False, 10.5, Phase.BACK_OFF, 1),
-        (at(Phase.BACK_OFF), True, 11, Phase.REPLAN, 1),
-        (at(Phase.BACK_OFF), False, 11, Phase.REPLAN, 1),
-        (at(Phase.REPLAN), True, 11, Phase.WAIT, 1),
-        (at(Phase.REPLAN), False, 11, Phase.FREE, 1),
-        (at(Phase.GIVEN_UP, 3), True, 99, Phase.GIVEN_UP, 3),
-        (at(Phase.GIVEN_UP, 3), False, 99, Phase.GIVEN_UP, 3),
-        (ONCE, False, 13.9, Phase.FREE, 2),
-        (ONCE, False, 14, Phase.FREE, 0),
-        (ONCE, True, 13.9, Phase.BACK_OFF, 3),
-        (replace(ONCE, since_ns=12 * S), True, 13.9, Phase.WAIT, 2),
-        (ONCE, True, 14, Phase.WAIT, 0),
+        (state_in(Phase.WAIT), True, 11, Phase.WAIT, 1),
+        (state_in(Phase.WAIT), True, 12, Phase.BACK_OFF, 2),
+        (state_in(Phase.WAIT), False, 11, Phase.FREE, 1),
+        (state_in(Phase.WAIT), False, 12, Phase.FREE, 1),
+        (state_in(Phase.WAIT, 3), True, 12, Phase.GIVEN_UP, 3),
+        (state_in(Phase.BACK_OFF), True, 10.5, Phase.BACK_OFF, 1),
+        (state_in(Phase.BACK_OFF), False, 10.5, Phase.BACK_OFF, 1),
+        (state_in(Phase.BACK_OFF), True, 11, Phase.REPLAN, 1),
+        (state_in(Phase.BACK_OFF), False, 11, Phase.REPLAN, 1),
+        (state_in(Phase.REPLAN), True, 11, Phase.WAIT, 1),
+        (state_in(Phase.REPLAN), False, 11, Phase.FREE, 1),
+        (state_in(Phase.GIVEN_UP, 3), True, 99, Phase.GIVEN_UP, 3),
+        (state_in(Phase.GIVEN_UP, 3), False, 99, Phase.GIVEN_UP, 3),
+        (OPEN_GAP, False, 13.9, Phase.FREE, 2),
+        (OPEN_GAP, False, 14, Phase.FREE, 0),
+        (OPEN_GAP, True, 13.9, Phase.BACK_OFF, 3),
+        (replace(OPEN_GAP, since_ns=12 * S), True, 13.9, Phase.WAIT, 2),
+        (OPEN_GAP, True, 14, Phase.WAIT, 0),
     ],
 )
 def test_phases_follow_each_other(
@@ -69,7 +69,7 @@ def test_phases_follow_each_other(
     assert (after.phase, after.attempt) == (phase, attempt)
 
 
-def test_a_gap_that_flickers_does_not_begin_the_wait_anew() -> None:
+def test_a_flickering_gap_does_not_restart_the_wait() -> None:
     state = Recovery()
     for tick in range(4):
         state = advance(state, tick % 2 == 0, (10 + tick) * S // 2, PARAMS)
@@ -88,11 +88,11 @@ def test_a_gap_that_flickers_does_not_begin_the_wait_anew() -> None:
 def test_it_gives_up_in_bounded_time(
     wait_s: float, back_off_s: float, attempts: int, tick_ms: int, gaps: list[bool]
 ) -> None:
-    """Whatever flickers, as long as no gap stays open for wait_s."""
+    """For any flickering gaps that stay open for less than wait_s."""
     params = RecoveryParams(enabled=True, wait_s=wait_s, back_off_s=back_off_s, attempts=attempts)
     tick_ns = tick_ms * 1_000_000
-    state, now_ns, open_ns, begun_ns = Recovery(), S, 0, S
-    limit_ns = begun_ns + longest_s(params, tick_ms * 1e-3) * S
+    state, now_ns, open_ns, start_ns = Recovery(), S, 0, S
+    limit_ns = start_ns + longest_s(params, tick_ms * 1e-3) * S
     k = 0
     while state.phase is not Phase.GIVEN_UP:
         gap = gaps[k % len(gaps)] and open_ns + 2 * tick_ns < wait_s * S and k > 0
@@ -104,7 +104,7 @@ def test_it_gives_up_in_bounded_time(
     assert state.attempt == attempts
 
 
-def test_most_room_is_where_nothing_is_near_and_of_equals_where_it_came_from() -> None:
+def test_most_room_is_the_free_side_and_of_equals_the_preferred_heading() -> None:
     everywhere = (0.5,) * 12
     heading, room = most_room(everywhere, math.radians(200.0))
     assert (round(math.degrees(heading)), room) == (-165, 0.5)
@@ -121,48 +121,48 @@ def test_most_room_is_where_nothing_is_near_and_of_equals_where_it_came_from() -
         max_size=6,
     )
 )
-def test_half_the_room_never_leads_into_what_stands_still(
+def test_a_move_of_half_the_room_touches_no_obstacle_at_rest(
     circles: list[tuple[float, float, float]],
 ) -> None:
-    here = (0.0, 0.0)
+    origin = (0.0, 0.0)
     known = [((x, y), r) for x, y, r in circles if math.hypot(x, y) > r]
-    ranges = sense_circles(here, known, SensorParams(sensing_range_m=3.0))
+    ranges = sense_circles(origin, known, SensorParams(sensing_range_m=3.0))
     heading, room = most_room(ranges, 0.0)
     step = min(0.5 * room, 1.0)
-    there = (step * math.cos(heading), step * math.sin(heading))
+    moved = (step * math.cos(heading), step * math.sin(heading))
     for center, r in known:
-        assert distance(there, center) >= r - 1e-6
+        assert distance(moved, center) >= r - 1e-6
 
 
 BLOCKED = (0.5,) * 11 + (0.6,)
 
 
-def seen(tick: int, ranges: tuple[float, ...] = BLOCKED, x: float = 0.0) -> Observation:
+def observation(tick: int, ranges: tuple[float, ...] = BLOCKED, x: float = 0.0) -> Observation:
     stamp = (tick + 1) * S
     return Observation(
         stamp_ns=stamp, pose=Pose2D(x, 0.0), ranges_m=ranges, goal=(9.0, 0.0), now_ns=stamp
     )
 
 
-def test_by_default_every_decision_is_passed_on_unchanged() -> None:
+def test_by_default_decisions_are_unchanged() -> None:
     params = PlannerParams()
-    bare, guarded = Algorithm1(params, 3), SupervisedPlanner(Algorithm1(params, 3))
+    bare, supervised = Algorithm1(params, 3), SupervisedPlanner(Algorithm1(params, 3))
     for tick in range(20):
         ranges = BLOCKED if tick % 3 else (0.3,) + (INF,) * 11
-        assert guarded.plan(seen(tick, ranges, x=0.1 * tick)) == bare.plan(
-            seen(tick, ranges, x=0.1 * tick)
+        assert supervised.plan(observation(tick, ranges, x=0.1 * tick)) == bare.plan(
+            observation(tick, ranges, x=0.1 * tick)
         )
-    assert guarded.phase is Phase.FREE
+    assert supervised.phase is Phase.FREE
 
 
-def drive(guarded: SupervisedPlanner, ticks: int) -> list[Decision]:
-    return [guarded.plan(seen(tick)) for tick in range(ticks)]
+def drive(supervised: SupervisedPlanner, ticks: int) -> list[Decision]:
+    return [supervised.plan(observation(tick)) for tick in range(ticks)]
 
 
-def test_blocked_it_waits_backs_off_replans_and_gives_up_until_there_is_a_goal() -> None:
+def test_blocked_it_waits_backs_off_replans_and_gives_up_until_reset() -> None:
     params = override(PlannerParams(), {"recovery.enabled": True, "recovery.attempts": 1})
-    guarded = make_planner(params, seed=1)
-    decisions = drive(guarded, 9)
+    supervised = make_planner(params, seed=1)
+    decisions = drive(supervised, 9)
     reasons = [decision.reason for decision in decisions]
     assert reasons[0].endswith("every gap is closed; waiting for 0.0 s")
     assert reasons[2] == "backing off, attempt 1 of 1"
@@ -171,29 +171,29 @@ def test_blocked_it_waits_backs_off_replans_and_gives_up_until_there_is_a_goal()
     assert {decision.mode for decision in decisions} == {Mode.BLOCKED}
     moving = [decision.velocity != (0.0, 0.0) for decision in decisions]
     assert moving == [False, False, True, *([False] * 6)]
-    assert decisions[2].waypoint[0] > 0.0, "to sector 12, where most room is"
+    assert decisions[2].waypoint[0] > 0.0, "to sector 12, with the most room"
     free = (INF,) * 12
-    assert guarded.plan(seen(9, free)).mode is Mode.BLOCKED
-    guarded.reset()
-    assert guarded.plan(seen(10, free)).mode is Mode.PATH_GENERATION
+    assert supervised.plan(observation(9, free)).mode is Mode.BLOCKED
+    supervised.reset()
+    assert supervised.plan(observation(10, free)).mode is Mode.PATH_GENERATION
 
 
-def test_who_is_carried_off_has_not_been_blocked_before() -> None:
+def test_an_odometry_jump_restarts_the_recovery() -> None:
     params = override(PlannerParams(), {"recovery.enabled": True, "recovery.attempts": 1})
-    guarded = make_planner(params, seed=1)
-    assert drive(guarded, 9)[-1].reason.startswith("gave up")
-    there = guarded.plan(seen(9, x=5.0))
-    assert there.reason.startswith("carried off 5 m in 1 s")
-    assert there.reason.endswith("every gap is closed; waiting for 0.0 s")
-    assert guarded.phase is Phase.WAIT
+    supervised = make_planner(params, seed=1)
+    assert drive(supervised, 9)[-1].reason.startswith("gave up")
+    moved = supervised.plan(observation(9, x=5.0))
+    assert moved.reason.startswith("carried off 5 m in 1 s")
+    assert moved.reason.endswith("every gap is closed; waiting for 0.0 s")
+    assert supervised.phase is Phase.WAIT
 
 
-def test_what_cannot_be_trusted_moves_nobody_in_any_phase() -> None:
+def test_refused_input_stops_the_robot_in_any_phase() -> None:
     params = override(PlannerParams(), {"recovery.enabled": True})
-    guarded = make_planner(params, seed=1)
-    drive(guarded, 2)
-    blind = replace(seen(2), refused="sector 1 holds nan", ranges_m=())
-    assert guarded.plan(blind).velocity == (0.0, 0.0)
+    supervised = make_planner(params, seed=1)
+    drive(supervised, 2)
+    blind = replace(observation(2), refused="sector 1 holds nan", ranges_m=())
+    assert supervised.plan(blind).velocity == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -206,8 +206,8 @@ def test_the_speed_falls_with_the_clearance(nearest: float, share: float) -> Non
     assert allowed_speed_share(ranges, SpeedLimitParams()) == 1.0
     params = PlannerParams(speed_limit=speed_limit)
     one_sided = (INF,) * 6 + (nearest,) + (INF,) * 5
-    full = make_planner(PlannerParams()).plan(seen(0, one_sided))
-    slow = make_planner(params).plan(seen(0, one_sided))
+    full = make_planner(PlannerParams()).plan(observation(0, one_sided))
+    slow = make_planner(params).plan(observation(0, one_sided))
     assert slow.waypoint == pytest.approx([share * w for w in full.waypoint])
     assert math.hypot(*slow.velocity) == pytest.approx(share * math.hypot(*full.velocity))
     if share < 1.0:

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Describe bags: complete, foreign, unclosed, damaged and empty ones."""
+
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,7 +43,7 @@ def test_the_foreign_bag() -> None:
     assert "2026-11-22 00:26:51.275 UTC" in text
 
 
-def test_a_bag_that_was_not_closed(tmp_path: Path) -> None:
+def test_bag_that_was_not_closed(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "run1", 30)
     path.write_bytes(path.read_bytes()[:-100])
     (tmp_path / "run1" / "metadata.yaml").unlink()
@@ -53,7 +55,7 @@ def test_a_bag_that_was_not_closed(tmp_path: Path) -> None:
     assert "problem:   run1_0.mcap: the end of the file is missing" in text
 
 
-def test_damage_that_salvaging_gets_around_is_still_a_problem(tmp_path: Path) -> None:
+def test_damage_that_salvaging_avoids_is_still_a_problem(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "run1", 30)
     data = bytearray(path.read_bytes())
     data[data.rindex(b"sensor_msgs/msg/LaserScan")] ^= 1
@@ -87,7 +89,7 @@ def test_sizes(tmp_path: Path) -> None:
         describe(tmp_path / "sparse")
 
 
-def test_what_is_no_bag_is_refused_as_everywhere(tmp_path: Path) -> None:
+def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(BagError, match="does not exist"):
         describe(tmp_path / "none")
     with pytest.raises(BagError, match="profile 'ros1'"):

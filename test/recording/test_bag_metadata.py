@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""metadata.yaml and the rosbag2 record: every field, older versions, refused content."""
+
 from pathlib import Path
 from typing import Any
 
@@ -95,19 +97,19 @@ def test_dump_and_load_agree() -> None:
         ),
         ros_distro="kilted",
     )
-    assert load_file(dump_file(bag), "here") == bag
+    assert load_file(dump_file(bag), "source") == bag
     assert yaml.safe_load(dump_record(bag))["duration"] == {"nanoseconds": 70}
     assert yaml.safe_load(dump_record(bag))["starting_time"] == {"nanoseconds_since_epoch": 100}
 
 
-def test_the_foreign_one_loads() -> None:
-    bag = load_file((FOREIGN / "metadata.yaml").read_text(), "here")
+def test_foreign_metadata_loads() -> None:
+    bag = load_file((FOREIGN / "metadata.yaml").read_text(), "source")
     assert bag.message_count == 281
     assert {t.name: t.message_count for t in bag.topics}["/scan"] == 133
 
 
 def test_older_versions_load() -> None:
-    """Version 4 has no per-file facts, no distro, no hashes, and QoS as text with numbers."""
+    """Version 4 has no per-file data, no distro, no hashes, and QoS as text with numbers."""
     qos_text = (
         "- history: 3\n  depth: 0\n  reliability: 1\n  durability: 2\n"
         "  deadline:\n    sec: 9223372036\n    nsec: 854775807\n"
@@ -132,7 +134,7 @@ def test_older_versions_load() -> None:
             }
         ],
     }
-    bag = load_file(yaml.safe_dump({ROOT: content}), "here")
+    bag = load_file(yaml.safe_dump({ROOT: content}), "source")
     assert bag.message_count == 5
     assert bag.ros_distro == "unknown"
     assert bag.topics[0].qos == (OfferedQos(history="unknown", depth=0),)
@@ -157,16 +159,16 @@ def changed(**changes: object) -> str:
         (changed(version=0), "version 0 is not known"),
         (changed(storage_identifier="sqlite3"), "storage 'sqlite3', only mcap .*rosbags-convert"),
         (changed(compression_mode="FILE"), "compressed by file, .*ros2 bag convert"),
-        (changed(relative_file_paths=None), "names no storage file"),
-        (changed(relative_file_paths=[]), "names no storage file"),
+        (changed(relative_file_paths=None), "lists no storage file"),
+        (changed(relative_file_paths=[]), "lists no storage file"),
         (changed(files=[3]), "not a readable metadata.yaml"),
         (changed(topics_with_message_count=[{}]), "not a readable metadata.yaml"),
         (changed(topics_with_message_count="many"), "not a readable metadata.yaml"),
     ],
 )
 def test_broken_or_unknown_metadata_is_refused(text: str, reason: str) -> None:
-    with pytest.raises(BagError, match=f"^here: {reason}") as caught:
-        load_file(text, "here")
+    with pytest.raises(BagError, match=f"^source: {reason}") as caught:
+        load_file(text, "source")
     assert "\n" not in str(caught.value)
 
 
@@ -174,4 +176,4 @@ def test_other_serialization_is_refused() -> None:
     content = content_of(FOREIGN)
     content["topics_with_message_count"][2]["topic_metadata"]["serialization_format"] = "proto"
     with pytest.raises(BagError, match=r"topic /odom is serialized as 'proto', only cdr"):
-        load_file(yaml.safe_dump({ROOT: content}), "here")
+        load_file(yaml.safe_dump({ROOT: content}), "source")

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Read bags of rosbag2 and mfba: any index, several files, odd content, merge by time."""
+
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -26,7 +28,7 @@ from sensor_msgs.msg import LaserScan
 from mfba_planner.recording import mcap_walk
 from mfba_planner.recording.bag_metadata import BagFile, BagMetadata, dump_file
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.merge_by_time import RawMessage, Source, in_time_order
+from mfba_planner.recording.merge_by_time import RawMessage, Source, merge_by_log_time
 from mfba_planner.recording.qos_profiles import INFINITE_NS, OfferedQos
 
 FOREIGN_COUNTS = {"/scan": 133, "/odom": 133, "/chatter": 13, "/goal_pose": 1, "/tf_static": 1}
@@ -58,7 +60,7 @@ def test_a_bag_of_the_real_rosbag2(path: Path) -> None:
         scans = list(reader.decoded(["/scan"]))
         assert len(scans) == 133
         assert all(len(item.message.ranges) == 360 for item in scans)
-        # Types that are not installed decode too: the bag brings its schemas.
+        # Types that are not installed decode too: the bag contains their schemas.
         (static,) = reader.decoded({"/tf_static"})
         assert static.type_name == "tf2_msgs/msg/TFMessage"
         assert static.message.transforms
@@ -79,7 +81,7 @@ def test_our_own_bag(tmp_path: Path) -> None:
             assert [a.media_type for a in reader.iter_attachments()] == ["text/plain"]
             assert ("lab", {"robot": "turtle"}) in list(reader.metadata_records())
             for index, raw in enumerate(reader.messages(["/scan"])):
-                # Not the bytes: CDR's padding is whatever was there before.
+                # The bytes may differ: CDR padding is not initialised.
                 assert deserialize_message(raw.data, LaserScan) == scan(index)
                 assert raw.log_time_ns == START_NS + index * SECOND // 100 + 1
                 assert raw.publish_time_ns == raw.log_time_ns - 1
@@ -97,7 +99,7 @@ def test_start_offset(tmp_path: Path) -> None:
         assert len(late) == 100
         assert len(list(reader.decoded(start_offset_s=0.5))) == 100
         assert list(reader.messages(start_offset_s=5.0)) == []
-        assert len(list(reader.messages(["/odom", "/nowhere"]))) == 100
+        assert len(list(reader.messages(["/odom", "/unknown"]))) == 100
 
 
 @pytest.mark.parametrize(
@@ -124,7 +126,7 @@ def test_start_offset(tmp_path: Path) -> None:
     ],
     ids=str,
 )
-def test_whatever_index_a_file_has_or_lacks(tmp_path: Path, options: dict[str, Any]) -> None:
+def test_files_with_any_kind_of_index(tmp_path: Path, options: dict[str, Any]) -> None:
     path = foreign_mcap(tmp_path / "a.mcap", times_ns=(5, 3, 9, 3, 7), **options)
     for salvage in (False, True):
         with BagReader(path, salvage=salvage) as reader:
@@ -159,7 +161,7 @@ def test_attachments_and_metadata_without_an_index(tmp_path: Path) -> None:
 def test_long_runs_of_messages_outside_chunks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mcap_walk, "_LOOSE_RUN_BYTES", 500)
+    monkeypatch.setattr(mcap_walk, "_UNCHUNKED_RUN_BYTES", 500)
     path = foreign_mcap(tmp_path / "a.mcap", times_ns=tuple(range(200, 0, -1)), use_chunking=False)
     with BagReader(path) as reader:
         assert reader.chunk_count > 10
@@ -167,11 +169,11 @@ def test_long_runs_of_messages_outside_chunks(
 
 
 def split_bag(directory: Path, paths: tuple[str, ...] = ("part_0.mcap", "part_1.mcap")) -> Path:
-    """Two files that overlap in time, as rosbag2 leaves them when it splits a bag."""
+    """Two files that overlap in time, as rosbag2 writes them when it splits a bag."""
     directory.mkdir()
     times = ((10, 30, 50), (20, 50, 60))
-    for name, part in zip(("part_0.mcap", "part_1.mcap"), times):
-        foreign_mcap(directory / name, times_ns=part, chunk_size=1)
+    for name, times_ns in zip(("part_0.mcap", "part_1.mcap"), times):
+        foreign_mcap(directory / name, times_ns=times_ns, chunk_size=1)
     files = tuple(BagFile(path=path, message_count=3) for path in paths)
     bag = BagMetadata(topics=(), files=files, ros_distro="kilted")
     (directory / "metadata.yaml").write_text(dump_file(bag))
@@ -192,7 +194,7 @@ def test_a_bag_of_several_files(tmp_path: Path, paths: tuple[str, ...]) -> None:
         assert in_file == [10, 30, 50, 20, 50, 60]
 
 
-def test_metadata_yaml_fills_in_what_the_channel_does_not_say(tmp_path: Path) -> None:
+def test_metadata_yaml_supplies_what_the_channel_lacks(tmp_path: Path) -> None:
     foreign_mcap(tmp_path / "a.mcap")
     content = yaml.safe_load((FOREIGN / "metadata.yaml").read_text())
     information = content["rosbag2_bagfile_information"]
@@ -202,12 +204,12 @@ def test_metadata_yaml_fills_in_what_the_channel_does_not_say(tmp_path: Path) ->
         topic = reader.topics["/chatter"]
         assert topic.qos == (OfferedQos(history="unknown", depth=0),)
         assert topic.type_hash.startswith("RIHS01_df668c74")
-        # It counts 281 messages in a file that has another name, and 3 are there.
+        # It counts 281 messages, in a file of another name; this file holds 3.
         assert not reader.complete
         assert reader.problems == ["metadata.yaml counts 0 messages, the files hold 3"]
 
 
-def test_what_is_odd_but_readable_is_a_problem_not_an_error(tmp_path: Path) -> None:
+def test_odd_but_readable_content_is_a_problem_not_an_error(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream)
@@ -238,7 +240,9 @@ CHUNKS = st.lists(st.lists(st.integers(0, 20), max_size=6), max_size=6)
 
 
 @given(CHUNKS)
-def test_merging_is_a_stable_sort_that_holds_only_what_overlaps(chunks: list[list[int]]) -> None:
+def test_merge_is_a_stable_sort_that_holds_only_overlapping_chunks(
+    chunks: list[list[int]],
+) -> None:
     loaded: list[int] = []
 
     def source(number: int, times: list[int]) -> Source:
@@ -254,7 +258,7 @@ def test_merging_is_a_stable_sort_that_holds_only_what_overlaps(chunks: list[lis
         ((time, number, i) for number, times in enumerate(chunks) for i, time in enumerate(times))
     )
     found = []
-    for message in in_time_order([source(n, times) for n, times in enumerate(chunks)]):
+    for message in merge_by_log_time([source(n, times) for n, times in enumerate(chunks)]):
         found.append((message.log_time_ns, message.data[0], message.sequence))
         later = [n for n, t in enumerate(chunks) if min(t, default=0) > message.log_time_ns]
         assert not set(loaded) & set(later)

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Write bags: format, chunk size and age, refused writes, failures, close and discard."""
+
 import resource
 import sys
 from itertools import pairwise
@@ -37,7 +39,7 @@ def chunk_count(path: Path) -> int:
         return reader.chunk_count
 
 
-def test_four_readers_open_count_and_decode_it(tmp_path: Path) -> None:
+def test_four_readers_open_count_and_decode_a_bag(tmp_path: Path) -> None:
     write_bag(tmp_path / "run1", 300)
     assert count_with_all(tmp_path / "run1") == {"/odom": 300, "/scan": 300, "/goal_pose": 1}
     assert sorted(p.name for p in (tmp_path / "run1").iterdir()) == [
@@ -46,7 +48,7 @@ def test_four_readers_open_count_and_decode_it(tmp_path: Path) -> None:
     ]
 
 
-def test_content_comes_back_whole(tmp_path: Path) -> None:
+def test_content_is_unchanged(tmp_path: Path) -> None:
     """Fixed arrays and nested fields, as an independent reader decodes them."""
     write_bag(tmp_path / "run1", 40)
     with AnyReader([tmp_path / "run1"]) as reader:
@@ -59,7 +61,7 @@ def test_content_comes_back_whole(tmp_path: Path) -> None:
             assert message.pose.pose.position.x == expected.pose.pose.position.x
 
 
-def test_the_file_is_written_as_rosbag2_wants_it(tmp_path: Path) -> None:
+def test_the_file_has_the_format_of_rosbag2(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "run1", 200)
     with path.open("rb") as stream:
         records = list(StreamReader(stream, emit_chunks=True, validate_crcs=True).records)
@@ -108,13 +110,13 @@ def test_an_empty_bag_and_a_topic_without_messages(tmp_path: Path) -> None:
             assert reader.complete
 
 
-def test_topics_may_come_late_and_types_are_stored_once(tmp_path: Path) -> None:
+def test_topics_added_late_and_types_stored_once(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run1") as writer:
         writer.add_topic("/a", "std_msgs/msg/String")
         writer.write("/a", text(), 1, 1)
         writer.flush()
         writer.add_topic("/b", "std_msgs/msg/String", OfferedQos(depth=1))
-        writer.add_topic("/b", "std_msgs/msg/String")  # again: as it was
+        writer.add_topic("/b", "std_msgs/msg/String")  # again: changes nothing
         writer.write("/b", text(), 2, 2)
         writer.write("/a", text(), 3, 3)
         assert {name: t.message_count for name, t in writer.topics.items()} == {"/a": 2, "/b": 1}
@@ -128,7 +130,7 @@ def test_topics_may_come_late_and_types_are_stored_once(tmp_path: Path) -> None:
         assert [m.sequence for m in reader.messages(["/a"])] == [0, 1]
 
 
-def test_what_cannot_be_written_is_refused_and_the_bag_goes_on(tmp_path: Path) -> None:
+def test_refused_writes_do_not_end_the_recording(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run1") as writer:
         writer.add_topic("/a", "std_msgs/msg/String")
         with pytest.raises(OutputError, match="/a: recorded as std_msgs/msg/String, not as"):
@@ -148,21 +150,21 @@ def test_an_existing_path_is_never_touched(tmp_path: Path) -> None:
     folder, file, dangling = tmp_path / "folder", tmp_path / "file", tmp_path / "dangling"
     folder.mkdir()
     file.write_text("precious")
-    dangling.symlink_to(tmp_path / "nowhere")
+    dangling.symlink_to(tmp_path / "missing")
     for path in (folder, file, dangling):
         with pytest.raises(OutputError, match=f"^{path}: exists already and is never overwritten"):
             BagWriter(path)
     assert list(folder.iterdir()) == []
     assert file.read_text() == "precious"
     assert dangling.is_symlink()
-    assert not (tmp_path / "nowhere").exists()
+    assert not (tmp_path / "missing").exists()
 
 
-def test_where_nothing_can_be_created_nothing_is_left(tmp_path: Path) -> None:
+def test_failed_creation_leaves_nothing_behind(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match=r"cannot be created \(Not a directory\); choose"):
         BagWriter(tmp_path / "file" / "run1")
-    # The directory's name is allowed, the longer file name in it is not.
+    # The directory name is allowed, the longer name of the file in it is not.
     with pytest.raises(OutputError, match=r"cannot be created \(File name too long\)"):
         BagWriter(tmp_path / "new" / "parents" / ("x" * 253))
     with pytest.raises(OutputError, match=r"cannot be created \(File name too long\)"):
@@ -178,7 +180,7 @@ def test_missing_parents_are_made_and_relative_paths_work(
     monkeypatch.chdir(tmp_path)
     with BagWriter("out/today/run1") as writer:
         fill(writer, 2)
-        # The bag stays where it was begun.
+        # The bag stays in the directory of its start.
         monkeypatch.chdir("/")
     assert count_with_all(tmp_path / "out" / "today" / "run1").total() == 5
 
@@ -190,7 +192,7 @@ def test_an_old_mcap_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert list(tmp_path.iterdir()) == []
 
 
-def test_after_the_end_nothing_is_written(tmp_path: Path) -> None:
+def test_writes_after_close_are_refused(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "run1")
     fill(writer, 3)
     writer.close()
@@ -260,8 +262,8 @@ def test_chunks_end_by_size(tmp_path: Path) -> None:
     assert chunk_count(writer.path) == 3
 
 
-def test_chunks_end_by_age_whatever_the_timer_and_the_rate(tmp_path: Path) -> None:
-    """No message waits longer than the age, for messages of any time and timers of any period."""
+def test_chunks_end_by_age_for_any_timer_and_rate(tmp_path: Path) -> None:
+    """No message is older than the limit, for any message rate and any timer period."""
     for period_ns in (SECOND // 50, SECOND // 4, SECOND // 3):
         for gap_ns in (SECOND // 200, SECOND // 7, SECOND * 3):
             case = f"run_{period_ns}_{gap_ns}"
@@ -287,7 +289,7 @@ def test_chunks_end_by_age_whatever_the_timer_and_the_rate(tmp_path: Path) -> No
                     pending.append(time_ns)
             assert oldest_ns <= SECOND, case
             assert not pending or calls[-1] - pending[0] < SECOND
-            # ... and no chunk ends much sooner than it must.
+            # ... and no chunk ends much earlier than necessary.
             writer.close()
             if gap_ns < SECOND:
                 assert chunk_count(writer.path) <= 10 * SECOND // (SECOND - 2 * period_ns) + 1
@@ -304,7 +306,7 @@ def test_messages_before_the_first_timer_call_are_flushed_by_it(tmp_path: Path) 
     assert chunk_count(writer.path) == 1
 
 
-def test_what_was_flushed_is_in_the_file_at_once(tmp_path: Path) -> None:
+def test_flushed_messages_are_in_the_file_immediately(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "run1")
     fill(writer, 10)
     with BagReader(writer.path, salvage=True) as reader:
@@ -335,7 +337,7 @@ def test_a_long_recording_holds_only_its_chunk_indexes(tmp_path: Path) -> None:
         assert 4000 < reader.chunk_count < 6000
 
 
-def test_messages_in_any_order_of_time(tmp_path: Path) -> None:
+def test_unsorted_messages(tmp_path: Path) -> None:
     times = [START_NS + (index * 7919) % 1000 for index in range(1000)]
     with BagWriter(tmp_path / "run1", chunk_bytes=3000) as writer:
         writer.add_topic("/a", "std_msgs/msg/String")

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""The configuration attachment of a bag: stored, read back, refused."""
+
 import math
 from pathlib import Path
 from typing import Any
@@ -22,16 +24,16 @@ CONFIGURATION = {
 }
 
 
-def test_it_comes_back_from_the_bag(tmp_path: Path) -> None:
+def test_read_returns_what_was_attached(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run1") as writer:
         attach_configuration(writer, {"seed": 1})
-        attach_configuration(writer, CONFIGURATION)  # the newest counts
+        attach_configuration(writer, CONFIGURATION)  # the newest is read
     with BagReader(tmp_path / "run1") as reader:
         assert read_configuration(reader) == {"schema_version": 1, **CONFIGURATION}
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, {1, 2}, b"bytes"])
-def test_what_json_cannot_hold_is_refused_and_nothing_is_stored(
+def test_values_that_json_cannot_hold_are_refused_and_not_stored(
     tmp_path: Path, value: Any
 ) -> None:
     writer = BagWriter(tmp_path / "run1")
@@ -42,8 +44,8 @@ def test_what_json_cannot_hold_is_refused_and_nothing_is_stored(
         assert reader.attachments == ()
 
 
-def test_a_bag_without_one(tmp_path: Path) -> None:
-    with BagReader(FOREIGN) as reader, pytest.raises(BagError, match="carries no mfba_planner/"):
+def test_bag_without_configuration(tmp_path: Path) -> None:
+    with BagReader(FOREIGN) as reader, pytest.raises(BagError, match="has no mfba_planner/"):
         read_configuration(reader)
 
 

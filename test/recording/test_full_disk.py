@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A disk that fills up while recording, by the kernel's own refusals."""
+"""A disk that fills up while recording, simulated by errors of the kernel."""
 
 import os
 import resource
@@ -20,8 +20,8 @@ from mfba_planner.recording.recover import recover
 
 
 @contextmanager
-def room_for(size: int) -> Iterator[None]:
-    """No file may grow beyond size: write(2) answers EFBIG, after a part where some fits."""
+def file_size_limit(size: int) -> Iterator[None]:
+    """Limit the size of files: write(2) fails with EFBIG, after a partial write if some fits."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -31,42 +31,45 @@ def room_for(size: int) -> Iterator[None]:
 
 
 def test_a_full_disk_at_any_moment(tmp_path: Path) -> None:
-    """The error counts what is safe, recover brings at least that, nothing else is left."""
+    """The error counts the stored messages, recover finds at least these."""
     whole = write_bag(tmp_path / "whole", 60, chunk_bytes=9000, beams=40).stat().st_size
     directory, out = tmp_path / "run1", tmp_path / "out"
-    seen = {"at once": 0, "nothing": 0, "some": 0, "at close": 0}
+    outcomes = {"at once": 0, "nothing": 0, "some": 0, "at close": 0}
     opened: set[int] = set()
     for size in range(0, whole - 500, whole // 40):
-        with room_for(size), pytest.raises(OutputError) as caught:
+        with file_size_limit(size), pytest.raises(OutputError) as caught:
             write_bag(directory, 60, chunk_bytes=9000, beams=40)
         line = str(caught.value)
         assert "\n" not in line
         if not directory.exists():
-            seen["at once"] += 1
+            outcomes["at once"] += 1
             assert f"{directory}: cannot be created (File too large); choose" in line
             continue
         assert f"{directory}: disk full after " in line
         assert f"(File too large); make room and run `mfba recover {directory}`" in line
         (file,) = directory.iterdir()
         assert file.stat().st_size <= size
-        safe = int(line.split("disk full after ")[1].split()[0])
-        if safe:
+        stored = int(line.split("disk full after ")[1].split()[0])
+        if stored:
             report = recover(directory, out)
-            assert report.messages >= safe
+            assert report.messages >= stored
             assert report.bytes_lost == 0  # the file ends with a whole record
-            if safe not in opened:
-                opened.add(safe)
+            if stored not in opened:
+                opened.add(stored)
                 assert count_with_all(out).total() == report.messages
             shutil.rmtree(out)
-        seen["at close" if safe == 121 else "some" if safe else "nothing"] += 1
+        outcomes["at close" if stored == 121 else "some" if stored else "nothing"] += 1
         shutil.rmtree(directory)
-    assert all(seen.values()), seen
+    assert all(outcomes.values()), outcomes
 
 
-def test_who_writes_on_is_told_the_first_reason_again(tmp_path: Path) -> None:
+def test_later_writes_raise_the_first_error_again(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "run1")
     fill(writer, 20)
-    with room_for(1000), pytest.raises(OutputError, match="disk full after 0 messages") as first:
+    with (
+        file_size_limit(1000),
+        pytest.raises(OutputError, match="disk full after 0 messages") as first,
+    ):
         writer.flush()
     with pytest.raises(OutputError) as again:
         writer.write("/odom", text(), 1, 1)
@@ -107,7 +110,7 @@ def test_recover_onto_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     source = write_bag(tmp_path / "run1", 60, beams=40)
     before = source.read_bytes()
     for size in (100, len(before) // 2, len(before) - 1000):
-        with room_for(size), pytest.raises(OutputError):
+        with file_size_limit(size), pytest.raises(OutputError):
             recover(tmp_path / "run1", tmp_path / "new" / "out")
         assert [p.name for p in tmp_path.iterdir()] == ["run1"]
     assert source.read_bytes() == before
@@ -118,7 +121,7 @@ def test_other_errors_of_the_disk_are_not_called_full(
 ) -> None:
     writer = BagWriter(tmp_path / "run1")
     fill(writer, 3)
-    # A pipe nobody reads any more refuses each write with EPIPE.
+    # A pipe without reader refuses each write with EPIPE.
     read_end, write_end = os.pipe()
     os.close(read_end)
     with writer._stream._file, open(write_end, "wb", buffering=0) as broken:

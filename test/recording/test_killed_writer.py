@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A writer that is killed: what is lost of its bag."""
+"""A writer that is killed loses at most one second of its bag."""
 
 import os
 import subprocess
@@ -16,8 +16,7 @@ SCRIPT = ROOT / "bench" / "recording_kill.py"
 
 @pytest.mark.parametrize("rate", ["500", "5000"])
 def test_kill_9_loses_at_most_a_second(rate: str) -> None:
-    """Chunks end by age, then by size (4 MB/s). The script reads each bag in three ways."""
-
+    """Chunks end by age at the low rate, by size at the high one (4 MB/s)."""
     source = str(Path(mfba_planner.__file__).parents[1])
     done = subprocess.run(
         [sys.executable, str(SCRIPT), "--kills", "2", "--rate", rate, "--longest", "1.5"],

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Message definitions and type hashes of installed types and sourced workspaces."""
+
 import json
 import sys
 from pathlib import Path
@@ -17,12 +19,12 @@ INSTALLED = sorted(
 )
 
 
-def test_there_are_installed_types() -> None:
+def test_types_are_installed() -> None:
     assert len(INSTALLED) > 100
 
 
 @pytest.mark.parametrize("type_name", INSTALLED)
-def test_every_installed_type_parses_and_carries_its_hash(type_name: str) -> None:
+def test_every_installed_type_parses_and_has_its_hash(type_name: str) -> None:
     definition = definition_of(type_name)
     package, _, name = type_name.split("/")
 
@@ -33,7 +35,7 @@ def test_every_installed_type_parses_and_carries_its_hash(type_name: str) -> Non
     hashes = {item["type_name"]: item["hash_string"] for item in facts["type_hashes"]}
     assert definition.type_hash == hashes[type_name]
     assert definition.type_hash.startswith("RIHS01_")
-    # The type and all its dependencies, each once: what rosidl itself lists.
+    # The type and all its dependencies, each once, as rosidl lists them.
     described = [line[5:] for line in definition.text.splitlines() if line.startswith("MSG: ")]
     expected = {dependency.replace("/msg/", "/") for dependency in hashes} - {f"{package}/{name}"}
     assert sorted(described) == sorted(expected)
@@ -89,7 +91,7 @@ def test_sourced_workspace_comes_first(tmp_path: Path, monkeypatch: pytest.Monke
     "type_name", ["String", "std_msgs/String", "std_msgs/srv/Empty", "/msg/String", "a/b/c/d", ""]
 )
 def test_other_names_are_refused(type_name: str) -> None:
-    with pytest.raises(InputError, match="not a message type; write it in three parts"):
+    with pytest.raises(InputError, match="not a message type; write package/msg/Name"):
         definition_of(type_name)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages and the core's values: what goes out comes back, and what is not sound is refused."""
+"""Convert core values to messages and back without loss; invalid messages are refused."""
 
 import math
 import struct
@@ -33,10 +33,10 @@ from mfba_planner.ros.interface import to_messages
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 moderate = st.floats(-1e6, 1e6)
-points = st.tuples(finite, finite)
+plane_points = st.tuples(finite, finite)
 angles = st.floats(-math.pi, math.pi)
 stamps = st.integers(0, (2**31 - 1) * from_messages.SECOND_NS)
-# A text in a message ends at the first NUL.
+# A string in a message ends at the first NUL.
 reasons = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=30)
 ranges = st.lists(
     st.one_of(st.just(math.inf), st.floats(0.0, 2.0**100, width=32)), min_size=3, max_size=20
@@ -47,42 +47,42 @@ NORTH = math.pi / 2
 
 @st.composite
 def decisions(draw: st.DrawFn) -> Decision:
-    seen = draw(ranges)
-    bits = sensory_vector(seen)
+    sector_ranges = draw(ranges)
+    bits = sensory_vector(sector_ranges)
     return Decision(
         stamp_ns=draw(stamps),
         mode=draw(st.sampled_from(Mode)),
         reason=draw(reasons),
         pose=Pose2D(draw(finite), draw(finite), draw(angles)),
-        goal=draw(st.none() | points),
-        ranges_m=seen,
+        goal=draw(st.none() | plane_points),
+        ranges_m=sector_ranges,
         vs=bits,
         vg=tuple(1 - bit for bit in bits),
         gap=draw(st.integers(0, len(bits))),
-        waypoint=draw(points),
-        velocity=draw(points),
-        candidates=draw(st.lists(points, max_size=8).map(tuple)),
+        waypoint=draw(plane_points),
+        velocity=draw(plane_points),
+        candidates=draw(st.lists(plane_points, max_size=8).map(tuple)),
     )
 
 
 def sent(message: Any) -> Any:
-    """The message as the other side gets it."""
+    """The message after serialization and deserialization."""
     return deserialize_message(serialize_message(message), type(message))
 
 
 def bits(*numbers: float) -> bytes:
-    """Numbers compared to the last bit, the sign of zero included."""
+    """The bytes of numbers, to compare every bit, including the sign of zero."""
     return struct.pack(f"{len(numbers)}d", *numbers)
 
 
 @given(stamps)
-def test_stamps_come_back(stamp_ns: int) -> None:
+def test_stamps_round_trip(stamp_ns: int) -> None:
     assert from_messages.stamp_ns(sent(to_messages.time_msg(stamp_ns))) == stamp_ns
     assert from_messages.stamp_ns(sent(to_messages.clock_msg(stamp_ns)).clock) == stamp_ns
 
 
-@given(finite, finite, angles, points, stamps)
-def test_odometry_comes_back(
+@given(finite, finite, angles, plane_points, stamps)
+def test_odometry_round_trip(
     x: float, y: float, yaw: float, velocity: tuple[float, float], stamp_ns: int
 ) -> None:
     message = sent(
@@ -95,8 +95,8 @@ def test_odometry_comes_back(
     assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
 
 
-@given(points)
-def test_a_robot_that_looks_along_x_loses_no_bit(velocity: tuple[float, float]) -> None:
+@given(plane_points)
+def test_odometry_at_zero_yaw_is_exact(velocity: tuple[float, float]) -> None:
     message = sent(to_messages.odometry_msg(Pose2D(0.0, 0.0), velocity, 1, "odom", "base_link"))
     assert from_messages.robot_pose(message).yaw == 0.0
     linear = message.twist.twist.linear
@@ -104,47 +104,49 @@ def test_a_robot_that_looks_along_x_loses_no_bit(velocity: tuple[float, float]) 
 
 
 def test_odometry_gives_the_velocity_in_the_body_frame() -> None:
-    """REP-105: a robot that looks north and moves east moves to its right, which is -y."""
+    """REP-105: a robot that faces north and moves east moves to its right, which is -y."""
     message = to_messages.odometry_msg(Pose2D(0.0, 0.0, NORTH), (1.0, 0.0), 1, "odom", "base_link")
     linear = message.twist.twist.linear
     assert (linear.x, linear.y) == pytest.approx((0.0, -1.0))
 
 
-@given(st.lists(points, max_size=12), stamps)
-def test_obstacles_come_back_in_order(centers: list[tuple[float, float]], stamp_ns: int) -> None:
+@given(st.lists(plane_points, max_size=12), stamps)
+def test_obstacles_round_trip_in_sequence(
+    centers: list[tuple[float, float]], stamp_ns: int
+) -> None:
     message = sent(to_messages.obstacles_msg(centers, stamp_ns, "odom"))
     assert from_messages.obstacle_centers(message) == centers
     assert from_messages.stamp_ns(message.header.stamp) == stamp_ns
 
 
-@given(points, stamps)
-def test_a_goal_comes_back(goal: tuple[float, float], stamp_ns: int) -> None:
+@given(plane_points, stamps)
+def test_goal_round_trip(goal: tuple[float, float], stamp_ns: int) -> None:
     message = sent(to_messages.pose_stamped_msg(goal, stamp_ns, "odom"))
     assert bits(*from_messages.goal_point(message)) == bits(*goal)
 
 
 @given(ranges, st.floats(0.01, 1000.0))
-def test_sectors_come_back(seen: tuple[float, ...], sensing_range_m: float) -> None:
-    params = SensorParams(sectors=len(seen), sensing_range_m=sensing_range_m)
-    message = sent(to_messages.sectors_msg(seen, params, 0.3, 1, "odom"))
-    assert from_messages.sector_ranges(message) == seen
-    assert tuple(message.intensities) == sensory_vector(seen)
-    # What LaserScan's own rules ask for: every finite range within its limits, a full ring.
+def test_sectors_round_trip(sector_ranges: tuple[float, ...], sensing_range_m: float) -> None:
+    params = SensorParams(sectors=len(sector_ranges), sensing_range_m=sensing_range_m)
+    message = sent(to_messages.sectors_msg(sector_ranges, params, 0.3, 1, "odom"))
+    assert from_messages.sector_ranges(message) == sector_ranges
+    assert tuple(message.intensities) == sensory_vector(sector_ranges)
+    # As LaserScan requires: every finite range within the limits, and a full circle.
     finite_ranges = [r for r in message.ranges if math.isfinite(r)]
     assert all(message.range_min <= r <= message.range_max for r in finite_ranges)
-    assert message.angle_increment * len(seen) == pytest.approx(2.0 * math.pi)
-    last = message.angle_min + (len(seen) - 1) * message.angle_increment
+    assert message.angle_increment * len(sector_ranges) == pytest.approx(2.0 * math.pi)
+    last = message.angle_min + (len(sector_ranges) - 1) * message.angle_increment
     assert message.angle_max == pytest.approx(last, abs=1e-5)
 
 
-def test_the_first_beam_looks_through_the_middle_of_sector_1() -> None:
+def test_the_first_beam_is_in_the_middle_of_sector_1() -> None:
     message = to_messages.sectors_msg((math.inf,) * 12, SensorParams(), 0.3, 1, "odom")
     assert math.degrees(message.angle_min) == pytest.approx(15.0)
     assert math.degrees(message.angle_increment) == pytest.approx(30.0)
 
 
 @given(st.lists(st.integers(0, 1), min_size=3).map(tuple))
-def test_the_sensory_vector_says_what_it_is(vs: tuple[int, ...]) -> None:
+def test_the_sensory_vector_has_a_labelled_layout(vs: tuple[int, ...]) -> None:
     message = sent(to_messages.sensory_vector_msg(vs))
     assert tuple(message.data) == vs
     (dimension,) = message.layout.dim
@@ -153,12 +155,12 @@ def test_the_sensory_vector_says_what_it_is(vs: tuple[int, ...]) -> None:
 
 @settings(max_examples=50)
 @given(decisions())
-def test_a_decision_comes_back_whole(decision: Decision) -> None:
+def test_decision_round_trip(decision: Decision) -> None:
     message = sent(to_messages.decision_msg(decision, "mfba", 3, "/planner"))
     assert from_messages.decision(message, decision.ranges_m) == decision
 
 
-def test_a_decision_tells_people_how_bad_it_is() -> None:
+def test_the_level_of_a_decision_depends_on_its_mode() -> None:
     def level(mode: Mode) -> bytes:
         message = to_messages.decision_msg(a_decision(mode=mode), "ba", 7, "/robot1/planner")
         status = message.status[0]
@@ -199,7 +201,7 @@ def a_decision(**changes: Any) -> Decision:
         ({"goal": None, "waypoint": (1.0, 2.0)}, [(1.0, 2.0)]),
     ],
 )
-def test_the_plan_leads_from_here_over_the_step_to_the_goal(
+def test_the_plan_is_pose_waypoint_and_goal(
     changes: dict[str, Any], expected: list[tuple[float, float]]
 ) -> None:
     plan = sent(to_messages.plan_msg(a_decision(**changes), "odom"))
@@ -219,7 +221,7 @@ def test_the_twist_is_the_decision_in_the_body_frame(
         vx, vy, wz = from_messages.velocity(sent(message))
         assert wz == 0.0
         back = from_messages.rotated((vx, vy), yaw)
-        # the smallest floats have no digits left to be exact in
+        # subnormal floats lose digits
         assert math.dist(back, velocity) <= 1e-12 * math.hypot(*velocity) + 1e-300
         if yaw == 0.0:
             assert bits(vx, vy) == bits(*velocity)
@@ -239,14 +241,14 @@ def test_any_quaternion_gives_a_yaw_or_is_refused(q: list[float]) -> None:
 
 
 @given(angles, st.floats(0.01, 100.0))
-def test_a_quaternion_need_not_be_normal(yaw: float, scale: float) -> None:
+def test_a_quaternion_need_not_be_of_unit_length(yaw: float, scale: float) -> None:
     half = 0.5 * yaw
     q = Quaternion(x=0.0, y=0.0, z=scale * math.sin(half), w=scale * math.cos(half))
     pose = from_messages.pose2d(Pose(orientation=q), "odom")
     assert abs(wrap_angle(pose.yaw - yaw)) < 1e-9
 
 
-def test_a_message_nobody_filled_in_is_a_sound_pose() -> None:
+def test_a_default_message_is_a_valid_pose() -> None:
     """The default quaternion of ROS 2 has w = 1; one of zeros is refused."""
     assert from_messages.robot_pose(Odometry()) == Pose2D(0.0, 0.0, 0.0)
     with pytest.raises(InputError, match="odom orientation has norm 0; send a unit quaternion"):
@@ -256,10 +258,10 @@ def test_a_message_nobody_filled_in_is_a_sound_pose() -> None:
 def odometry_with(**numbers: float) -> Odometry:
     message = Odometry()
     for name, value in numbers.items():
-        part = (
+        target = (
             message.pose.pose.orientation if name.startswith("q") else message.pose.pose.position
         )
-        setattr(part, name[-1], value)
+        setattr(target, name[-1], value)
     return message
 
 
@@ -287,7 +289,7 @@ def pose_at(**numbers: float) -> Pose:
         (from_messages.velocity, lambda v: TwistStamped(twist=Twist(linear=Vector3(x=v)))),
     ],
 )
-def test_what_is_not_finite_is_refused_by_its_value(
+def test_non_finite_values_are_refused_and_named(
     read: Callable[[Any], Any], make: Callable[[float], Any], bad: float
 ) -> None:
     with pytest.raises(InputError, match=rf"holds {bad}; send finite numbers$"):
@@ -297,10 +299,10 @@ def test_what_is_not_finite_is_refused_by_its_value(
 @pytest.mark.parametrize("bad", [math.nan, -math.inf, -0.1])
 @pytest.mark.parametrize("sector", [1, 7, 12])
 def test_sectors_of_a_blind_sensor_are_refused(bad: float, sector: int) -> None:
-    seen = [math.inf] * 12
-    seen[sector - 1] = bad
+    sector_ranges = [math.inf] * 12
+    sector_ranges[sector - 1] = bad
     with pytest.raises(InputError, match=rf"^sector {sector} holds .*the sensor was blind$"):
-        from_messages.sector_ranges(sent(LaserScan(ranges=seen)))
+        from_messages.sector_ranges(sent(LaserScan(ranges=sector_ranges)))
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
@@ -311,7 +313,7 @@ def test_fewer_than_three_sectors_are_refused(count: int) -> None:
 
 @pytest.mark.parametrize("key", ["mode", "vs", "gap", "pose", "waypoint", "candidates"])
 @pytest.mark.parametrize("value", [None, "garbage"])
-def test_a_garbled_decision_is_refused(key: str, value: str | None) -> None:
+def test_a_malformed_decision_is_refused(key: str, value: str | None) -> None:
     message = to_messages.decision_msg(a_decision(), "mfba", 0, "/planner")
     status = message.status[0]
     kept = [item for item in status.values if item.key != key or value is not None]
@@ -319,30 +321,31 @@ def test_a_garbled_decision_is_refused(key: str, value: str | None) -> None:
         if item.key == key:
             item.value = value
     status.values = kept
-    with pytest.raises(InputError, match=r"^planner/decision lacks or garbles .*|not a list of"):
+    text = r"^planner/decision: missing or malformed .*|not a list of"
+    with pytest.raises(InputError, match=text):
         from_messages.decision(message, (math.inf,) * 12)
 
 
 def test_an_empty_diagnostic_is_no_decision() -> None:
     message = to_messages.decision_msg(a_decision(), "mfba", 0, "/planner")
     message.status = []
-    with pytest.raises(InputError, match="lacks or garbles"):
+    with pytest.raises(InputError, match="missing or malformed"):
         from_messages.decision(message, ())
 
 
-@given(st.lists(points))
-def test_points_as_text_come_back(some: list[tuple[float, float]]) -> None:
+@given(st.lists(plane_points))
+def test_points_as_text_round_trip(some: list[tuple[float, float]]) -> None:
     assert from_messages.points(from_messages.points_text(some)) == tuple(some)
 
 
 @pytest.mark.parametrize("text", ["1", "1,2,3", "a,b", "1,2 3"])
-def test_text_that_is_no_points_is_refused(text: str) -> None:
+def test_text_without_points_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="not a list of points"):
         from_messages.points(text)
 
 
 @given(st.tuples(moderate, moderate), angles)
-def test_turning_there_and_back(vector: tuple[float, float], angle: float) -> None:
+def test_rotation_and_its_inverse(vector: tuple[float, float], angle: float) -> None:
     turned = from_messages.rotated(vector, angle)
     assert math.hypot(*turned) == pytest.approx(math.hypot(*vector))
     assert from_messages.rotated(turned, -angle) == pytest.approx(vector, abs=1e-6)

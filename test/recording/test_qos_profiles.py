@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""QoS profiles in rosbag2's YAML: round trip, comparison with rosbags, refused lists."""
+
 from typing import Any
 
 import pytest
@@ -42,14 +44,14 @@ def test_profiles_survive_list_and_text(profiles: tuple[OfferedQos, ...]) -> Non
     assert from_list(to_text(profiles)) == profiles
 
 
-@settings(max_examples=25)  # its YAML parser is a slow one
+@settings(max_examples=25)  # its YAML parser is slow
 @given(st.lists(PROFILES, min_size=1, max_size=3).map(tuple))
 def test_rosbags_reads_the_same_and_its_numbers_are_understood(
     profiles: tuple[OfferedQos, ...],
 ) -> None:
     theirs = parse_qos(to_text(profiles))
     assert [item.depth for item in theirs] == [item.depth for item in profiles]
-    # Its enumerations know neither manual_by_node nor best_available everywhere: it says unknown.
+    # Its enumerations lack manual_by_node and some best_available: these become unknown.
     for ours, back in zip(profiles, from_list(dump_qos_v9(theirs))):
         assert back.deadline_ns == ours.deadline_ns
         assert back.history == ours.history
@@ -66,7 +68,7 @@ def test_words_are_rosbag2s() -> None:
         (offered,) = from_list(recorded)
         assert offered.deadline_ns == INFINITE_NS
         assert to_list([offered]) == recorded
-        assert list(to_list([offered])[0]) == list(recorded[0])  # in the same order
+        assert list(to_list([offered])[0]) == list(recorded[0])  # with the same sequence of keys
 
 
 def test_more_than_the_longest_duration_is_infinite() -> None:

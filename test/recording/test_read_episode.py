@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bags back to Episodes: what lacks or is garbled is named; a run that was cut short is read."""
+"""Read bags back into Episodes: missing and malformed content is named; cut runs are read."""
 
 import json
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.run_episode import run
 
-Change = Callable[[str, Any], Any]  # (topic, message) -> message, or None to leave it out
+Change = Callable[[str, Any], Any]  # (topic, message) -> message, or None to remove it
 
 
 @pytest.fixture(scope="module")
@@ -82,9 +82,10 @@ def test_a_decision_without_its_sectors_is_named(bag: Path, tmp_path: Path) -> N
     ("key", "value"),
     [("mode", "flying"), ("gap", "x"), ("waypoint", "1,2,3"), ("pose", "1,2"), ("vs", "0a0")],
 )
-def test_a_garbled_decision_is_refused(bag: Path, tmp_path: Path, key: str, value: str) -> None:
-    with pytest.raises(BagError, match=r"garble|not a list of points"):
-        read_episode(edited(bag, tmp_path / "garbled", with_value(key, value)))
+def test_a_malformed_decision_is_refused(bag: Path, tmp_path: Path, key: str, value: str) -> None:
+    text = r": planner/decision: missing or malformed .*; was it edited|not a list of points"
+    with pytest.raises(BagError, match=text):
+        read_episode(edited(bag, tmp_path / "edited", with_value(key, value)))
 
 
 def test_a_bag_older_than_an_option_was_made_with_its_default(bag: Path, tmp_path: Path) -> None:
@@ -107,7 +108,7 @@ def test_a_bag_older_than_an_option_was_made_with_its_default(bag: Path, tmp_pat
         (lambda c: c["nodes"]["world_sim"].update(scenario_json="{}"), "missing"),
     ],
 )
-def test_a_configuration_that_explains_nothing_is_refused(
+def test_an_incomplete_configuration_is_refused(
     bag: Path, tmp_path: Path, change: Callable[[Any], Any], reason: str
 ) -> None:
     def configure(content: Any) -> Any:
@@ -121,15 +122,15 @@ def test_a_configuration_that_explains_nothing_is_refused(
     assert "\n" not in str(caught.value)
 
 
-def test_decisions_that_changed_places_are_none_lost(bag: Path, tmp_path: Path) -> None:
-    """All are read in their order; what streams cannot wait for them and says so."""
+def test_swapped_decisions_are_sorted(bag: Path, tmp_path: Path) -> None:
+    """read_episode sorts them by stamp; summarize streams and refuses them."""
     odd = rewrite(bag, tmp_path / "odd", swapped("/planner/decision", 5))
     assert read_episode(odd).ticks == read_episode(bag).ticks
     with pytest.raises(BagError, match=r"the decision at stamp \d+ ns comes after that at \d+ ns"):
         summarize(odd)
 
 
-def test_a_decision_that_is_there_twice_counts_once(bag: Path, tmp_path: Path) -> None:
+def test_a_repeated_decision_counts_once(bag: Path, tmp_path: Path) -> None:
     def twice(messages: list[Any]) -> Any:
         for message in messages:
             yield from [message] * (2 if message.topic == "/planner/decision" else 1)
@@ -146,8 +147,8 @@ def test_the_summary_is_that_of_the_episode(bag: Path) -> None:
     assert (episode.outcome, episode.ticks) == (whole.outcome, whole.ticks[-1:])
 
 
-def test_refused_sectors_are_an_episode_all_the_same(bag: Path, tmp_path: Path) -> None:
-    """What the planner refused, the reader does not take for free space either."""
+def test_refused_sectors_give_empty_ranges(bag: Path, tmp_path: Path) -> None:
+    """Sectors that the planner refused are not read as free space."""
 
     def blind(name: str, message: Any) -> Any:
         if name == "/sectors":

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Recover truncated and damaged bags, and bags that were never closed."""
+
 import random
 import shutil
 from collections import Counter
@@ -34,7 +36,7 @@ def content(path: Path) -> list[RawMessage]:
 
 
 def test_truncation_anywhere(tmp_path: Path) -> None:
-    """Every message of every whole chunk, in a bag four readers open; an error without one."""
+    """All messages of all whole chunks are recovered; an error if no chunk is whole."""
     source = write_bag(tmp_path / "run1", 60, chunk_bytes=9000, beams=40)
     data, written = source.read_bytes(), content(source)
     file = open_file(source)
@@ -45,33 +47,33 @@ def test_truncation_anywhere(tmp_path: Path) -> None:
 
     generator = random.Random(20240501)
     cuts = sorted(generator.sample(range(8, len(data)), 190))
-    # ... and the places where it matters: around each chunk's end, and at the very end.
+    # ... and the critical offsets: around each chunk's end, and at the end of the file.
     cuts += [end + step for end in ends[:4] for step in (-1, 0, 1)]
     cuts += [len(data) - 1, len(data) - 8, len(data) - 40]
-    cut, out = tmp_path / "cut.mcap", tmp_path / "out"
+    truncated, out = tmp_path / "cut.mcap", tmp_path / "out"
     failures = 0
     opened: set[bytes] = set()
     for size in cuts:
-        cut.write_bytes(data[:size])
+        truncated.write_bytes(data[:size])
         whole = sum(count for count, end in zip(sizes, ends) if end <= size)
         if not whole:
             failures += 1
             with pytest.raises(BagError) as caught:
-                recover(cut, out)
+                recover(truncated, out)
             assert "\n" not in str(caught.value)
             assert not out.exists()
         else:
-            report = recover(cut, out)
+            report = recover(truncated, out)
             assert report.messages == whole
             assert report.problems
             recovered = (out / "out_0.mcap").read_bytes()
-            if recovered not in opened:  # the readers need not see the same bytes twice
+            if recovered not in opened:  # the readers check the same bytes only once
                 opened.add(recovered)
                 assert content(out) == written[:whole]
                 expected = Counter(message.topic for message in written[:whole])
                 assert count_with_all(out) == expected
             shutil.rmtree(out)
-        assert cut.read_bytes() == data[:size]
+        assert truncated.read_bytes() == data[:size]
     assert 0 < failures < len(cuts) / 2
     assert len(opened) == len(ends)
 
@@ -88,11 +90,11 @@ def test_a_directory_without_metadata(tmp_path: Path) -> None:
     assert sorted(p.name for p in source.parent.iterdir()) == ["run1_0.mcap"]
 
 
-def test_everything_else_comes_over_too(tmp_path: Path) -> None:
+def test_attachments_metadata_and_topics_are_recovered(tmp_path: Path) -> None:
     source = write_bag(tmp_path / "run1", 30)
-    cut = tmp_path / "cut.mcap"
-    cut.write_bytes(source.read_bytes()[:-500])
-    report = recover(cut, tmp_path / "out")
+    truncated = tmp_path / "cut.mcap"
+    truncated.write_bytes(source.read_bytes()[:-500])
+    report = recover(truncated, tmp_path / "out")
     assert report.attachments == 1
     with BagReader(source) as before, BagReader(tmp_path / "out") as after:
         assert after.complete
@@ -105,14 +107,14 @@ def test_everything_else_comes_over_too(tmp_path: Path) -> None:
         assert after.ros_distro == before.ros_distro
 
 
-def test_a_good_bag_comes_over_as_it_is(tmp_path: Path) -> None:
+def test_a_complete_bag_is_copied_unchanged(tmp_path: Path) -> None:
     report = recover(FOREIGN, tmp_path / "out")
     assert (report.messages, report.bytes_lost, report.problems) == (281, 0, ())
     assert content(tmp_path / "out") == content(FOREIGN)
     assert count_with_all(tmp_path / "out").total() == 281
     with BagReader(FOREIGN) as before, BagReader(tmp_path / "out") as after:
         assert after.topics == before.topics
-    # An empty one too: nothing is missing from it.
+    # An empty bag too: it is complete.
     with BagWriter(tmp_path / "quiet") as writer:
         writer.add_topic("/scan", "sensor_msgs/msg/LaserScan", SENSOR)
     assert recover(tmp_path / "quiet", tmp_path / "quiet_too").messages == 0
@@ -142,7 +144,7 @@ def damage_chunk(path: Path, number: int) -> None:
     path.write_bytes(data)
 
 
-def test_a_damaged_chunk_in_the_middle_is_left_out(tmp_path: Path) -> None:
+def test_a_damaged_chunk_in_the_middle_is_skipped(tmp_path: Path) -> None:
     source = write_bag(tmp_path / "run1", 60)
     before = content(source)
     damage_chunk(source, 2)
@@ -157,13 +159,13 @@ def test_a_damaged_chunk_in_the_middle_is_left_out(tmp_path: Path) -> None:
     assert count_with_all(tmp_path / "out").total() == report.messages
 
 
-def test_messages_whose_description_is_lost_are_counted(tmp_path: Path) -> None:
-    """The first chunk describes the channels; cut the end off and they stand nowhere else."""
+def test_messages_without_definitions_are_not_recovered(tmp_path: Path) -> None:
+    """Only the first chunk and the summary define the channels."""
     source = write_bag(tmp_path / "run1", 60)
     damage_chunk(source, 0)
     source.write_bytes(source.read_bytes()[:-8])
     with pytest.raises(BagError, match="not one whole chunk"):
-        # The summary, without its last bytes, still describes them - but not without its start.
+        # Without summary no definition is left; with all but its last bytes, all are found.
         recover(truncate_before_summary(source), tmp_path / "out")
     assert not (tmp_path / "out").exists()
     report = recover(source, tmp_path / "out")
@@ -171,11 +173,11 @@ def test_messages_whose_description_is_lost_are_counted(tmp_path: Path) -> None:
 
 
 def truncate_before_summary(path: Path) -> Path:
-    cut = path.with_name("cut.mcap")
+    truncated = path.with_name("cut.mcap")
     data = path.read_bytes()
     # DataEnd: opcode 15, length 4, then its CRC.
-    cut.write_bytes(data[: data.rindex(b"\x0f\x04" + bytes(7))])
-    return cut
+    truncated.write_bytes(data[: data.rindex(b"\x0f\x04" + bytes(7))])
+    return truncated
 
 
 def test_zeros_after_a_power_cut(tmp_path: Path) -> None:
@@ -197,18 +199,18 @@ def test_several_files_become_one(tmp_path: Path) -> None:
         foreign_mcap(bag / f"bag_{number}.mcap", times_ns=(number * 10, number * 10 + 1))
     last = bag / "bag_10.mcap"
     last.write_bytes(last.read_bytes()[:-20])
-    # metadata.yaml that cannot be used does not stand in the way.
+    # An unusable metadata.yaml is no obstacle.
     listed = BagMetadata(topics=(), files=(BagFile(path="gone.mcap"),), ros_distro="kilted")
     (bag / "metadata.yaml").write_text(dump_file(listed))
     report = recover(bag, tmp_path / "out")
     assert report.messages == 8
-    assert report.problems[0].endswith("names gone.mcap, which is not there")
+    assert report.problems[0].endswith("lists gone.mcap, which does not exist")
     assert report.problems[1] == "bag_10.mcap: the end of the file is missing"
     times = [message.log_time_ns for message in content(tmp_path / "out")]
     assert times == [0, 1, 10, 11, 20, 21, 100, 101]  # 10 after 2
 
 
-def test_a_bag_that_uses_types_not_installed_here(tmp_path: Path) -> None:
+def test_a_bag_with_types_that_are_not_installed(tmp_path: Path) -> None:
     # Of a type with one string, data; rosbags computes it from the schema and compares.
     type_hash = "RIHS01_134dbc5b563ba6a8f3539b907dd992d0eeee76157fb90e4dfc28b104a458bf62"
     path = foreign_mcap(
@@ -224,7 +226,7 @@ def test_a_bag_that_uses_types_not_installed_here(tmp_path: Path) -> None:
         assert reader.ros_distro == "unknown"
 
 
-def test_existing_output_is_refused_and_the_source_stays(tmp_path: Path) -> None:
+def test_existing_output_is_refused_and_the_source_unchanged(tmp_path: Path) -> None:
     source = write_bag(tmp_path / "run1", 5)
     before = source.read_bytes()
     for out in (tmp_path / "run1", tmp_path):
@@ -258,7 +260,7 @@ def test_nothing_to_recover(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_recovering_twice_changes_nothing_more(tmp_path: Path) -> None:
+def test_recovering_twice_makes_no_further_change(tmp_path: Path) -> None:
     source = write_bag(tmp_path / "run1", 30)
     source.write_bytes(source.read_bytes()[:-700])
     recover(source, tmp_path / "once")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every bag that cannot be read is refused in one line: path, reason, remedy."""
+"""Bags that cannot be read are refused in one line: path, reason, remedy."""
 
 import os
 import random
@@ -49,33 +49,33 @@ def sqlite_bag(path: Path) -> None:
 
 
 def test_missing(tmp_path: Path) -> None:
-    give = "give a .mcap file or a bag directory"
-    assert refusal(tmp_path / "none") == f": does not exist; {give}"
+    remedy = "give a .mcap file or a bag directory"
+    assert refusal(tmp_path / "none") == f": does not exist; {remedy}"
     (tmp_path / "dangling").symlink_to(tmp_path / "none")
-    assert refusal(tmp_path / "dangling") == f": does not exist; {give}"
+    assert refusal(tmp_path / "dangling") == f": does not exist; {remedy}"
     (tmp_path / "file").write_text("x")
     assert "does not exist" in refusal(tmp_path / "file" / "below")
 
 
 def test_no_bag_at_all(tmp_path: Path) -> None:
-    give = "give a .mcap file or a bag directory"
+    remedy = "give a .mcap file or a bag directory"
     (tmp_path / "empty.mcap").touch()
-    assert refusal(tmp_path / "empty.mcap") == f": empty file; {give}"
+    assert refusal(tmp_path / "empty.mcap") == f": empty file; {remedy}"
     (tmp_path / "text.mcap").write_text("a shopping list, not a recording")
-    assert refusal(tmp_path / "text.mcap") == f": not an MCAP file (no magic bytes); {give}"
+    assert refusal(tmp_path / "text.mcap") == f": not an MCAP file (no magic bytes); {remedy}"
     (tmp_path / "short.mcap").write_bytes(MCAP0_MAGIC[:5])
     assert "not an MCAP file" in refusal(tmp_path / "short.mcap")
     (tmp_path / "folder").mkdir()
     assert "not a bag, metadata.yaml is missing" in refusal(tmp_path / "folder")
     os.mkfifo(tmp_path / "pipe")
-    assert refusal(tmp_path / "pipe") == f": not a file; {give}"
+    assert refusal(tmp_path / "pipe") == f": not a file; {remedy}"
     assert "cannot be read (File name too long)" in refusal(tmp_path / ("x" * 300))
 
 
-def test_what_vanishes_or_fails_while_it_is_opened(tmp_path: Path) -> None:
+def test_files_that_fail_while_being_opened(tmp_path: Path) -> None:
     with pytest.raises(BagError, match=r"gone: cannot be read \(No such file"):
         open_file(tmp_path / "gone")
-    # A process's own memory opens, but has no end to look at.
+    # A process's own memory can be opened, but has no end to seek to.
     with pytest.raises(BagError, match=r"mem: cannot be read \(Invalid argument\); copy it"):
         open_file(Path("/proc/self/mem"))
 
@@ -112,7 +112,7 @@ def test_truncated(tmp_path: Path) -> None:
         )
     with path.open("wb") as stream:
         Writer(stream).start("ros2", "")
-    assert path.stat().st_size < 37  # not even room for an end
+    assert path.stat().st_size < 37  # shorter than a footer
     assert ": truncated, the end of the file is missing" in refusal(path)
     path.write_bytes(data[:12])
     assert "truncated within its header (12 bytes), nothing of it can be" in refusal(path)
@@ -141,13 +141,13 @@ def test_broken_metadata_yaml(tmp_path: Path) -> None:
     listed.write_bytes(b"\xff\xfe\x00")
     assert "metadata.yaml: not UTF-8 text" in refusal(bag)
     listed.write_text(sound.replace("rosbag2_foreign_scan_0", "moved"))
-    assert "names moved.mcap, which is not there" in refusal(bag)
+    assert "lists moved.mcap, which does not exist" in refusal(bag)
     listed.unlink()
     listed.mkdir()
     assert "cannot be read (Is a directory)" in refusal(bag)
 
 
-def test_truncated_part_of_a_directory(tmp_path: Path) -> None:
+def test_truncated_file_of_a_directory(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "run1", 5)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(BagError, match=f"^{path}: truncated"):
@@ -162,7 +162,7 @@ def damaged(source: Path, target: Path, offset: int) -> Path:
 
 
 def chunk_data_offset(path: Path) -> int:
-    """Somewhere inside the first chunk's compressed data."""
+    """An offset inside the first chunk's compressed data."""
     with path.open("rb") as stream:
         for record in StreamReader(stream, emit_chunks=True).records:
             if isinstance(record, Chunk):
@@ -194,7 +194,7 @@ def test_damage_in_a_file_without_index_or_crc(tmp_path: Path) -> None:
     assert "no whole record; run" in refusal(path)
 
 
-def test_a_record_that_runs_over_its_chunk(tmp_path: Path) -> None:
+def test_a_record_that_exceeds_its_chunk(tmp_path: Path) -> None:
     path = foreign_mcap(tmp_path / "a.mcap", compression=CompressionType.NONE, enable_crcs=False)
     data = bytearray(path.read_bytes())
     data[data.index(b"at 2") - 4 - 4 - 22 - 8] += 1
@@ -220,7 +220,7 @@ def test_a_file_that_shrinks_while_it_is_read(tmp_path: Path) -> None:
             list(reader.messages())
 
 
-def test_a_message_of_a_channel_nobody_described(tmp_path: Path) -> None:
+def test_a_message_of_an_undefined_channel(tmp_path: Path) -> None:
     path = foreign_mcap(
         tmp_path / "a.mcap",
         use_chunking=False,
@@ -235,7 +235,7 @@ def test_a_message_of_a_channel_nobody_described(tmp_path: Path) -> None:
     assert "damaged, 3 messages of channel 1, which is not described" in refusal(path)
 
 
-def test_what_cannot_be_decoded_can_still_be_read(tmp_path: Path) -> None:
+def test_undecodable_messages_can_still_be_read(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     foreign_mcap(path, schema=("std_msgs/msg/String", "ros2idl", b"module std_msgs {};"))
     assert "cannot be decoded (schema encoding 'ros2idl', not ros2msg)" in decode_refusal(path)
@@ -244,12 +244,12 @@ def test_what_cannot_be_decoded_can_still_be_read(tmp_path: Path) -> None:
     foreign_mcap(path, schema=("", "", b""))
     assert "topic /chatter () cannot be decoded (schema encoding ''" in decode_refusal(path)
     foreign_mcap(path, schema=("std_msgs/msg/String", "ros2msg", b"string data\nfloat64[30] x"))
-    assert "a message on /chatter at 1 ns is no std_msgs/msg/String" in decode_refusal(path)
+    assert "a message on /chatter at 1 ns is not a std_msgs/msg/String" in decode_refusal(path)
     assert read_all(path) == 3
 
 
-def survivors(path: Path, read: Callable[[Path], int]) -> int | None:
-    """How many messages it found, None for a refusal; any other exception fails the test."""
+def count_or_refused(path: Path, read: Callable[[Path], int]) -> int | None:
+    """Number of messages read, None for a BagError; other exceptions fail the test."""
     try:
         return read(path)
     except BagError:
@@ -283,8 +283,8 @@ def test_random_damage_is_read_or_refused_but_never_a_traceback(tmp_path: Path, 
         for _ in range(generator.choice((1, 1, 4, 30))):
             broken[generator.randrange(len(broken))] = generator.randrange(256)
         target.write_bytes(broken)
-        found = survivors(target, read_all)
-        salvaged = survivors(target, salvage_all)
+        found = count_or_refused(target, read_all)
+        salvaged = count_or_refused(target, salvage_all)
         refused += found is None
         assert (found or 0) <= total
         assert (salvaged or 0) <= total

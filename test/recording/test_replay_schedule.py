@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The order of replay and its deadlines: no ROS, no clock."""
+"""The sequence of a replay, its deadlines and its QoS: without ROS and without clock."""
 
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def contents(
         ]
 
 
-def test_all_messages_come_in_log_time_order(tmp_path: Path) -> None:
+def test_messages_are_sorted_by_log_time(tmp_path: Path) -> None:
     bag = bag_of(tmp_path / "b", (0, "/a", "a0"), (2, "/a", "a2"), (1, "/b", "b1"), (3, "/c", "-"))
     assert contents(bag, {"/a", "/b"}, {}) == [("a0", 0), ("b1", 1), ("a2", 2)]
 
@@ -71,7 +71,7 @@ def test_a_latched_message_at_the_offset_comes_once(tmp_path: Path) -> None:
     assert contents(bag, {"/latched"}, {"/latched": 1}, 1.0) == [("old", 1), ("new", 1)]
 
 
-def test_what_was_latched_long_ago_is_still_found(tmp_path: Path) -> None:
+def test_old_latched_messages_are_found(tmp_path: Path) -> None:
     bag = bag_of(tmp_path / "b", (0, "/latched", "old"), (9, "/plain", "now"))
     assert contents(bag, {"/latched", "/plain"}, {"/latched": 1}, 8.0) == [("old", 8), ("now", 9)]
 
@@ -83,12 +83,12 @@ def test_an_offset_beyond_the_end_is_refused() -> None:
             begin_ns(bag, 13.3)
 
 
-def test_one_publisher_is_offered_as_it_was() -> None:
+def test_the_qos_of_one_publisher_is_unchanged() -> None:
     assert offer((SENSOR,)) == SENSOR
     assert offer(()).depth == 0
 
 
-def test_several_publishers_are_offered_as_the_strongest() -> None:
+def test_the_qos_of_several_publishers_is_the_strongest() -> None:
     both = offer((SENSOR, LATCHED))
     assert (both.reliability, both.durability) == ("reliable", "transient_local")
     assert (both.depth, both.deadline_ns) == (5, SENSOR.deadline_ns)
@@ -103,17 +103,17 @@ def test_several_publishers_are_offered_as_the_strongest() -> None:
 @given(
     rate=st.floats(0.01, 100.0),
     times=st.lists(st.integers(0, 10**12), max_size=20),
-    begin=st.integers(0, 10**15),
-    late=st.integers(0, 10**10),
+    start_ns=st.integers(0, 10**15),
+    elapsed_ns=st.integers(0, 10**10),
 )
-def test_deadlines_do_not_depend_on_when_they_are_asked_for(
-    rate: float, times: list[int], begin: int, late: int
+def test_deadlines_do_not_depend_on_the_time_of_the_call(
+    rate: float, times: list[int], start_ns: int, elapsed_ns: int
 ) -> None:
     schedule = Schedule(rate, START_NS)
-    schedule.start(begin)
+    schedule.start(start_ns)
     for time_ns in times:
-        wait = schedule.wait_ns(START_NS + time_ns, begin + late)
-        assert wait == round(time_ns / rate) - late
+        wait = schedule.wait_ns(START_NS + time_ns, start_ns + elapsed_ns)
+        assert wait == round(time_ns / rate) - elapsed_ns
 
 
 @given(
@@ -127,21 +127,21 @@ def test_pauses_shift_the_deadlines_by_their_length(
     now = 5
     schedule.start(now)
     due = round(10**12 / rate) + now
-    for running, standing in pauses:
-        now += running
+    for running_ns, paused_ns in pauses:
+        now += running_ns
         schedule.pause(now)
         before = schedule.time_ns(now)
         assert schedule.wait_ns(10**12, now) is None
-        now += standing
+        now += paused_ns
         assert schedule.time_ns(now) == before
         schedule.resume(now)
-        due += standing
+        due += paused_ns
     wait = schedule.wait_ns(10**12, now)
     assert wait is not None
     assert abs(wait - (due - now)) <= 20 / rate + 2  # one rounding per pause
 
 
-def test_time_stands_until_the_start_and_while_paused() -> None:
+def test_time_is_stopped_until_the_start_and_while_paused() -> None:
     schedule = Schedule(2.0, START_NS, paused=True)
     schedule.start(0)
     assert schedule.time_ns(99) == START_NS
@@ -150,14 +150,14 @@ def test_time_stands_until_the_start_and_while_paused() -> None:
     schedule.step_to(START_NS + 4)  # never back
     assert schedule.time_ns(99) == START_NS + 10
     schedule.resume(1000)
-    schedule.resume(2000)  # it runs already
+    schedule.resume(2000)  # already running
     assert [schedule.by_steps] == [False]
-    schedule.step_to(START_NS + 10**9)  # time runs by itself
+    schedule.step_to(START_NS + 10**9)  # no effect while time runs
     assert schedule.time_ns(1005) == START_NS + 20
     assert schedule.wait_ns(START_NS + 30, 1005) == 5
 
 
-def test_resumed_before_the_start_it_runs_from_the_start() -> None:
+def test_resume_before_start_runs_from_the_start() -> None:
     schedule = Schedule(1.0, 0, paused=True)
     schedule.resume(10)
     assert schedule.wait_ns(5, 20) is None
@@ -165,7 +165,7 @@ def test_resumed_before_the_start_it_runs_from_the_start() -> None:
     assert schedule.wait_ns(5, 100) == 5
 
 
-def test_as_fast_as_possible_everything_is_due_and_time_follows_the_messages() -> None:
+def test_as_fast_as_possible_all_is_due_and_time_follows_the_messages() -> None:
     schedule = Schedule(None, START_NS)
     assert schedule.wait_ns(START_NS, 0) is None
     schedule.start(0)
@@ -177,9 +177,9 @@ def test_as_fast_as_possible_everything_is_due_and_time_follows_the_messages() -
     assert schedule.time_ns(10**15) == START_NS
 
 
-def test_the_next_round_begins_after_the_gap_whenever_that_is_asked() -> None:
+def test_the_next_loop_starts_after_the_gap_at_any_time_of_the_call() -> None:
     schedule = Schedule(2.0, START_NS)
     schedule.start(1000)
-    for round_ in range(1, 4):
+    for loop in range(1, 4):
         schedule.rewind(START_NS + 600, START_NS, 50)
-        assert schedule.wait_ns(START_NS, 0) == 1000 + round_ * 350
+        assert schedule.wait_ns(START_NS, 0) == 1000 + loop * 350

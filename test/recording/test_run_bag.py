@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bag of a real run, opened by readers others wrote: every topic, every tick, decoded."""
+"""The bag of a real run, decoded by four independent readers: every topic, every tick."""
 
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios.scenario_files import load_scenario
 
-# Nobody publishes them in a simulation of the paper's robot, which has no lidar and never errs.
-NEVER = {"ground_truth", "initialpose", "scan", "waypoints"}
+# Not published in a simulation of the paper's robot, which has no lidar and no noise.
+NOT_PUBLISHED = {"ground_truth", "initialpose", "scan", "waypoints"}
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(tmp_path_factory.mktemp("run") / "bag", "case2", 4)
 
 
-def test_readers_of_others_find_every_topic_with_a_message_per_tick(bag: Path) -> None:
+def test_independent_readers_find_every_topic_with_a_message_per_tick(bag: Path) -> None:
     """rosbags, mcap-ros2-support, pybag and small-mcap decode it all and agree."""
     ticks = len(read_episode(bag).ticks)
     assert ticks > 50
@@ -33,10 +33,10 @@ def test_readers_of_others_find_every_topic_with_a_message_per_tick(bag: Path) -
         if topic.every_tick:
             assert counts[name] == ticks, name
         else:
-            assert (counts[name] >= 1) == (topic.name not in NEVER), name
+            assert (counts[name] >= 1) == (topic.name not in NOT_PUBLISHED), name
 
 
-def test_the_bag_explains_itself(bag: Path) -> None:
+def test_the_bag_contains_its_configuration(bag: Path) -> None:
     with BagReader(bag) as reader:
         found = read_configuration(reader)
     assert found["nodes"]["planner"]["seed"] == 4

@@ -90,7 +90,7 @@ def test_verify_knows_which_scans_the_sensor_would_refuse(tmp_path: Path, domain
     other = rewrite(tmp_path / "bag", tmp_path / "other", list, configure=expecting("rear"))
     report = verify(other)
     assert len(report.faults) == len(report.recorded)
-    assert all("/sectors is not what the sensor measures" in fault for fault in report.faults)
+    assert all("/sectors does not match the sensor" in fault for fault in report.faults)
 
 
 def start(graph: Graph, config: RunConfig, **more: Any) -> WorldSim:

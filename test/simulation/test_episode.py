@@ -263,7 +263,7 @@ def test_success_needs_the_goal(outcome: Outcome) -> None:
 
 def test_the_core_alone_knows_the_papers_method_only() -> None:
     params = PlannerParams(method=Method.PREDICTIVE)
-    with pytest.raises(ConfigError, match="method=predictive: not the core's own"):
+    with pytest.raises(ConfigError, match="method=predictive: not Algorithm 1"):
         run(load_scenario("case1"), planner=params)
 
 

@@ -361,7 +361,7 @@ def test_a_result_for_each_robot_and_one_picture(driven: Path) -> None:
 
 
 def test_what_knows_one_robot_only_says_so(driven: Path) -> None:
-    with pytest.raises(BagError, match="holds 4 robots, and a bag of one"):
+    with pytest.raises(BagError, match="holds 4 robots, but this reads a bag of one"):
         read_episode(driven / "bag")
     for args, what in (
         (["--real-time"], "--real-time: 10 robots run in lockstep here; leave it out"),

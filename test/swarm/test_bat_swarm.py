@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Eq. 3-10 as worked examples, every reading against a second implementation, and properties."""
+"""BatSwarm: eq. 3-10 by hand, all readings against a second implementation, properties."""
 
 import functools
 import itertools
@@ -36,12 +36,12 @@ from mfba_planner.swarm.bat_swarm import (
     Walk,
     minimize,
 )
-from mfba_planner.swarm.swarm_iteration import Law
+from mfba_planner.swarm.swarm_iteration import BatMotion
 
 Values = list[float]
 BOX = Box((-1.0, 10.0), (3.0, 12.0))
-SILENT = {"r0": 1.0}  # rand > 1 never holds: no local walk
-WALKING = {"r0": 0.0}  # rand > 0 always holds
+NO_WALK = {"r0": 1.0}  # rand > 1 never holds: no local walk
+ALWAYS_WALK = {"r0": 0.0}  # rand > 0 always holds
 COORDINATE = st.floats(-100.0, 100.0)
 DISCS = st.builds(Disc, st.floats(0.001, 50.0), st.tuples(COORDINATE, COORDINATE))
 BOXES = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=1, max_size=4).map(
@@ -57,7 +57,7 @@ def generator(seed: int = 7) -> np.random.Generator:
 
 
 def params(**changes: Any) -> BatParams:
-    """Two bats that may leave the box and move by plain BA, unless told otherwise."""
+    """Two bats of plain BA that may leave the box, with changes."""
     plain: dict[str, Any] = {
         "algorithm": Algorithm.BA,
         "population": 2,
@@ -79,7 +79,7 @@ def sphere(x: Vector) -> float:
     return sum((v - 0.1) ** 2 for v in x)
 
 
-# --- the equations, one by one -------------------------------------------------------------
+# --- the equations, one by one --------------------------------------------------------------
 
 
 def test_eq_3_lands_inside_the_box() -> None:
@@ -95,52 +95,52 @@ def test_eq_3_as_printed_lands_outside() -> None:
 
 
 def test_eq_4_5_6_towards_the_best() -> None:
-    p = params(f_min=0.5, f_max=2.5, **SILENT)
+    p = params(f_min=0.5, f_max=2.5, **NO_WALK)
     swarm, x, rng = start(p, [3.0, 1.0])
     u = rng.random((2, 5))
     f = 0.5 + 2.0 * u[:, 0]
     v = (x[1] - x) * f[:, None]
     assert np.array(swarm.ask()) == pytest.approx(x + v, rel=1e-12)
-    assert swarm.ask()[1] == x[1].tolist(), "the best bat has nowhere to fly"
+    assert swarm.ask()[1] == x[1].tolist(), "the best bat does not move"
 
 
-def test_eq_5_as_printed_flies_away_from_the_best() -> None:
-    p = params(f_min=0.5, f_max=2.5, velocity=Velocity.AS_PRINTED, **SILENT)
+def test_eq_5_as_printed_moves_away_from_the_best() -> None:
+    p = params(f_min=0.5, f_max=2.5, velocity=Velocity.AS_PRINTED, **NO_WALK)
     swarm, x, rng = start(p, [3.0, 1.0])
     f = 0.5 + 2.0 * rng.random((2, 5))[:, 0]
     assert np.array(swarm.ask()) == pytest.approx(x + (x - x[1]) * f[:, None], rel=1e-12)
 
 
 def test_eq_5_adds_to_the_velocity_of_the_iteration_before() -> None:
-    swarm, x, rng = start(params(**SILENT), [3.0, 1.0])
+    swarm, x, rng = start(params(**NO_WALK), [3.0, 1.0])
     swarm.ask()
-    swarm.tell([9.0, 9.0])  # refused: the bats stay, their velocity does not
+    swarm.tell([9.0, 9.0])  # refused: positions stay, velocities change
     f = 10.0 * np.array([rng.random((2, 5))[:, 0], rng.random((2, 5))[:, 0]])
     v = (x[1] - x) * (f[0] + f[1])[:, None]
     assert np.array(swarm.ask()) == pytest.approx(x + v, rel=1e-9)
 
 
 def test_eq_7_walks_around_the_best_with_an_epsilon_per_coordinate() -> None:
-    swarm, x, rng = start(params(sigma=0.25, a0=0.8, **WALKING), [3.0, 1.0])
+    swarm, x, rng = start(params(sigma=0.25, a0=0.8, **ALWAYS_WALK), [3.0, 1.0])
     epsilon = 2.0 * rng.random((2, 5))[:, 3:] - 1.0
     assert np.array(swarm.ask()) == pytest.approx(x[1] + 0.25 * epsilon * 0.8, rel=1e-12)
 
 
 def test_eq_7_with_one_epsilon_for_all_coordinates() -> None:
-    swarm, x, rng = start(params(epsilon=Epsilon.SCALAR, **WALKING), [3.0, 1.0])
+    swarm, x, rng = start(params(epsilon=Epsilon.SCALAR, **ALWAYS_WALK), [3.0, 1.0])
     epsilon = 2.0 * rng.random((2, 5))[:, 3] - 1.0
     assert np.array(swarm.ask()) == pytest.approx(x[1] + 0.3 * epsilon[:, None], rel=1e-12)
 
 
 def test_eq_7_from_the_bat_itself() -> None:
-    swarm, x, rng = start(params(walk=Walk.SELF, **WALKING), [3.0, 1.0])
+    swarm, x, rng = start(params(walk=Walk.SELF, **ALWAYS_WALK), [3.0, 1.0])
     u = rng.random((2, 5))
-    flown = x + (x[1] - x) * 10.0 * u[:, :1]
-    assert np.array(swarm.ask()) == pytest.approx(flown + 0.3 * (2.0 * u[:, 3:] - 1.0), rel=1e-12)
+    moved = x + (x[1] - x) * 10.0 * u[:, :1]
+    assert np.array(swarm.ask()) == pytest.approx(moved + 0.3 * (2.0 * u[:, 3:] - 1.0), rel=1e-12)
 
 
 def test_eq_7_scales_with_the_mean_loudness_and_eq_8_lowers_it() -> None:
-    swarm, _, rng = start(params(alpha=0.5, **WALKING), [3.0, 1.0])
+    swarm, _, rng = start(params(alpha=0.5, **ALWAYS_WALK), [3.0, 1.0])
     swarm.ask()
     swarm.tell([9.0, 0.5])  # bat 2 is accepted: its loudness is 0.5 now, the mean 0.75
     best = np.array(swarm.best_x)
@@ -153,7 +153,7 @@ def test_eq_7_scales_with_the_mean_loudness_and_eq_8_lowers_it() -> None:
 @pytest.mark.parametrize(("gamma", "t"), [(0.8, 1), (0.8, 3), (0.2, 2)])
 def test_eq_9_sets_the_rate_of_an_accepted_bat(gamma: float, t: int) -> None:
     # f = 0 and r = 1 keep both bats where they are, until a lower r lets one walk
-    p = params(gamma=gamma, a0=100.0, f_max=0.0, walk=Walk.SELF, **SILENT)
+    p = params(gamma=gamma, a0=100.0, f_max=0.0, walk=Walk.SELF, **NO_WALK)
     rate = 1.0 - math.exp(-gamma * t)
     outcomes = set()
     for seed in range(50):
@@ -173,7 +173,7 @@ def test_eq_9_sets_the_rate_of_an_accepted_bat(gamma: float, t: int) -> None:
 
 
 def test_eq_10_with_the_normalized_and_the_raw_t() -> None:
-    p = params(algorithm=Algorithm.MFBA, iterations=4, rho=0.5, f_min=1.0, f_max=3.0, **SILENT)
+    p = params(algorithm=Algorithm.MFBA, iterations=4, rho=0.5, f_min=1.0, f_max=3.0, **NO_WALK)
     for schedule, scale in ((Schedule.NORMALIZED, 0.25), (Schedule.RAW, 1.0)):
         swarm, x, rng = start(replace(p, schedule=schedule), [3.0, 1.0])
         v = np.zeros((2, 2))
@@ -231,14 +231,14 @@ def test_the_horizon_is_t_of_eq_10_where_given() -> None:
 @pytest.mark.parametrize(
     ("value", "moves"), [(2.9, True), (3.0, True), (3.1, False), (math.nan, False)]
 )
-def test_a_bat_moves_to_what_is_not_worse_and_to_nothing_else(value: float, moves: bool) -> None:
-    # f = 1/2 for both; gamma = 100 keeps r at 1, so that nobody walks
-    swarm, x, _ = start(params(f_min=0.5, f_max=0.5, gamma=100.0, **SILENT), [3.0, 1.0])
+def test_a_bat_accepts_values_that_are_not_worse_and_no_others(value: float, moves: bool) -> None:
+    # f = 1/2 for both; gamma = 100 keeps r at 1, so that no bat walks
+    swarm, x, _ = start(params(f_min=0.5, f_max=0.5, gamma=100.0, **NO_WALK), [3.0, 1.0])
     v = (x[1] - x[0]) / 2.0
     assert swarm.ask()[0] == pytest.approx((x[0] + v).tolist())
     swarm.tell([value, 9.0])
-    at = x[0] + v if moves else x[0]
-    assert swarm.ask()[0] == pytest.approx((at + v + (x[1] - at) / 2.0).tolist())
+    position = x[0] + v if moves else x[0]
+    assert swarm.ask()[0] == pytest.approx((position + v + (x[1] - position) / 2.0).tolist())
     assert swarm.best_x == x[1].tolist()
 
 
@@ -246,7 +246,7 @@ def test_a_bat_moves_to_what_is_not_worse_and_to_nothing_else(value: float, move
 def test_a_better_point_is_accepted_with_probability_a(a0: float) -> None:
     accepted = 0
     for seed in range(200):
-        p = params(a0=a0, f_min=0.0, f_max=0.0, sigma=1.0, walk=Walk.SELF, **WALKING)
+        p = params(a0=a0, f_min=0.0, f_max=0.0, sigma=1.0, walk=Walk.SELF, **ALWAYS_WALK)
         swarm, rng = BatSwarm(p, BOX, generator(seed)), generator(seed)
         first = [list(x) for x in swarm.ask()]
         swarm.tell([3.0, 1.0])
@@ -287,13 +287,13 @@ def reference(
         rows = rng.random((n, 3 + d + 2 * paired))
         loudness = sum(a) / n
         tried = []
-        for i, (draw, gate, _, *rest) in enumerate(rows):
+        for i, (draw, walk_draw, _, *rest) in enumerate(rows):
             epsilon = rest[:d]
             if p.algorithm is Algorithm.BA:
                 beta = draw
             else:
-                when = t / p.iterations if p.schedule is Schedule.NORMALIZED else t
-                beta = when * math.exp(-p.rho * draw)
+                scaled_t = t / p.iterations if p.schedule is Schedule.NORMALIZED else t
+                beta = scaled_t * math.exp(-p.rho * draw)
             f = p.f_min + (p.f_max - p.f_min) * beta
             v[i] = v[i] * p.inertia
             if p.velocity is Velocity.TOWARDS_BEST:
@@ -301,7 +301,7 @@ def reference(
             else:
                 v[i] = v[i] + f * (x[i] - best_x)
             new: Any = x[i] + v[i]
-            if gate > r[i]:
+            if walk_draw > r[i]:
                 e = np.array(epsilon if p.epsilon is Epsilon.PER_COORDINATE else epsilon[:1] * d)
                 old = best_x if p.walk is Walk.BEST else new
                 length: Any = 1.0
@@ -367,8 +367,8 @@ def test_our_own_options_agree_with_a_second_implementation(
             swarm.tell([sphere(x) for x in candidates])
 
 
-def test_a_step_of_a_pair_is_a_difference_of_two_other_places() -> None:
-    p = params(population=6, step=Step.PAIR, epsilon=Epsilon.SCALAR, f_max=0.0, **WALKING)
+def test_a_pair_step_is_along_the_difference_of_two_bats() -> None:
+    p = params(population=6, step=Step.PAIR, epsilon=Epsilon.SCALAR, f_max=0.0, **ALWAYS_WALK)
     swarm, x, _ = start(p, [6.0, 5.0, 4.0, 3.0, 2.0, 1.0])
     gaps = [b - a for a, b in itertools.permutations(x, 2)]
     for candidate in np.array(swarm.ask()):
@@ -385,12 +385,12 @@ def test_a_step_of_a_pair_is_a_difference_of_two_other_places() -> None:
 
 
 @given(ANY_READING, st.one_of(DISCS, FLAT_BOXES), st.integers(0, 2**32))
-def test_the_unrolled_plane_is_the_general_flight_to_the_last_bit(
+def test_the_unrolled_plane_equals_the_general_iteration_bit_by_bit(
     p: BatParams, region: Region, seed: int
 ) -> None:
     fast = minimize(sphere, region, p, generator(seed))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Law, "_fly_in_the_plane", Law._iterate_in_d_dimensions)
+        patch.setattr(BatMotion, "_iterate_in_the_plane", BatMotion._iterate_in_d_dimensions)
         slow = minimize(sphere, region, p, generator(seed))
     assert (fast.best_x, fast.best_value) == (slow.best_x, slow.best_value)
     assert fast.candidates == slow.candidates
@@ -404,7 +404,7 @@ def test_drawing_ahead_changes_nothing(p: BatParams, seed: int) -> None:
         swarm.tell([sphere(x) for x in swarm.ask()])
     ahead = minimize(sphere, BOX, p, other)
     assert (ahead.best_x, ahead.candidates) == (swarm.best_x, swarm.candidates)
-    assert rng.random() == other.random(), "nothing is drawn in vain"
+    assert rng.random() == other.random(), "no draw is unused"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bat_swarm, "DRAWN_AHEAD", 50)
         assert minimize(sphere, BOX, p, generator(seed)).candidates == swarm.candidates
@@ -425,7 +425,9 @@ FAILING: list[Any] = [
 
 
 @pytest.mark.parametrize(("bad", "name"), FAILING)
-def test_a_failing_objective_is_named_and_counted_and_the_run_goes_on(bad: Any, name: str) -> None:
+def test_a_failing_objective_is_named_and_counted_and_the_run_continues(
+    bad: Any, name: str
+) -> None:
     calls: list[bool] = []
 
     def objective(x: Vector) -> Any:
@@ -483,31 +485,31 @@ def test_asking_twice_returns_the_same_candidates() -> None:
         swarm.tell([sphere(x) for x in first])
 
 
-def test_candidates_once_handed_out_do_not_change() -> None:
+def test_returned_candidates_do_not_change_later() -> None:
     swarm = BatSwarm(BatParams(bounds=Bounds.NONE), Disc(0.3), generator())
-    kept = []
+    handed_out = []
     for _ in range(6):
-        handed = swarm.ask()
-        kept.append((handed, [list(x) for x in handed]))
-        swarm.tell([sphere(x) for x in handed])
-    for handed, copy in kept:
-        assert handed == copy
+        candidates = swarm.ask()
+        handed_out.append((candidates, [list(x) for x in candidates]))
+        swarm.tell([sphere(x) for x in candidates])
+    for candidates, copy in handed_out:
+        assert candidates == copy
 
 
 def test_tell_needs_an_ask() -> None:
     swarm = BatSwarm(params(), BOX, generator())
     for _ in range(3):
-        with pytest.raises(InputError, match="tell without ask: call ask"):
+        with pytest.raises(InputError, match=r"^tell\(\) without ask\(\): call ask"):
             swarm.tell([1.0, 2.0])
         swarm.ask()
         swarm.tell([1.0, 2.0])
 
 
 @pytest.mark.parametrize("values", [[], [1.0], [1.0, 2.0, 3.0]])
-def test_tell_refuses_a_wrong_count_and_forgets_it(values: Values) -> None:
+def test_tell_refuses_a_wrong_count_and_ignores_the_values(values: Values) -> None:
     swarm = BatSwarm(params(), BOX, generator())
     swarm.ask()
-    with pytest.raises(InputError, match=f"^{len(values)} values told for 2 bats: tell one per"):
+    with pytest.raises(InputError, match=f"^{len(values)} values for 2 bats: give one per"):
         swarm.tell(values)
     assert swarm.best_value == math.inf
     swarm.tell([2.0, 1.0])
@@ -528,7 +530,7 @@ def test_nan_is_never_the_best() -> None:
     assert (swarm.best_x, swarm.best_value) == (x[1].tolist(), 5.0)
 
 
-def test_a_swarm_that_has_seen_nothing_but_nan_goes_on() -> None:
+def test_a_swarm_continues_after_values_of_nan_only() -> None:
     swarm, x, _ = start(params(), [math.nan, math.nan])
     assert (swarm.best_x, swarm.best_value) == (x[0].tolist(), math.inf)
     candidates = swarm.ask()
@@ -537,12 +539,16 @@ def test_a_swarm_that_has_seen_nothing_but_nan_goes_on() -> None:
     assert (swarm.best_x, swarm.best_value) == (candidates[0], 4.0)
 
 
-def test_a_bat_whose_first_value_was_nan_takes_any_number() -> None:
-    swarm, _, _ = start(params(a0=100.0, f_max=0.0, walk=Walk.SELF, **WALKING), [math.nan, 5.0])
-    moved = swarm.ask()[0]
+def test_a_bat_whose_first_value_was_nan_accepts_any_number() -> None:
+    swarm, _, _ = start(
+        params(a0=100.0, f_max=0.0, walk=Walk.SELF, **ALWAYS_WALK), [math.nan, 5.0]
+    )
+    accepted = swarm.ask()[0]
     swarm.tell([1e9, 9.0])
-    flown = swarm.ask()[0]
-    assert np.hypot(flown[0] - moved[0], flown[1] - moved[1]) <= 0.3 * 100.0 * math.sqrt(2.0)
+    walked = swarm.ask()[0]
+    assert np.hypot(walked[0] - accepted[0], walked[1] - accepted[1]) <= 0.3 * 100.0 * math.sqrt(
+        2.0
+    )
 
 
 def test_each_iteration_uses_the_same_number_of_draws_whatever_happens() -> None:
@@ -557,20 +563,20 @@ def test_each_iteration_uses_the_same_number_of_draws_whatever_happens() -> None
 
 
 @given(ANY_READING, st.one_of(DISCS, BOXES), st.integers(0, 2**32))
-def test_the_best_is_the_least_value_told_and_never_worsens(
+def test_the_best_is_the_least_value_so_far_and_never_worsens(
     p: BatParams, region: Region, seed: int
 ) -> None:
     swarm = BatSwarm(p, region, generator(seed))
-    told: list[tuple[float, Vector]] = []
+    values_so_far: list[tuple[float, Vector]] = []
     for _ in range(p.iterations + 1):
         before = swarm.best_value
         candidates = swarm.ask()
         values = [sphere(x) for x in candidates]
-        told += zip(values, candidates)
+        values_so_far += zip(values, candidates)
         swarm.tell(values)
         assert swarm.best_value <= before
-        least = min(value for value, _ in told)
-        assert (swarm.best_value, swarm.best_x) in told
+        least = min(value for value, _ in values_so_far)
+        assert (swarm.best_value, swarm.best_x) in values_so_far
         assert swarm.best_value == least
 
 
@@ -614,7 +620,7 @@ def test_another_seed_gives_another_run() -> None:
 
 
 @pytest.mark.parametrize("algorithm", Algorithm)
-def test_minimize_runs_t_iterations_and_finds_more_than_luck(algorithm: Algorithm) -> None:
+def test_minimize_runs_t_iterations_and_beats_the_initial_population(algorithm: Algorithm) -> None:
     p = BatParams(algorithm=algorithm, iterations=30)
     gains = []
     for seed in range(60):
@@ -627,21 +633,21 @@ def test_minimize_runs_t_iterations_and_finds_more_than_luck(algorithm: Algorith
 
 
 def test_minimize_evaluates_each_candidate_once() -> None:
-    seen: list[Vector] = []
+    points: list[Vector] = []
 
     def count(x: Vector) -> float:
-        seen.append(x)
+        points.append(x)
         return sphere(x)
 
     minimize(count, BOX, BatParams(population=3, iterations=4), generator())
-    assert len(seen) == 3 * (4 + 1)
+    assert len(points) == 3 * (4 + 1)
 
 
-# --- moving the region ----------------------------------------------------------------------
+# --- changing the region --------------------------------------------------------------------
 
 
-def test_resettle_draws_bats_and_best_into_the_new_region_and_values_them_again() -> None:
-    p = params(bounds=Bounds.CLAMP, **WALKING)
+def test_change_region_clamps_bats_and_best_and_evaluates_them_again() -> None:
+    p = params(bounds=Bounds.CLAMP, **ALWAYS_WALK)
     swarm, _, rng = start(p, [3.0, 1.0])
     away = Box((7.0, 10.0), (8.0, 12.0))
     swarm.change_region(away, lambda x: x[0] + x[1])
@@ -651,23 +657,27 @@ def test_resettle_draws_bats_and_best_into_the_new_region_and_values_them_again(
     epsilon = 2.0 * rng.random((2, 5))[:, 3:] - 1.0
     expected = [away.clamp((np.array(swarm.best_x) + 0.3 * e).tolist()) for e in epsilon]
     assert swarm.ask() == expected
-    swarm.tell([17.0, 7.0 + max(y)])  # not worse than where bat 2 was put
+    swarm.tell([17.0, 7.0 + max(y)])  # not worse than bat 2's clamped position
     assert swarm.best_value == min(17.0, 7.0 + min(y))
 
 
-def test_resettle_leaves_unbounded_bats_where_they_are() -> None:
+def test_change_region_does_not_move_unbounded_bats() -> None:
     swarm, x, _ = start(params(), [3.0, 1.0])
     swarm.change_region(Box((70.0, 70.0), (80.0, 80.0)), lambda x: 5.0)
     assert (swarm.best_x, swarm.best_value) == (x[1].tolist(), 5.0)
 
 
-def test_resettle_has_its_moment() -> None:
+def test_change_region_is_refused_between_ask_and_tell() -> None:
     swarm = BatSwarm(params(), BOX, generator())
     for _ in range(3):
-        with pytest.raises(InputError, match="resettle before tell: tell the values"):
+        with pytest.raises(
+            InputError, match=r"^change_region\(\) before tell\(\): give the values"
+        ):
             swarm.change_region(BOX, sphere)
         swarm.ask()
-        with pytest.raises(InputError, match="resettle before tell: tell the values"):
+        with pytest.raises(
+            InputError, match=r"^change_region\(\) before tell\(\): give the values"
+        ):
             swarm.change_region(BOX, sphere)
         swarm.tell([1.0, 2.0])
         swarm.change_region(BOX, sphere)
@@ -710,7 +720,7 @@ def test_box_takes_lists_and_arrays_of_numbers() -> None:
 
 
 @pytest.mark.parametrize("edge", [5.0, None, ("a", "b"), ([1.0], [2.0])])
-def test_box_refuses_what_is_no_numbers(edge: Any) -> None:
+def test_box_refuses_values_that_are_not_numbers(edge: Any) -> None:
     with pytest.raises(ConfigError, match=r"^box from .*: give d numbers for each$"):
         Box(edge, (3.0, 12.0))
 
@@ -722,7 +732,7 @@ def test_disc_by_hand() -> None:
     assert disc.clamp([1.0, 2.0]) == [1.0, 2.0]
     assert disc.clamp([7.0, 10.0]) == pytest.approx([4.0, 6.0])
     assert disc.clamp([-9.0, 2.0]) == pytest.approx([-4.0, 2.0])
-    assert Disc(1.0).clamp([0.0, -3.0]) == [0.0, -1.0], "at the origin unless told otherwise"
+    assert Disc(1.0).clamp([0.0, -3.0]) == [0.0, -1.0], "centred at the origin by default"
 
 
 # --- refusals -------------------------------------------------------------------------------
@@ -733,7 +743,7 @@ def test_one_bat_is_no_swarm() -> None:
         BatParams(population=1)
 
 
-def test_the_frequencies_are_in_order() -> None:
+def test_f_min_above_f_max_is_refused() -> None:
     assert BatParams(f_min=2.0, f_max=2.0).f_min == 2.0
     with pytest.raises(ConfigError, match=r"^f_min=3: above f_max=2; give f_min <= f_max$"):
         BatParams(f_min=3.0, f_max=2.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The batched engine equals the single one run by run, to the last bit."""
+"""Batched swarms: every run equals the single swarm bit by bit; errors and failures."""
 
 import math
 from dataclasses import replace
@@ -81,23 +81,23 @@ def test_each_run_equals_the_single_engine_bit_by_bit(
 
 
 @pytest.mark.parametrize("a0", [1e-7, 0.3, 2.0, 100.0])
-def test_loud_and_quiet_bats_walk_as_far_as_in_the_single_engine(a0: float) -> None:
+def test_any_loudness_gives_the_same_walk_as_the_single_engine(a0: float) -> None:
     p = BatParams(a0=a0, sigma=0.05 / a0, r0=0.0, iterations=9)
     result = minimize_batch(bowls, BOX, p, generators(4))
     for i, rng in enumerate(generators(4)):
         assert result.best_x[i].tolist() == minimize(bowl, BOX, p, rng).best_x
 
 
-def test_long_runs_in_pieces_are_the_same_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_in_chunks_are_the_same_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     p = BatParams(population=8, iterations=40, f_max=1.5)
-    whole = minimize_batch(bowls, BOX, p, generators(9))
+    unsplit = minimize_batch(bowls, BOX, p, generators(9))
     monkeypatch.setattr(batched_swarms, "CACHED_BATS", 16)  # two runs at once
     monkeypatch.setattr(batched_swarms, "DRAWN", 500)  # six iterations drawn at once
-    pieces = minimize_batch(bowls, BOX, p, generators(9))
+    chunks = minimize_batch(bowls, BOX, p, generators(9))
     for name in ("best_value", "best_x", "history", "failures"):
-        assert np.array_equal(getattr(whole, name), getattr(pieces, name)), name
+        assert np.array_equal(getattr(unsplit, name), getattr(chunks, name)), name
     swarm = minimize(bowl, BOX, p, generators(9)[8])
-    assert (swarm.best_value, swarm.best_x) == (whole.best_value[8], whole.best_x[8].tolist())
+    assert (swarm.best_value, swarm.best_x) == (unsplit.best_value[8], unsplit.best_x[8].tolist())
 
 
 def test_history_falls_to_the_best_value() -> None:
@@ -131,9 +131,9 @@ def test_an_objective_of_the_wrong_shape_is_refused() -> None:
 
 def test_an_objective_that_raises_is_named() -> None:
     def broken(x: np.ndarray) -> np.ndarray:
-        raise ZeroDivisionError("no luck")
+        raise ZeroDivisionError("no value")
 
-    with pytest.raises(InputError, match=r"^objective raised ZeroDivisionError \(no luck\) at"):
+    with pytest.raises(InputError, match=r"^objective raised ZeroDivisionError \(no value\) at"):
         minimize_batch(broken, BOX, BatParams(), generators(2))
 
 

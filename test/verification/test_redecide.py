@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mfba verify of recordings that are not ours: decisions from scratch."""
+"""mfba verify of foreign recordings: the planner decides on their scans and odometry."""
 
 import math
 import re
@@ -37,7 +37,7 @@ def odom(stamp_ns: int, x: float = 0.0) -> Message:
 
 
 def scan(stamp_ns: int, ahead_m: float = math.inf, beams: int = 36) -> Message:
-    """Beam 0 looks along +x."""
+    """A scan whose beam 0 points along +x; all other ranges are inf."""
     message = LaserScan(angle_increment=2.0 * math.pi / beams, range_max=10.0)
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, SECOND)
     message.ranges = [ahead_m] + [math.inf] * (beams - 1)
@@ -72,7 +72,7 @@ def test_each_scan_is_decided_on_the_odometry_of_its_stamp(tmp_path: Path) -> No
     ]  # fmt: skip
 
 
-def test_without_one_of_its_stamp_the_newest_before_counts(tmp_path: Path) -> None:
+def test_without_odometry_of_its_stamp_the_newest_before_is_used(tmp_path: Path) -> None:
     path = bag(
         tmp_path / "bag",
         goal(0, 10.0, 0.0),
@@ -93,7 +93,7 @@ def test_without_one_of_its_stamp_the_newest_before_counts(tmp_path: Path) -> No
     )
 
 
-def test_before_the_goal_the_robot_waits_and_a_new_goal_counts_from_then(tmp_path: Path) -> None:
+def test_a_goal_applies_from_its_log_time(tmp_path: Path) -> None:
     path = bag(
         tmp_path / "bag",
         *(odom(k * TICK_NS) for k in range(1, 5)),
@@ -111,7 +111,7 @@ def test_before_the_goal_the_robot_waits_and_a_new_goal_counts_from_then(tmp_pat
     assert {tick.goal for tick in given.decided} == {(7.0, 7.0)}
 
 
-def test_the_robots_size_and_the_scans_yaw_count(tmp_path: Path) -> None:
+def test_robot_radius_and_scan_yaw_change_the_sectors(tmp_path: Path) -> None:
     path = bag(tmp_path / "bag", goal(0, 10.0, 0.0), odom(TICK_NS), scan(TICK_NS, 1.2))
 
     def bits(**changes: Any) -> list[int]:
@@ -148,7 +148,7 @@ def test_stamps_that_go_back_and_refused_inputs_are_named(tmp_path: Path) -> Non
     assert found.notes == ("2 scans that the sensor refuses",)
 
 
-def test_two_scans_must_be_chosen_from(tmp_path: Path) -> None:
+def test_one_of_two_scan_topics_must_be_named(tmp_path: Path) -> None:
     _, message, time_ns = scan(TICK_NS, 0.9)
     path = bag(
         tmp_path / "bag", goal(0, 9.0, 0.0), odom(TICK_NS), scan(TICK_NS),
@@ -163,34 +163,34 @@ def test_two_scans_must_be_chosen_from(tmp_path: Path) -> None:
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0)
-QUARTER = math.sqrt(0.5)
+SQRT_HALF = math.sqrt(0.5)
 
 
-def transforms(*told: tuple[str, str, tuple[float, ...], tuple[float, float]]) -> bytes:
-    """A TFMessage of (frame, frame in it, quaternion, position); its package is not installed."""
+def tf_message(*transforms: tuple[str, str, tuple[float, ...], tuple[float, float]]) -> bytes:
+    """A TFMessage of (frame, child frame, quaternion, position); its package is not installed."""
     make = {name.rpartition("/")[2]: kind for name, kind in STORE.types.items()}
     message = make["TFMessage"](
         [
             make["TransformStamped"](
-                make["Header"](make["Time"](0, 0), above),
+                make["Header"](make["Time"](0, 0), parent),
                 frame,
-                make["Transform"](make["Vector3"](*at, 0.0), make["Quaternion"](*q)),
+                make["Transform"](make["Vector3"](*position, 0.0), make["Quaternion"](*q)),
             )
-            for above, frame, q, at in told
+            for parent, frame, q, position in transforms
         ]
     )
     return bytes(STORE.serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
 
 
 def bag_with_extrinsics(
-    path: Path, *told: tuple[str, str, tuple[float, ...], tuple[float, float]]
+    path: Path, *transforms: tuple[str, str, tuple[float, ...], tuple[float, float]]
 ) -> Path:
-    """A scan in frame laser with something 0.9 m along its beam 0, odometry of base_link."""
+    """A scan in frame laser with an obstacle at 0.9 m on beam 0, odometry of base_link."""
     with BagReader(FOREIGN) as reader:
         definition = reader.definitions["tf2_msgs/msg/TFMessage"]
     with BagWriter(path) as writer:
         writer.add_topic("/tf_static", "tf2_msgs/msg/TFMessage", definition=definition)
-        writer.write("/tf_static", transforms(*told), 0, 0)
+        writer.write("/tf_static", tf_message(*transforms), 0, 0)
         for name, message, time_ns in (goal(0, 9.0, 0.0), odom(TICK_NS), scan(TICK_NS, 0.9)):
             kind = type_name(type(message))
             if kind.endswith("LaserScan"):
@@ -202,71 +202,74 @@ def bag_with_extrinsics(
     return path
 
 
-LEFT = (0.0, 0.0, QUARTER, QUARTER)  # a quarter counter-clockwise
+LEFT = (0.0, 0.0, SQRT_HALF, SQRT_HALF)  # by 90 degrees counter-clockwise
 LEVEL = (0.0, 0.0, 0.0, 1.0)
-HERE = (0.0, 0.0)
+ORIGIN = (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("told", "yaw"),
+    ("transforms", "yaw"),
     [
-        ([("base_link", "laser", LEVEL, HERE)], 0.0),
-        ([("base_link", "laser", LEFT, HERE)], 0.5),
-        ([("base_link", "laser", tuple(3.0 * x for x in LEFT), HERE)], 0.5),
+        ([("base_link", "laser", LEVEL, ORIGIN)], 0.0),
+        ([("base_link", "laser", LEFT, ORIGIN)], 0.5),
+        ([("base_link", "laser", tuple(3.0 * x for x in LEFT), ORIGIN)], 0.5),
         ([("base_link", "mast", LEFT, (0.2, 0.0)), ("mast", "laser", LEFT, (0.0, 0.1))], 1.0),
-        ([("footprint", "laser", LEFT, HERE), ("footprint", "base_link", LEVEL, HERE)],
+        ([("footprint", "laser", LEFT, ORIGIN), ("footprint", "base_link", LEVEL, ORIGIN)],
          0.5),
-        ([("laser", "base_link", LEFT, HERE)], -0.5),
-        ([("base_link", "laser", LEVEL, HERE), ("base_link", "laser", LEFT, HERE)],
+        ([("laser", "base_link", LEFT, ORIGIN)], -0.5),
+        ([("base_link", "laser", LEVEL, ORIGIN), ("base_link", "laser", LEFT, ORIGIN)],
          0.5),
         # Two lidars one above the other, both upside down: the upper one is level.
-        ([("base_link", "low", UPSIDE_DOWN, HERE), ("low", "laser", UPSIDE_DOWN, HERE)], 0.0),
+        ([("base_link", "low", UPSIDE_DOWN, ORIGIN), ("low", "laser", UPSIDE_DOWN, ORIGIN)], 0.0),
     ],
 )  # fmt: skip
-def test_how_the_lidar_is_mounted_tf_static_says(
-    told: list[Any], yaw: float, tmp_path: Path
+def test_tf_static_gives_the_yaw_of_the_lidar(
+    transforms: list[Any], yaw: float, tmp_path: Path
 ) -> None:
-    """Beam 0 sees something 0.9 m away: in the middle of that sector, once the lidar is turned."""
-    path = bag_with_extrinsics(tmp_path / "bag", *told)
+    """The obstacle on beam 0 is in the sector of the lidar's yaw."""
+    path = bag_with_extrinsics(tmp_path / "bag", *transforms)
     (decided,) = redecide_recording(path, ROBOT).decided
     given = replace(ROBOT, scan_yaw_rad=yaw * math.pi)
     (expected,) = redecide_recording(path, given).decided
     assert any(decided.vs)
     assert decided.vs == expected.vs
     assert decided.ranges_m == pytest.approx(expected.ranges_m, abs=1e-6)
-    (unturned,) = redecide_recording(path, replace(ROBOT, scan_yaw_rad=0.0)).decided
-    assert (decided.vs == unturned.vs) == (yaw == 0.0)
+    (unrotated,) = redecide_recording(path, replace(ROBOT, scan_yaw_rad=0.0)).decided
+    assert (decided.vs == unrotated.vs) == (yaw == 0.0)
 
 
-def test_how_far_the_lidar_is_from_the_middle_is_noted(tmp_path: Path) -> None:
-    told = ("base_link", "mast", LEFT, (0.2, 0.0)), ("mast", "laser", LEFT, (0.15, 0.0))
-    found = redecide_recording(bag_with_extrinsics(tmp_path / "bag", *told), ROBOT)
-    # 0.2 ahead, then 0.15 along what is ahead of the mast: to the left.
-    assert found.notes == (
-        "/tf_static: laser is turned by 3.142 rad in base_link, 0.25 m off its middle: "
-        "--robot-radius must allow for that",
+def test_the_offset_of_the_lidar_is_noted(tmp_path: Path) -> None:
+    transforms = (
+        ("base_link", "mast", LEFT, (0.2, 0.0)),
+        ("mast", "laser", LEFT, (0.15, 0.0)),
     )
-    level = bag_with_extrinsics(tmp_path / "level", ("base_link", "laser", LEVEL, HERE))
+    found = redecide_recording(bag_with_extrinsics(tmp_path / "bag", *transforms), ROBOT)
+    # 0.2 m ahead, then 0.15 m ahead of the mast, which is to the left.
+    assert found.notes == (
+        "/tf_static: laser is rotated by 3.142 rad in base_link, 0.25 m from its origin: "
+        "--robot-radius must include that",
+    )
+    level = bag_with_extrinsics(tmp_path / "level", ("base_link", "laser", LEVEL, ORIGIN))
     assert redecide_recording(level, ROBOT).notes == ()
 
 
 @pytest.mark.parametrize(
-    ("told", "what"),
+    ("transforms", "message"),
     [
-        ([("base_link", "camera", LEVEL, HERE)],
-         "frame 'laser': no /tf_static says how it stands in 'base_link'; give --scan-yaw"),
-        ([("a", "laser", LEVEL, HERE), ("b", "base_link", LEVEL, HERE)], "no /tf_static"),
-        ([("laser", "a", LEVEL, HERE), ("a", "laser", LEVEL, HERE)], "no /tf_static"),
-        ([("base_link", "laser", UPSIDE_DOWN, HERE)], "tilted against 'base_link'"),
-        ([("base_link", "laser", (0.0, 0.1, 0.0, 0.9), HERE)], "tilted against 'base_link'"),
-        ([("base_link", "laser", (0.0, 0.0, 0.0, 0.0), HERE)], "tilted against 'base_link'"),
+        ([("base_link", "camera", LEVEL, ORIGIN)],
+         "frame 'laser': no /tf_static gives its pose in 'base_link'; give --scan-yaw"),
+        ([("a", "laser", LEVEL, ORIGIN), ("b", "base_link", LEVEL, ORIGIN)], "no /tf_static"),
+        ([("laser", "a", LEVEL, ORIGIN), ("a", "laser", LEVEL, ORIGIN)], "no /tf_static"),
+        ([("base_link", "laser", UPSIDE_DOWN, ORIGIN)], "tilted against 'base_link'"),
+        ([("base_link", "laser", (0.0, 0.1, 0.0, 0.9), ORIGIN)], "tilted against 'base_link'"),
+        ([("base_link", "laser", (0.0, 0.0, 0.0, 0.0), ORIGIN)], "tilted against 'base_link'"),
     ],
 )  # fmt: skip
-def test_a_lidar_that_nobody_knows_the_mounting_of_is_refused(
-    told: list[Any], what: str, tmp_path: Path
+def test_a_lidar_with_unknown_extrinsics_is_refused(
+    transforms: list[Any], message: str, tmp_path: Path
 ) -> None:
-    path = bag_with_extrinsics(tmp_path / "bag", *told)
-    with pytest.raises(BagError, match=re.escape(what)):
+    path = bag_with_extrinsics(tmp_path / "bag", *transforms)
+    with pytest.raises(BagError, match=re.escape(message)):
         redecide_recording(path, ROBOT)
     assert cli.main(["verify", str(path), "--scan-yaw", "0.3"]) == 0
 
@@ -275,8 +278,8 @@ def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["verify", str(FOREIGN)]) == 0
     expected = redecide_recording(FOREIGN, ROBOT)
     assert capsys.readouterr().out == (
-        "note: /tf_static: laser is turned by 0 rad in base_link, 0.1 m off its middle: "
-        "--robot-radius must allow for that\n"
+        "note: /tf_static: laser is rotated by 0 rad in base_link, 0.1 m from its origin: "
+        "--robot-radius must include that\n"
         f"modes: obstacle_avoidance 67, path_generation 66\n"
         f"from scratch, 133 decisions, digest {expected.digest}\n"
     )
@@ -317,7 +320,7 @@ def test_without_goal(tmp_path: Path) -> None:
     assert cli.main(["verify", str(path), "--goal", "1", "2"]) == 0
 
 
-def test_a_bag_of_ours_says_all_that_itself(tmp_path: Path) -> None:
+def test_options_are_refused_for_a_bag_of_mfba(tmp_path: Path) -> None:
     ours = record(tmp_path / "ours", "case1", 2)
     with pytest.raises(ConfigError, match=r"--seed: .* says that itself; leave it out"):
         cli.main(["verify", str(ours), "--seed", "3"])

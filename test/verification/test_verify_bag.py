@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mfba verify: an honest bag is identical, and an edited one is caught and named."""
+"""mfba verify: an unedited bag is identical, and every edit is detected and named."""
 
 import math
 import struct
@@ -36,7 +36,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(tmp_path_factory.mktemp("verified") / "bag", "case2", 4)
 
 
-def test_an_honest_bag_is_identical(bag: Path) -> None:
+def test_an_unedited_bag_is_identical(bag: Path) -> None:
     report = verify(bag)
     assert report.is_identical
     assert (report.faults, report.notes) == ((), ())
@@ -88,11 +88,11 @@ def other_bit(bits: str) -> str:
     ("edit", "named"),
     [
         (one_changed("/sectors", 30, flip_range), "tick 30"),
-        (one_changed("/sectors", 30, flip_intensity), "/sectors is not what the decision says"),
-        (one_changed("/sensory_vector", 30, flip_bit), "/sensory_vector is not what"),
+        (one_changed("/sectors", 30, flip_intensity), "/sectors does not match the decision"),
+        (one_changed("/sensory_vector", 30, flip_bit), "/sensory_vector does not match"),
         (one_changed("/odom", 30, nudge_odom), "tick 30"),
-        (one_changed("/goal_step", 30, nudge_pose), "/goal_step is not what the decision says"),
-        (one_changed("/cmd_vel", 30, nudge_twist), "/cmd_vel is not what the decision says"),
+        (one_changed("/goal_step", 30, nudge_pose), "/goal_step does not match the decision"),
+        (one_changed("/cmd_vel", 30, nudge_twist), "/cmd_vel does not match the decision"),
         (one_changed(DECISION, 30, set_field("waypoint", last_bit)), "tick 30"),
         (one_changed(DECISION, 30, set_field("velocity", last_bit)), "tick 30"),
         (one_changed(DECISION, 30, set_field("pose", lambda p: p.replace(",0.0", ",1e-300"))), ""),
@@ -100,14 +100,15 @@ def other_bit(bits: str) -> str:
         (one_changed(DECISION, 30, set_field("vs", other_bit)), "tick 30"),
         (one_changed(DECISION, 30, set_field("vg", other_bit)), "tick 30"),
         (one_changed(DECISION, 30, set_field("gap", lambda gap: str(int(gap) + 1))), "tick 30"),
-        (one_changed(DECISION, 30, set_field("goal", lambda _: "1.0,2.0")), "for a goal that no"),
-        (one_changed(DECISION, 30, set_field("goal", lambda _: "")), "without the goal that was"),
-        (one_changed(DECISION, 30, set_field("mode", lambda _: "flying")), "garbles"),
+        (
+            one_changed(DECISION, 30, set_field("goal", lambda _: "1.0,2.0")),
+            "for a goal that was not in any /goal_pose",
+        ),
+        (one_changed(DECISION, 30, set_field("goal", lambda _: "")), "without the known goal"),
+        (one_changed(DECISION, 30, set_field("mode", lambda _: "flying")), "malformed"),
     ],
 )
-def test_what_was_edited_by_hand_is_named(
-    bag: Path, tmp_path: Path, edit: Edit, named: str
-) -> None:
+def test_an_edited_message_is_named(bag: Path, tmp_path: Path, edit: Edit, named: str) -> None:
     report = verify(rewrite(bag, tmp_path / "edited", edit))
     assert not report.is_identical
     found = list(report.faults)
@@ -116,17 +117,17 @@ def test_what_was_edited_by_hand_is_named(
     assert any(named in text for text in found), found
 
 
-def test_sectors_that_the_obstacles_do_not_make_are_named(bag: Path, tmp_path: Path) -> None:
-    everywhere = one_changed("/obstacles", 30, nudge_obstacle)
-    found = [verify(rewrite(bag, tmp_path / "edited", everywhere))]
-    assert all("is not what the sensor measures" in text for text in found[0].faults)
+def test_sectors_that_do_not_match_the_obstacles_are_named(bag: Path, tmp_path: Path) -> None:
+    moved = one_changed("/obstacles", 30, nudge_obstacle)
+    found = [verify(rewrite(bag, tmp_path / "edited", moved))]
+    assert all("does not match the sensor" in text for text in found[0].faults)
 
 
 def without(topic: str, *indices: int) -> Edit:
     def edit(messages: list[Any]) -> list[Any]:
-        places = [k for k, message in enumerate(messages) if message.topic == topic]
-        gone = {places[index] for index in indices}
-        return [message for k, message in enumerate(messages) if k not in gone]
+        positions = [k for k, message in enumerate(messages) if message.topic == topic]
+        removed = {positions[index] for index in indices}
+        return [message for k, message in enumerate(messages) if k not in removed]
 
     return edit
 
@@ -141,8 +142,8 @@ def without_tick(index: int) -> Edit:
 
 def twice(topic: str, index: int) -> Edit:
     def edit(messages: list[Any]) -> list[Any]:
-        (place,) = [[k for k, m in enumerate(messages) if m.topic == topic][index]]
-        return [*messages[: place + 1], messages[place], *messages[place + 1 :]]
+        position = [k for k, m in enumerate(messages) if m.topic == topic][index]
+        return [*messages[: position + 1], messages[position], *messages[position + 1 :]]
 
     return edit
 
@@ -169,7 +170,7 @@ def test_missing_and_reordered_messages_are_named(
 
 
 def test_a_stamp_between_two_ticks_is_named(bag: Path, tmp_path: Path) -> None:
-    """Of a tick at which no bats flew, as their numbers hang on the stamp."""
+    """For a tick without a swarm, whose random numbers depend on the stamp."""
     ticks = verify(bag).recorded
     stamp = next(t.stamp_ns for t in ticks if t.mode is Mode.OBSTACLE_AVOIDANCE)
 
@@ -181,18 +182,16 @@ def test_a_stamp_between_two_ticks_is_named(bag: Path, tmp_path: Path) -> None:
     report = verify(rewrite(bag, tmp_path / "edited", each_changed(later)))
     assert report.divergence is None
     tick_ns = ticks[1].stamp_ns - ticks[0].stamp_ns
-    assert f"stamp {stamp + 1} ns: no tick of {tick_ns} ns after the last" in report.faults
+    assert f"stamp {stamp + 1} ns: not {tick_ns} ns after the last tick" in report.faults
 
 
-def test_a_repeated_message_is_noted_but_is_no_contradiction(bag: Path, tmp_path: Path) -> None:
+def test_a_repeated_message_is_noted_but_is_no_fault(bag: Path, tmp_path: Path) -> None:
     report = verify(rewrite(bag, tmp_path / "edited", twice("/odom", 20)))
     assert report.is_identical
-    assert report.notes == ("/odom: 1 messages are there once more, all alike",)
+    assert report.notes == ("/odom: 1 repeated messages, all identical",)
 
 
-def test_a_recording_that_was_interrupted_is_checked_as_far_as_it_goes(
-    bag: Path, tmp_path: Path
-) -> None:
+def test_an_interrupted_recording_is_checked_up_to_its_end(bag: Path, tmp_path: Path) -> None:
     def cut(messages: list[Any]) -> list[Any]:
         return messages[: len(messages) // 2]
 
@@ -201,43 +200,43 @@ def test_a_recording_that_was_interrupted_is_checked_as_far_as_it_goes(
     assert 20 < len(report.decided) < 40
 
 
-def test_without_configuration_it_says_so(bag: Path, tmp_path: Path) -> None:
+def test_a_bag_without_configuration_is_refused(bag: Path, tmp_path: Path) -> None:
     plain = rewrite(bag, tmp_path / "plain", list, configure=lambda _: None)
-    with pytest.raises(BagError, match="carries no mfba_planner/configuration"):
+    with pytest.raises(BagError, match="has no mfba_planner/configuration"):
         verify(plain)
 
 
-def test_any_one_bit_on_the_disk_is_noticed(bag: Path, tmp_path: Path) -> None:
+def test_any_flipped_bit_on_the_disk_is_detected(bag: Path, tmp_path: Path) -> None:
     (source,) = bag.glob("*.mcap")
     data = bytearray(source.read_bytes())
     copy = tmp_path / source.name
     rng = np.random.default_rng(1)
-    for place in rng.integers(len(data), size=100).tolist():
+    for offset in rng.integers(len(data), size=100).tolist():
         bit = 1 << int(rng.integers(8))
-        data[place] ^= bit
+        data[offset] ^= bit
         copy.write_bytes(data)
         with pytest.raises(BagError):
             verify(copy)
-        data[place] ^= bit
+        data[offset] ^= bit
     copy.write_bytes(data)
     assert verify(copy).is_identical
 
 
-def test_an_index_that_points_elsewhere_is_named(bag: Path, tmp_path: Path) -> None:
-    """The footer ends in: start of the summary and of its offsets, CRC, eight bytes of magic."""
+def test_an_index_with_a_wrong_offset_is_named(bag: Path, tmp_path: Path) -> None:
+    """The last bytes: start of the summary, of its offsets, CRC, eight bytes of magic."""
     (source,) = bag.glob("*.mcap")
     content = bytearray(source.read_bytes())
-    place = len(content) - 8 - 4 - 8 - 8
-    (start,) = struct.unpack_from("<Q", content, place)
-    struct.pack_into("<Q", content, place, start - 1)
+    offset = len(content) - 8 - 4 - 8 - 8
+    (start,) = struct.unpack_from("<Q", content, offset)
+    struct.pack_into("<Q", content, offset, start - 1)
     path = tmp_path / source.name
     path.write_bytes(content)
     assert check_data(source)
-    with pytest.raises(BagError, match="data section does not end where its index says"):
+    with pytest.raises(BagError, match="data section does not end at the position in its index"):
         check_data(path)
 
 
-def test_the_bag_that_is_checked_is_not_touched(bag: Path) -> None:
+def test_verify_does_not_change_the_bag(bag: Path) -> None:
     before = {path: path.read_bytes() for path in bag.iterdir()}
     verify(bag)
     assert {path: path.read_bytes() for path in bag.iterdir()} == before

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planners of other authors, and ablations of the predictive planner, to compare with."""
+"""Planners for comparison: APF, DWA, ORCA, VFH, straight line, and ablations of our own."""

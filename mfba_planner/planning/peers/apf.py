@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Artificial potential field: pulled by the goal, pushed by what is near (Khatib 1986)."""
+"""Artificial potential field: attracted by the goal, repelled by obstacles (Khatib 1986)."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ...core.geometry import Point
 from ...core.types import Observation
 from ..base_planner import BasePlanner, Move
 from ..mode_transitions import Event
-from ..observed_circles import discs
+from ..observed_circles import circle_rows
 
-REPULSION = 0.3  # of the pull, at the distance where 1/d - 1/SR is 1 per metre
-NEAREST_M = 0.02  # gaps below this push no harder
+REPULSION = 0.3  # relative to the attraction, which has length 1
+NEAREST_M = 0.02  # the repulsion does not grow below this distance
 
 
 class PotentialField(BasePlanner):
-    """Full speed along the sum of the forces; stuck in a minimum, it pushes on at random no more.
+    """Full speed along the sum of the forces; no escape from local minima.
 
     Force: unit vector to the goal, plus REPULSION (1/d - 1/SR) / d^2 away from each enlarged
     edge at distance d < SR.
@@ -30,20 +30,20 @@ class PotentialField(BasePlanner):
         """Follow the force."""
         px, py = obs.pose.position
         gx, gy = goal[0] - px, goal[1] - py
-        left = math.hypot(gx, gy)
-        fx, fy = gx / left, gy / left
-        around = discs(obs)
-        if not around.size:
+        distance_m = math.hypot(gx, gy)
+        fx, fy = gx / distance_m, gy / distance_m
+        rows = circle_rows(obs)
+        if not rows.size:
             velocity = self.straight(obs.pose.position, goal, self.params.speed_mps)
             return Move(velocity=velocity, reason="nothing within SR")
-        away = np.hypot(around[:, 0], around[:, 1])
-        gap = np.maximum(away - around[:, 4], NEAREST_M)
+        away = np.hypot(rows[:, 0], rows[:, 1])
+        gap = np.maximum(away - rows[:, 4], NEAREST_M)
         push = REPULSION * np.maximum(1.0 / gap - 1.0 / self.sensor.sensing_range_m, 0.0)
         push /= gap * gap * np.maximum(away, 1e-9)
-        fx -= float(push @ around[:, 0])
-        fy -= float(push @ around[:, 1])
+        fx -= float(push @ rows[:, 0])
+        fy -= float(push @ rows[:, 1])
         force = math.hypot(fx, fy)
-        reason = f"{len(around)} repelling"
+        reason = f"{len(rows)} repelling"
         if force < 1e-9:
             return Move(velocity=(0.0, 0.0), reason=f"{reason}: forces cancel", event=Event.NO_GAP)
         speed = self.params.speed_mps

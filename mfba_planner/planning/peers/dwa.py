@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dynamic window: sampled velocities, simulated on, the best admissible one (Fox 1997)."""
+"""Dynamic window approach: the best admissible one of sampled velocities (Fox 1997)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...core.geometry import Point
 from ...core.types import NANO, Observation
 from ..base_planner import BasePlanner, Move
 from ..mode_transitions import Event
-from ..observed_circles import discs
+from ..observed_circles import circle_rows
 
 HEADINGS, SPEEDS = 36, (1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0)
 HORIZON_S = 2.0
@@ -20,10 +20,10 @@ NEAREST_M = 0.05  # clearance below which a velocity is admissible only if nothi
 
 
 class DynamicWindow(BasePlanner):
-    """Velocities of an omnidirectional robot, held for HORIZON_S among circles that move on.
+    """Velocities of an omnidirectional robot, held for HORIZON_S, circles at constant velocity.
 
-    The window is the whole disc of speeds: this robot has no limit of acceleration. Objective:
-    PROGRESS times the way gained towards the goal, minus CLEARANCE over the smallest gap.
+    The window is the whole disc of velocities, as this robot has no acceleration limit.
+    Objective: PROGRESS times the approach to the goal, minus CLEARANCE over the smallest gap.
     """
 
     reads_sectors = False
@@ -38,31 +38,35 @@ class DynamicWindow(BasePlanner):
         )
 
     def move(self, obs: Observation, goal: Point) -> Move:
-        """The sample of the best objective."""
+        """The sample with the best objective."""
         ahead = self.straight(obs.pose.position, goal, self.params.speed_mps)
-        around = discs(obs)
-        if not around.size:
+        rows = circle_rows(obs)
+        if not rows.size:
             return Move(velocity=ahead, reason="nothing within SR")
         samples = np.concatenate([self._samples, [ahead]])
-        gap = self.gaps(around, samples)
+        gap = self.gaps(rows, samples)
         gx, gy = goal[0] - obs.pose.x, goal[1] - obs.pose.y
-        left = math.hypot(gx, gy)
-        lasts = max(min(HORIZON_S, left / self.params.speed_mps), self.params.tick_ns * NANO)
-        gained = left - np.hypot(gx - samples[:, 0] * lasts, gy - samples[:, 1] * lasts)
+        distance_m = math.hypot(gx, gy)
+        duration = max(
+            min(HORIZON_S, distance_m / self.params.speed_mps), self.params.tick_ns * NANO
+        )
+        gained = distance_m - np.hypot(
+            gx - samples[:, 0] * duration, gy - samples[:, 1] * duration
+        )
         value = PROGRESS * gained - CLEARANCE / np.maximum(gap, NEAREST_M)
         value[gap < NEAREST_M] = -1e6 + gap[gap < NEAREST_M]
         best = int(value.argmax())
         safe = gap[best] >= NEAREST_M
         return Move(
             velocity=(float(samples[best, 0]), float(samples[best, 1])),
-            reason=f"{len(around)} in range: smallest gap {gap[best]:.2f} m within the horizon",
+            reason=f"{len(rows)} in range: smallest gap {gap[best]:.2f} m within the horizon",
             event=Event.OBSTACLE if safe else Event.NO_GAP,
         )
 
     @staticmethod
-    def gaps(around: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    def gaps(rows: np.ndarray, samples: np.ndarray) -> np.ndarray:
         """Smallest distance to any enlarged edge within the horizon, per sample; (m,), metres."""
-        x, y, vx, vy, radius = around.T[:, :, None]
+        x, y, vx, vy, radius = rows.T[:, :, None]
         wx, wy = vx - samples[:, 0], vy - samples[:, 1]
         t = np.clip(-(x * wx + y * wy) / np.maximum(wx * wx + wy * wy, 1e-12), 0.0, HORIZON_S)
         gap: np.ndarray = (np.hypot(x + t * wx, y + t * wy) - radius).min(axis=0)

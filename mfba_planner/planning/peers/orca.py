@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ORCA through pyrvo: the velocity nearest to the wanted one that avoids all for tau seconds."""
+"""ORCA by pyrvo: the velocity nearest to the preferred one without collision in HORIZON_S."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from ..planner_params import PlannerParams
 
 HORIZON_S = 3.0
 MARGIN_M = 0.06
-# ORCA asks each of two agents for half of the evasion. Obstacles do not do their half: the robot
-# asks again from the velocity it got, until nothing is left to evade.
+# ORCA assigns half of each evasion to either agent, but obstacles do not evade. So the robot runs
+# it again from the resulting velocity, until little evasion is left.
 ROUNDS = 4
 
 
 class Orca(BasePlanner):
-    """One agent among others that keep their velocities; needs known circles."""
+    """One ORCA agent among agents at constant velocity; needs known circles."""
 
     reads_sectors = False
 
@@ -37,11 +37,11 @@ class Orca(BasePlanner):
         super().__init__(params, sensor, seed)
 
     def forget(self) -> None:
-        """Stand still before the first tick."""
+        """Start from velocity 0."""
         self._velocity: Point = (0.0, 0.0)
 
     def move(self, obs: Observation, goal: Point) -> Move:
-        """The velocity of ORCA; InputError where only a scan is known."""
+        """The velocity of ORCA; straight to the goal without circles."""
         wanted = self.straight(obs.pose.position, goal, self.params.speed_mps)
         circles = obs.circles or ()
         if not circles:
@@ -55,23 +55,23 @@ class Orca(BasePlanner):
         px, py = obs.pose.position
         others = []
         for circle in circles:
-            place = (circle.center_m[0] - px, circle.center_m[1] - py)
-            number = simulator.add_agent(place)
+            position = (circle.center_m[0] - px, circle.center_m[1] - py)
+            number = simulator.add_agent(position)
             simulator.set_agent_radius(number, circle.radius_m)
-            simulator.set_agent_max_neighbors(number, 0)  # what they would do is not asked for
-            others.append((number, place, circle.velocity_mps))
+            simulator.set_agent_max_neighbors(number, 0)  # their own evasion is not computed
+            others.append((number, position, circle.velocity_mps))
         velocity = self._velocity
         for _ in range(ROUNDS):
             simulator.set_agent_position(robot, (0.0, 0.0))
             simulator.set_agent_velocity(robot, velocity)
             simulator.set_agent_pref_velocity(robot, wanted)
-            for number, place, keeps in others:
-                simulator.set_agent_position(number, place)
-                simulator.set_agent_velocity(number, keeps)
-                simulator.set_agent_pref_velocity(number, keeps)
+            for number, position, obstacle_velocity in others:
+                simulator.set_agent_position(number, position)
+                simulator.set_agent_velocity(number, obstacle_velocity)
+                simulator.set_agent_pref_velocity(number, obstacle_velocity)
             simulator.do_step()
             velocity = simulator.get_agent_velocity(robot).to_tuple()
-        # Single precision, and the program of last resort, may leave the disc of speeds.
+        # Single precision and ORCA's fallback program may exceed the speed.
         excess = max(1.0, math.hypot(*velocity) / speed)
         velocity = (velocity[0] / excess, velocity[1] / excess)
         self._velocity = velocity

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The straight line to the goal, whatever is in the way: what doing nothing is worth."""
+"""The straight line to the goal, ignoring obstacles: the baseline."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from ..base_planner import BasePlanner, Move
 
 
 class Straight(BasePlanner):
-    """Drives at the goal at full speed."""
+    """Drives straight to the goal at full speed."""
 
     reads_sectors = False
 
     def move(self, obs: Observation, goal: Point) -> Move:
-        """Straight on, never looking."""
+        """Straight to the goal."""
         velocity = self.straight(obs.pose.position, goal, self.params.speed_mps)
         return Move(velocity=velocity, reason="straight to the goal")

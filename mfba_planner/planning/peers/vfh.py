@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A vector field histogram: masked headings, and the free one of least cost (VFH+ 1998)."""
+"""Vector field histogram: the free heading of least cost (VFH+, Ulrich 1998)."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ from ...core.geometry import Point, bearing
 from ...core.types import Observation
 from ..base_planner import BasePlanner, Move
 from ..mode_transitions import Event
-from ..observed_circles import discs
+from ..observed_circles import circle_rows
 
 HEADINGS = 72
-MARGIN_M = 0.3  # added to every circle: it moves while the robot passes
+MARGIN_M = 0.3  # added to every radius, as circles move while the robot passes
 TO_GOAL, TO_LAST = 5.0, 2.0  # weights of the turn away from the goal and from the last heading
 
 
 class VectorFieldHistogram(BasePlanner):
-    """Chooses among free headings; a heading is masked within the tangents of a circle in range.
+    """Chooses among free headings; a heading between the tangents of a circle is masked.
 
-    Circles stand still for it, as in VFH+; cost: TO_GOAL turn to the goal + TO_LAST turn to the
-    heading before.
+    Circles count as at rest, as in VFH+. Cost: TO_GOAL times the turn from the goal's heading,
+    plus TO_LAST times the turn from the last heading.
     """
 
     reads_sectors = False
 
     def forget(self) -> None:
-        """No heading before the first."""
+        """Drop the last heading."""
         self._last: float | None = None
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """Full speed along the cheapest free heading."""
         target = bearing(obs.pose.position, goal)
-        around = discs(obs)
-        if not around.size:
+        rows = circle_rows(obs)
+        if not rows.size:
             self._last = target
             velocity = self.straight(obs.pose.position, goal, self.params.speed_mps)
             return Move(velocity=velocity, reason="nothing within SR")
         headings = np.append(np.arange(HEADINGS) * (2.0 * math.pi / HEADINGS), target)
-        away = np.hypot(around[:, 0], around[:, 1])
-        directions = np.arctan2(around[:, 1], around[:, 0])
-        half = np.arcsin(np.minimum((around[:, 4] + MARGIN_M) / np.maximum(away, 1e-9), 1.0))
+        away = np.hypot(rows[:, 0], rows[:, 1])
+        directions = np.arctan2(rows[:, 1], rows[:, 0])
+        half = np.arcsin(np.minimum((rows[:, 4] + MARGIN_M) / np.maximum(away, 1e-9), 1.0))
         off = np.abs(_turn(headings[:, None], directions))
         masked = (off < half).any(axis=1)
         if masked.all():
