@@ -31,7 +31,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.ros.interface.topics import TICK_QOS
-from mfba_planner.ros.runtime.node_runtime import make_executor
+from mfba_planner.ros.runtime.spin_node import make_executor
 
 HOPS = ("world", "sensor", "planner")
 TICKS = 500

@@ -27,7 +27,7 @@ import rclpy
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.ros.runtime.node_runtime import make_executor
+from mfba_planner.ros.runtime.spin_node import make_executor
 from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 

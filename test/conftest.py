@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures that keep tests apart from each other and from any other ROS graph."""
+"""Fixtures that isolate tests from each other and from any other ROS graph."""
 
 import os
 from collections.abc import Iterator
@@ -15,8 +15,8 @@ settings.load_profile("mfba")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _ros_at_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep discovery on this machine and ROS logs out of the user's home."""
+def _isolated_ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep discovery on this machine and ROS logs out of the home directory."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("ros_log")))
@@ -27,7 +27,7 @@ def _ros_at_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture
 def domain_id() -> Iterator[int]:
-    """Hold a ROS domain of this test's own."""
+    """Claim a ROS domain for one test."""
     domain, lock = claim_domain()
     with lock:
         yield domain
@@ -35,7 +35,7 @@ def domain_id() -> Iterator[int]:
 
 @pytest.fixture
 def ros_context(domain_id: int) -> Iterator[Any]:
-    """Open a fresh rclpy Context in a domain of its own."""
+    """Open a new rclpy Context in a domain of its own."""
     from rclpy.context import Context
 
     context = Context()
@@ -47,7 +47,7 @@ def ros_context(domain_id: int) -> Iterator[Any]:
 
 @pytest.fixture
 def graph(ros_context: Any) -> Iterator[Any]:
-    """Open a Graph: nodes of ours and a probe, on one executor."""
+    """Open a Graph: nodes under test and a probe, on one executor."""
     from ros_graph import Graph
 
     opened = Graph(ros_context)
@@ -57,5 +57,5 @@ def graph(ros_context: Any) -> Iterator[Any]:
 
 @pytest.fixture
 def ros_env(domain_id: int) -> dict[str, str]:
-    """Return the environment for a subprocess in this test's own domain."""
+    """Return the environment for a subprocess in this test's domain."""
     return {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}

@@ -22,7 +22,7 @@ from ..ros.endpoints.robot_namespace import below
 from ..ros.interface import topics
 from ..ros.interface.serialized_message import header_stamp_ns
 from ..ros.interface.topics import Topic
-from ..ros.runtime.node_runtime import GraphNode
+from ..ros.runtime.graph_node import GraphNode
 from ..ros.runtime.polled_subscriptions import PolledSubscriptions
 
 ASK_AGAIN_S = 0.5  # an answer can get lost while client and server still find each other
@@ -99,7 +99,7 @@ class Monitor:
 
     def take_in(self) -> None:
         """Take in the newest of everything, now: the run must not be waited upon."""
-        self._polled.empty()
+        self._polled.poll()
 
     def ask_ready(self, nodes: Iterable[str]) -> dict[str, Question]:
         """A question to ~/ready of each node."""

@@ -18,7 +18,8 @@ from ..ros.nodes.planner import PlannerNode
 from ..ros.nodes.recorder import Recorder
 from ..ros.nodes.virtual_sensor import VirtualSensor
 from ..ros.nodes.world_sim import WorldSim
-from ..ros.runtime.node_runtime import GraphNode, make_executor
+from ..ros.runtime.graph_node import GraphNode
+from ..ros.runtime.spin_node import make_executor
 from ..scenarios.run_config import (
     NODES,
     READY_TIMEOUT_S,
@@ -81,7 +82,7 @@ def run_in_process(
         world: WorldSim = nodes[topics.WORLD_SIM]
         if bag:
             recorder: Recorder = nodes[topics.RECORDER]
-            recorder.explain({name: parameters.values(nodes[name]) for name in wanted})
+            recorder.attach_parameters({name: parameters.values(nodes[name]) for name in wanted})
         _spin(
             executor,
             lambda: not _missing(nodes),

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rclpy side: thin nodes over the planner, and what they exchange and are made of."""
+"""The ROS 2 nodes of the planner, their topics and parameters, and bag replay."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What each node can be told besides the core's parameters; fixed once the node runs.
+"""The nodes' own parameters, besides those of planner and sensor; fixed once a node runs.
 
 No ROS here: the launcher, the documentation and the nodes read the same declarations.
 """
@@ -15,13 +15,13 @@ from ..planning.planner_params import PlannerParams
 from ..simulation.robot_model import Base, Robot
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
-_WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause lets it go"
-_DIAGNOSTICS = "/diagnostics: time between two"
+_WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause (false) starts it"
+_DIAGNOSTICS = "period of /diagnostics"
 _HARDWARE = "hardware_id of /diagnostics, to tell robots apart"
 
 
 class Source(Enum):
-    """What the virtual sensor measures from."""
+    """Which topic the virtual sensor measures from."""
 
     OBSTACLES = "obstacles"
     SCAN = "scan"
@@ -52,22 +52,22 @@ class WorldSimSettings:
         2.0, "lockstep: publish a tick again after this", unit="s", minimum=0.05, maximum=3600.0
     )
     answer_retries: int = option(
-        4, "lockstep: give up after so many repetitions", minimum=0, maximum=1_000_000
+        4, "lockstep: give up after this many repetitions", minimum=0, maximum=1_000_000
     )
     cmd_vel_timeout_s: float = option(
         0.5,
-        "real time: rest after so long without cmd_vel, but no less than a tick; 0: never",
+        "real time: rest after this time without cmd_vel, but not within a tick; 0: never",
         unit="s",
         minimum=0.0,
         maximum=3600.0,
     )
     enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
-    seed: int = option(0, "seed of the instruments' noise", minimum=0, maximum=2**63 - 1)
+    seed: int = option(0, "seed of the sensor noise", minimum=0, maximum=2**63 - 1)
     odom_frame: str = option("odom", "frame of all poses (REP-105)")
     base_frame: str = option("base_link", "frame of the robot (REP-105)")
     scan_frame: str = option("base_scan", "frame of the simulated lidar")
     view_period_s: float = option(
-        0.2, "markers and trail: simulated time between two", unit="s", minimum=0.0, maximum=3600.0
+        0.2, "period of markers and trail, simulated time", unit="s", minimum=0.0, maximum=3600.0
     )
     wait_for: str = option("", _WORLD_WAITS_FOR)
 
@@ -121,13 +121,13 @@ class VirtualSensorSettings:
 class PlannerSettings(Base):
     """Settings of planner; PlannerParams are its parameters too."""
 
-    seed: int = option(0, "seed of all its randomness", minimum=0, maximum=2**63 - 1)
-    lockstep: bool = option(False, "answer pairs of one stamp; false: newest odom, stop on stale")
+    seed: int = option(0, "seed of all random draws", minimum=0, maximum=2**63 - 1)
+    lockstep: bool = option(False, "pair inputs by stamp; false: newest odom, stop on stale")
     enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
     odom_frame: str = option("odom", "frame of all poses (REP-105)")
     base_frame: str = option("base_link", "frame of the robot (REP-105)")
     view_period_s: float = option(
-        0.2, "markers: time between two", unit="s", minimum=0.0, maximum=3600.0
+        0.2, "period of the markers", unit="s", minimum=0.0, maximum=3600.0
     )
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
@@ -152,7 +152,7 @@ class RecorderSettings:
     nodes: str = option("", "nodes whose parameters go into the bag, separated by commas")
     namespaces: str = option("", "fleets: the robots' namespaces, separated by commas")
     sim_time: bool = option(False, "log times are /clock's (as rosbag2 --use-sim-time)")
-    run: str = option("{}", "JSON of whatever else explains the run (driver, versions)")
+    run: str = option("{}", "JSON object with more facts of the run (driver, versions)")
     enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
     wait_for: str = option("", _WAIT_FOR)
 
@@ -163,4 +163,4 @@ class RecorderSettings:
 
 def names(text: str) -> set[str]:
     """Split a comma-separated setting."""
-    return {part.strip() for part in text.split(",") if part.strip()}
+    return {name.strip() for name in text.split(",") if name.strip()}

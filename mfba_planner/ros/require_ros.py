@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Importing this makes sure that ROS 2 can start; ConfigError, with the remedy, otherwise."""
+"""On import: checks that ROS 2 can start; ConfigError, with the remedy, if not."""
 
 import ctypes
 import os
@@ -15,7 +15,7 @@ def _require_ros() -> None:
     name = os.environ.get("RMW_IMPLEMENTATION")
     try:
         if name:
-            # rcl itself would end the process with code 102 while it is being imported.
+            # rcl would exit with code 102 during its import.
             ctypes.CDLL(f"lib{name}.so")
     except OSError as error:
         raise ConfigError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A real graph in real time with somebody on the wires between its nodes, who may tamper."""
+"""A real graph in real time with a relay that may alter or drop the messages between nodes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,13 +16,13 @@ TICK_NS = 100_000_000
 SPEED_FACTOR = 0.25  # slow motion: a busy machine must not look like a fault
 TIMEOUT_S = 0.16  # of simulated time
 
-Tamper = Callable[[Any], Any]  # what becomes of a message; None: it is lost
+Tamper = Callable[[Any], Any]  # returns the altered message; None: it is lost
 
 
-class Wired:
-    """world_sim, virtual_sensor and planner, whose odom, scan and sectors pass through here.
+class RelayedGraph:
+    """world_sim, virtual_sensor and planner, whose odom, scan and sectors pass through a relay.
 
-    The world has no lidar: scan is made here, one per odom, with beams as given.
+    The world has no lidar: the relay adds a scan per odom, with `beams` as its ranges.
     """
 
     def __init__(self, graph: Graph, scenario: str, **planner: Any) -> None:
@@ -33,7 +33,7 @@ class Wired:
         self.decisions = graph.hear(topics.DECISION)
         self._diagnostics = graph.hear(topics.DIAGNOSTICS)
         self.cmd_vel = graph.hear(topics.CMD_VEL)
-        self._wires = {
+        self._relayed = {
             topic.name: graph.probe.create_publisher(
                 topic.type, f"tampered/{topic.name}", topic.qos
             )
@@ -56,52 +56,52 @@ class Wired:
             | planner,
             cli_args=_remapped("odom", "sectors"),
         )
-        told = {"scenario": scenario, "tick_ns": TICK_NS, "speed_factor": SPEED_FACTOR}
-        self.world = graph.start(WorldSim, told | {"cmd_vel_timeout_s": 0.2 / SPEED_FACTOR})
+        parameters = {"scenario": scenario, "tick_ns": TICK_NS, "speed_factor": SPEED_FACTOR}
+        self.world = graph.start(WorldSim, parameters | {"cmd_vel_timeout_s": 0.2 / SPEED_FACTOR})
 
     def _on_odom(self, message: Any) -> None:
-        self._pass_on("odom", message)
+        self._relay("odom", message)
         scan = topics.SCAN.type()
         scan.header.stamp = message.header.stamp
         scan.header.frame_id = "base_link"
         scan.angle_min, scan.angle_increment = 0.0, 6.283185307179586 / len(self.beams)
         scan.range_min, scan.range_max, scan.ranges = 0.05, 10.0, self.beams
-        self._pass_on("scan", scan)
+        self._relay("scan", scan)
 
     def _on_sectors(self, message: Any) -> None:
-        self._pass_on("sectors", message)
+        self._relay("sectors", message)
 
-    def _pass_on(self, name: str, message: Any) -> None:
-        told = self.tamper.get(name, lambda same: same)(message)
-        if told is not None:
-            self._wires[name].publish(told)
+    def _relay(self, name: str, message: Any) -> None:
+        altered = self.tamper.get(name, lambda same: same)(message)
+        if altered is not None:
+            self._relayed[name].publish(altered)
 
     def is_moving(self) -> bool:
-        """Whether the last two odometry messages are of two places."""
-        return len(self.odom) > 1 and _place(self.odom[-1]) != _place(self.odom[-2])
+        """Whether the last two odometry messages differ in position."""
+        return len(self.odom) > 1 and _position(self.odom[-1]) != _position(self.odom[-2])
 
     def drive(self) -> int:
-        """Wait until the robot is under way; return the stamp of the newest odometry."""
+        """Wait until the robot moves; return the stamp of the newest odometry."""
         self.graph.until(lambda: len(self.odom) > 3 and self.is_moving(), timeout_s=20.0)
         return stamp_ns(self.odom[-1].header.stamp)
 
     def rest_after(self, since_ns: int) -> float:
-        """Wait until the robot rests for three ticks; seconds it moved on after a stamp."""
+        """Wait until the robot rests for three ticks; seconds it moved after a stamp."""
         self.graph.until(lambda: self._rested(since_ns) is not None, timeout_s=20.0)
         return (self._rested(since_ns) or 0) * 1e-9
 
     def _rested(self, since_ns: int) -> int | None:
         after = [m for m in self.odom if stamp_ns(m.header.stamp) >= since_ns]
         for k in range(len(after) - 3):
-            if len({_place(m) for m in after[k : k + 4]}) == 1:
+            if len({_position(m) for m in after[k : k + 4]}) == 1:
                 return stamp_ns(after[k].header.stamp) - since_ns
         return None
 
     def diagnostics(self, node: str = "planner") -> list[Any]:
-        """What a node has said on /diagnostics."""
+        """The messages of a node on /diagnostics."""
         return [m for m in self._diagnostics if m.status[0].name.startswith(f"{node}: ")]
 
-    def told(self, name: str, node: str = "planner") -> Any:
+    def status(self, name: str, node: str = "planner") -> Any:
         """A node's newest status of this name."""
         newest = self.diagnostics(node)[-1].status
         return next(status for status in newest if status.name == f"{node}: {name}")
@@ -112,6 +112,6 @@ def _remapped(*names: str) -> list[str]:
     return ["--ros-args", *rules]
 
 
-def _place(odom: Any) -> tuple[float, float]:
+def _position(odom: Any) -> tuple[float, float]:
     p = odom.pose.pose.position
     return (p.x, p.y)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A planner, what it is given and what it answers, for tests that talk to it by hand."""
+"""A planner node with its inputs published by hand and its outputs collected, for tests."""
 
 import math
 from typing import Any
@@ -35,8 +35,8 @@ def goal(x: float, y: float) -> PoseStamped:
     return pose_stamped_msg((x, y), 1, "odom")
 
 
-class Talk:
-    """A planner, what it is given and what it answers."""
+class PlannerHarness:
+    """A planner node, publishers of its inputs and lists of its outputs."""
 
     def __init__(
         self, graph: Graph, parameters: dict[str, Any], at: tuple[float, float] | None = GOAL
@@ -48,7 +48,7 @@ class Talk:
         self.waypoints = graph.writer(topics.WAYPOINTS)
         self.decisions = graph.hear(topics.DECISION)
         self.plans = graph.hear(topics.PLAN)
-        self.steps = graph.hear(topics.GOAL_STEP)
+        self.goal_steps = graph.hear(topics.GOAL_STEP)
         stamped = parameters.get("enable_stamped_cmd_vel")
         self.cmd_vel = graph.hear(topics.CMD_VEL, TwistStamped if stamped else None)
         if at:
@@ -57,8 +57,8 @@ class Talk:
         if at:
             graph.until(lambda: self.node.goals.goal_queue.goal is not None)
 
-    def answers(self, *messages: Any) -> list[Any]:
-        """Publish in this order and return the decisions that come of it."""
+    def decide_all(self, *messages: Any) -> list[Any]:
+        """Publish the messages one after another; return the decisions that follow."""
         count, twists = len(self.decisions), len(self.cmd_vel)
         writers: dict[Any, Any] = {Odometry: self.odom, LaserScan: self.sectors}
         writers |= {PoseStamped: self.goal, Path: self.waypoints}
@@ -67,12 +67,13 @@ class Talk:
             if isinstance(message, PoseStamped | Path):
                 self.graph.settle()
         self.graph.settle()
-        given = self.decisions[count:]
-        assert len(self.cmd_vel) - twists == len(given), "each decision has its Twist"
-        return given
+        decisions = self.decisions[count:]
+        assert len(self.cmd_vel) - twists == len(decisions), "each decision has its Twist"
+        return decisions
 
-    def answer(self, *messages: Any) -> Any:
-        (only,) = self.answers(*messages)
+    def decide(self, *messages: Any) -> Any:
+        """As decide_all, where one decision follows."""
+        (only,) = self.decide_all(*messages)
         return only
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Real nodes and a probe on one executor, over real DDS, for tests that talk to nodes."""
+"""Real nodes and a probe node on one executor, over real DDS, for tests."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -13,14 +13,15 @@ from rclpy.qos import QoSProfile
 from waiting import spin_until
 
 from mfba_planner.ros.interface.topics import Topic
-from mfba_planner.ros.runtime.node_runtime import GraphNode, make_executor
+from mfba_planner.ros.runtime.graph_node import GraphNode
+from mfba_planner.ros.runtime.spin_node import make_executor
 
 N = TypeVar("N", bound=GraphNode)
-SETTLE_TURNS = 40  # delivery within a process is synchronous: two turns bring one message
+SETTLE_SPINS = 40  # delivery within a process is synchronous: two spins deliver one message
 
 
 class Graph:
-    """A context with nodes of ours, and one that publishes, listens and calls."""
+    """A context with nodes under test, and a probe that publishes, subscribes and calls."""
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -29,16 +30,16 @@ class Graph:
         self.executor.add_node(self.probe)
         self.nodes: list[GraphNode] = []
 
-    def start(self, kind: type[N], /, parameters: dict[str, Any], **options: Any) -> N:
-        """Make a node with these parameters and spin it from now on."""
+    def start(self, node_type: type[N], /, parameters: dict[str, Any], **options: Any) -> N:
+        """Construct a node with these parameters and add it to the executor."""
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-        node = kind(context=self.context, parameter_overrides=overrides, **options)
+        node = node_type(context=self.context, parameter_overrides=overrides, **options)
         self.executor.add_node(node)
         self.nodes.append(node)
         return node
 
     def stop(self, node: GraphNode) -> None:
-        """End a node as its process would."""
+        """Close and destroy a node as its process would."""
         self.nodes.remove(node)
         self.executor.remove_node(node)
         node.close()
@@ -50,49 +51,55 @@ class Graph:
         self.executor.shutdown()
         self.probe.destroy_node()
 
-    def writer(self, topic: Topic, kind: Any = None, qos: QoSProfile | None = None) -> Publisher:
-        """A publisher of the probe's, matched with its readers as all is in one process."""
-        return self.probe.create_publisher(kind or topic.type, topic.name, qos or topic.qos)
-
-    def hear(self, topic: Topic, kind: Any = None, qos: QoSProfile | None = None) -> list[Any]:
-        """A list that fills with the messages of a topic."""
-        heard: list[Any] = []
-        self.probe.create_subscription(
-            kind or topic.type, topic.name, heard.append, qos or topic.qos
+    def writer(
+        self, topic: Topic, message_type: Any = None, qos: QoSProfile | None = None
+    ) -> Publisher:
+        """A publisher of the probe, matched at once as all nodes are in one process."""
+        return self.probe.create_publisher(
+            message_type or topic.type, topic.name, qos or topic.qos
         )
-        return heard
+
+    def hear(
+        self, topic: Topic, message_type: Any = None, qos: QoSProfile | None = None
+    ) -> list[Any]:
+        """A list that fills with the messages of a topic."""
+        received: list[Any] = []
+        self.probe.create_subscription(
+            message_type or topic.type, topic.name, received.append, qos or topic.qos
+        )
+        return received
 
     def hear_when(self, *topics: Topic) -> list[tuple[int, str]]:
-        """A list of (time it was published, name) for the messages of several topics."""
-        heard: list[tuple[int, str]] = []
+        """A list of (publication time, topic name) for the messages of several topics."""
+        received: list[tuple[int, str]] = []
 
-        def note(name: str) -> Any:
-            return lambda _, info: heard.append((info["source_timestamp"], name))
+        def callback(name: str) -> Any:
+            return lambda _, info: received.append((info["source_timestamp"], name))
 
         for topic in topics:
-            self.probe.create_subscription(topic.type, topic.name, note(topic.name), topic.qos)
-        return heard
+            self.probe.create_subscription(topic.type, topic.name, callback(topic.name), topic.qos)
+        return received
 
     def until(self, condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
-        """Spin everything until a fact holds."""
+        """Spin all nodes until a condition holds."""
         spin_until(self.executor, condition, timeout_s)
 
     def settle(self) -> None:
-        """Let everything that is under way arrive and be answered."""
-        for _ in range(SETTLE_TURNS):
+        """Spin until all messages are delivered and their callbacks have run."""
+        for _ in range(SETTLE_SPINS):
             self.executor.spin_once(timeout_sec=0.0)
 
-    def call(self, kind: Any, name: str, request: Any = None) -> Any:
+    def call(self, service_type: Any, name: str, request: Any = None) -> Any:
         """Call a service and return its response."""
-        client = self.probe.create_client(kind, name)
+        client = self.probe.create_client(service_type, name)
         self.until(client.service_is_ready)
-        future = client.call_async(request or kind.Request())
+        future = client.call_async(request or service_type.Request())
         self.until(future.done)
         self.probe.destroy_client(client)
         return future.result()
 
     def parameters(self, node: str, names: list[str]) -> list[Any]:
-        """Values of a node's parameters, asked of its service."""
+        """Values of a node's parameters, from its service."""
         client = AsyncParameterClient(self.probe, node)
         self.until(client.services_are_ready)
         future = client.get_parameters(names)
@@ -100,7 +107,7 @@ class Graph:
         return [parameter_value_to_python(value) for value in future.result().values]
 
     def set_parameter(self, node: str, name: str, value: Any) -> str:
-        """Set one parameter of a node over its service; why it was refused, or empty."""
+        """Set one parameter of a node through its service; the refusal's reason, or empty."""
         client = AsyncParameterClient(self.probe, node)
         self.until(client.services_are_ready)
         future = client.set_parameters([Parameter(name, value=value)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What several test files share: waiting for facts, and domains nobody else uses."""
+"""Waiting for a condition, and ROS domains that no other test uses."""
 
 import time
 from collections.abc import Callable
@@ -15,12 +15,12 @@ def spin_until(executor: Any, condition: Callable[[], bool], timeout_s: float = 
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
-    """Wait for a fact that no executor brings: a file, a process; AssertionError likewise."""
+    """Wait for a condition without an executor (a file, a process); AssertionError likewise."""
     _until(condition, timeout_s, lambda: time.sleep(0.005))
 
 
-def _until(condition: Callable[[], bool], timeout_s: float, turn: Callable[[], None]) -> None:
+def _until(condition: Callable[[], bool], timeout_s: float, step: Callable[[], None]) -> None:
     deadline = time.monotonic() + timeout_s
     while not condition():
-        assert time.monotonic() < deadline, f"not so after {timeout_s} s: {condition}"
-        turn()
+        assert time.monotonic() < deadline, f"not true after {timeout_s} s: {condition}"
+        step()

@@ -215,7 +215,7 @@ def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph)
     left_at = world.world.tick
     second = graph.start(PlannerNode, told["planner"])
     run_to_the_end(graph, world)
-    assert second._refusals.count == 0
+    assert second._refused_inputs.count == 0
     expected = run_episode.run(load_scenario("case2"), seed=7).ticks
     assert left_at < len(expected) - 5, "it was restarted too late to say anything"
     assert [stamp_ns(message.header.stamp) for message in decisions] == [

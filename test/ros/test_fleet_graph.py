@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""world_sim of a fleet as others see it: one tick for all, over when the last has answered."""
+"""world_sim with a fleet: one tick for all, which ends when all commands are received."""
 
 from dataclasses import replace
 from typing import Any
@@ -36,27 +36,27 @@ PAIR = Scenario(
 
 
 class Pair:
-    """A world of two robots, and somebody who answers for both by hand."""
+    """A world of two robots whose commands are published by hand."""
 
     def __init__(self, graph: Graph, **parameters: Any) -> None:
         self.graph = graph
         self.clock = graph.hear(topics.CLOCK)
         self.odom = {name: graph.hear(below(name, topics.ODOM)) for name in "ab"}
-        self.seen = {name: graph.hear(below(name, topics.OBSTACLES)) for name in "ab"}
+        self.obstacles = {name: graph.hear(below(name, topics.OBSTACLES)) for name in "ab"}
         self.ends = {name: graph.hear(below(name, topics.OUTCOME)) for name in "ab"}
-        self.steps = {name: graph.writer(below(name, topics.GOAL_STEP)) for name in "ab"}
+        self.goal_steps = {name: graph.writer(below(name, topics.GOAL_STEP)) for name in "ab"}
         self.twists = {name: graph.writer(below(name, topics.CMD_VEL)) for name in "ab"}
-        told = {"lockstep": True, "answer_timeout_s": 60.0, "scenario": scenario_to_json(PAIR)}
-        self.world = graph.start(WorldSim, {**told, **parameters})
+        defaults = {"lockstep": True, "answer_timeout_s": 60.0, "scenario": scenario_to_json(PAIR)}
+        self.world = graph.start(WorldSim, {**defaults, **parameters})
         graph.until(lambda: all(self.odom.values()))
 
-    def answer(self, name: str, vx: float, vy: float = 0.0) -> None:
+    def command(self, name: str, vx: float, vy: float = 0.0) -> None:
         stamp = stamp_ns(self.odom[name][-1].header.stamp)
-        self.steps[name].publish(pose_stamped_msg((0.0, 0.0), stamp, "odom"))
+        self.goal_steps[name].publish(pose_stamped_msg((0.0, 0.0), stamp, "odom"))
         self.twists[name].publish(Twist(linear=Vector3(x=vx, y=vy)))
 
     def until_tick(self, count: int) -> None:
-        """Wait until robot a was asked so often, and for what goes with it."""
+        """Wait for this many ticks of robot a, and for all messages of them."""
         self.graph.until(lambda: len(self.odom["a"]) == count)
         self.graph.settle()
 
@@ -64,86 +64,86 @@ class Pair:
         return [stamp_ns(message.header.stamp) for message in self.odom[name]]
 
 
-def test_a_tick_is_over_when_the_last_has_answered(graph: Graph) -> None:
+def test_a_tick_ends_when_all_commands_are_received(graph: Graph) -> None:
     pair = Pair(graph)
-    pair.answer("b", 0.1)
+    pair.command("b", 0.1)
     graph.settle()
-    pair.answer("b", 0.7)  # said twice: the first counts
+    pair.command("b", 0.7)  # sent twice: the first counts
     graph.settle()
     assert pair.stamps("a") == pair.stamps("b") == [TICK_NS]
-    pair.answer("a", 0.5, -0.25)
+    pair.command("a", 0.5, -0.25)
     pair.until_tick(2)
     assert pair.stamps("a") == pair.stamps("b") == [TICK_NS, 2 * TICK_NS]
     assert len(pair.clock) == 2
     a, b = (robot_pose(pair.odom[name][-1]).position for name in "ab")
     assert a == (0.5 * TICK_S, -0.25 * TICK_S)
     assert b == (0.1 * TICK_S, 3.0)
-    assert obstacle_centers(pair.seen["a"][-1]) == [STONE.center_m, b]
-    assert obstacle_centers(pair.seen["b"][-1]) == [STONE.center_m, a]
+    assert obstacle_centers(pair.obstacles["a"][-1]) == [STONE.center_m, b]
+    assert obstacle_centers(pair.obstacles["b"][-1]) == [STONE.center_m, a]
     assert pair.odom["a"][-1].child_frame_id == "a/base_link"
 
 
-def test_who_has_arrived_is_asked_once_more_and_then_left_alone(graph: Graph) -> None:
+def test_a_robot_that_has_arrived_gets_one_more_tick_and_then_none(graph: Graph) -> None:
     pair = Pair(graph)
-    pair.answer("a", 0.0)
-    pair.answer("b", 0.3 / TICK_S)
+    pair.command("a", 0.0)
+    pair.command("b", 0.3 / TICK_S)
     pair.until_tick(2)
     assert pair.ends["b"][-1].message == "running"
-    pair.answer("a", 0.0)
+    pair.command("a", 0.0)
     graph.settle()
-    assert len(pair.odom["a"]) == 2  # b has to say that it has arrived
-    pair.answer("b", 0.0)
+    assert len(pair.odom["a"]) == 2  # b has to command its last tick
+    pair.command("b", 0.0)
     pair.until_tick(3)
     assert pair.ends["b"][-1].message == "goal_reached"
-    pair.answer("a", 9.0 / TICK_S)
+    pair.command("a", 9.0 / TICK_S)
     pair.until_tick(4)
     assert len(pair.odom["b"]) == 2
-    assert obstacle_centers(pair.seen["a"][-1])[1] == pytest.approx((0.3, 3.0))
-    pair.answer("a", 0.0)
+    assert obstacle_centers(pair.obstacles["a"][-1])[1] == pytest.approx((0.3, 3.0))
+    pair.command("a", 0.0)
     graph.until(lambda: pair.world.over)
     graph.settle()
     assert pair.ends["a"][-1].message == "goal_reached"
 
 
-def test_only_who_is_silent_is_asked_again_and_not_for_ever(graph: Graph) -> None:
+def test_a_tick_is_repeated_for_the_robot_without_command_and_not_for_ever(graph: Graph) -> None:
     pair = Pair(graph, answer_timeout_s=0.05, answer_retries=2)
-    pair.answer("a", 0.1)
+    pair.command("a", 0.1)
     with pytest.raises(GraphError, match="published 3 times"):
         graph.until(lambda: False)
     assert pair.stamps("a")[0] == TICK_NS
     assert pair.stamps("b") == [TICK_NS] * 3
 
 
-def test_a_twist_that_is_none_stops_its_robot_alone(graph: Graph) -> None:
+def test_a_refused_twist_stops_only_its_robot(graph: Graph) -> None:
     pair = Pair(graph)
-    pair.answer("a", float("nan"))
-    pair.answer("b", 0.2)
+    pair.command("a", float("nan"))
+    pair.command("b", 0.2)
     pair.until_tick(2)
     a, b = (robot_pose(pair.odom[name][-1]).position for name in "ab")
     assert a == (0.0, 0.0)
     assert b == (0.2 * TICK_S, 3.0)
 
 
-def test_what_a_fleet_cannot_be_told(graph: Graph) -> None:
+def test_a_fleet_cannot_run_on(graph: Graph) -> None:
     with pytest.raises(ConfigError, match="run_on=True: a fleet's run ends; give false"):
         graph.start(WorldSim, {"scenario": scenario_to_json(PAIR), "run_on": True})
 
 
-def test_a_fleet_pauses_steps_and_begins_again_as_one_robot_does(graph: Graph) -> None:
+def test_a_fleet_can_be_paused_stepped_and_reset(graph: Graph) -> None:
     pair = Pair(graph, start_paused=False)
 
-    def answer() -> None:
-        pair.answer("a", 0.5)
-        pair.answer("b", 0.1)
+    def command_both() -> None:
+        pair.command("a", 0.5)
+        pair.command("b", 0.1)
 
     assert graph.call(SetBool, "world_sim/pause", SetBool.Request(data=True)).success
-    answer()
+    command_both()
     graph.settle()
     assert pair.stamps("a") == pair.stamps("b") == [TICK_NS]
     assert graph.call(Trigger, "world_sim/step").message == "tick 1"
     pair.until_tick(2)
-    assert not graph.call(Trigger, "world_sim/step").success  # unanswered
-    answer()
+    assert not graph.call(Trigger, "world_sim/step").success  # no command yet
+    command_both()
     graph.settle()
     assert len(pair.odom["a"]) == 2
     assert graph.call(Trigger, "world_sim/reset").message == f"tick 0 at stamp {3 * TICK_NS} ns"
@@ -153,11 +153,11 @@ def test_a_fleet_pauses_steps_and_begins_again_as_one_robot_does(graph: Graph) -
     assert robot_pose(pair.odom["b"][-1]).position == (0.0, 3.0)
 
 
-def test_in_real_time_ticks_are_everybody_s_until_the_last_has_arrived(graph: Graph) -> None:
+def test_in_real_time_all_robots_tick_until_the_last_has_arrived(graph: Graph) -> None:
     a, b = PAIR.robots
     near = replace(PAIR, goal_m=(1.0, 0.0), robots=(replace(a, goal_m=(1.0, 0.0)), b))
-    told = {"lockstep": False, "speed_factor": 4.0, "scenario": scenario_to_json(near)}
-    pair = Pair(graph, cmd_vel_timeout_s=0.0, **told)
+    parameters = {"lockstep": False, "speed_factor": 4.0, "scenario": scenario_to_json(near)}
+    pair = Pair(graph, cmd_vel_timeout_s=0.0, **parameters)
     pair.twists["b"].publish(Twist(linear=Vector3(x=0.29 / TICK_S)))
     graph.until(lambda: pair.ends["b"][-1].message == "goal_reached")
     ended = len(pair.odom["b"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The graph as others discover it: names, types, QoS, services, parameters, and namespaces."""
+"""The graph as ROS tools discover it: names, types, QoS, services, parameters, namespaces."""
 
 from collections import Counter
 from typing import Any
@@ -20,7 +20,7 @@ from mfba_planner.scenarios.run_config import NODES, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.run_episode import run
 
-# The table of the design: name, type, who writes, who reads (besides the recorder), latched.
+# The topics: name, type, writers, readers (besides the recorder), latched.
 TABLE = [
     ("/clock", "rosgraph_msgs/msg/Clock", ["world_sim"], [], False),
     ("/odom", "nav_msgs/msg/Odometry", ["world_sim"], ["virtual_sensor", "planner"], False),
@@ -44,12 +44,12 @@ TABLE = [
     ("/outcome", "diagnostic_msgs/msg/DiagnosticStatus", ["world_sim"], [], True),
     ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", [], ["world_sim"], False),
     ("/markers", "visualization_msgs/msg/MarkerArray", ["planner", "world_sim"], [], False),
-    # Only the recorder asks for these: the paper's robot has no lidar and its odometry never errs.
+    # Only the recorder subscribes: the paper's robot has neither a lidar nor odometry noise.
     ("/scan", "sensor_msgs/msg/LaserScan", [], [], False),
     ("/ground_truth", "nav_msgs/msg/Odometry", [], [], False),
 ]
 RCLPYS_OWN = {"/parameter_events", "/rosout", "/planner/transition_event"}
-ONE_FOR_ALL = {"/clock", "/diagnostics"}  # time and health are the whole site's
+ABSOLUTE = {"/clock", "/diagnostics"}  # shared by all namespaces
 SERVICES = {
     "/world_sim/pause": "std_srvs/srv/SetBool",
     "/world_sim/step": "std_srvs/srv/Trigger",
@@ -66,7 +66,7 @@ SERVICES = {
 
 def start_all(graph: Graph, bag: Any, **options: Any) -> dict[str, Any]:
     """The graph as the launcher starts it, for case study 1."""
-    told = node_parameters(RunConfig(scenario=load_scenario("case1")), (*NODES, "recorder"))
+    parameters = node_parameters(RunConfig(scenario=load_scenario("case1")), (*NODES, "recorder"))
     recorder = {"output": str(bag), "sim_time": True, "nodes": ",".join(NODES)}
     kinds: dict[str, Any] = {
         "recorder": Recorder,
@@ -74,8 +74,8 @@ def start_all(graph: Graph, bag: Any, **options: Any) -> dict[str, Any]:
         "virtual_sensor": VirtualSensor,
         "planner": PlannerNode,
     }
-    told["recorder"] = recorder
-    return {name: graph.start(kind, told[name], **options) for name, kind in kinds.items()}
+    parameters["recorder"] = recorder
+    return {name: graph.start(kind, parameters[name], **options) for name, kind in kinds.items()}
 
 
 @pytest.fixture
@@ -117,7 +117,7 @@ def test_writers_readers_and_qos(
         assert ReliabilityPolicy.RELIABLE in reliability
 
 
-def test_in_lockstep_what_every_tick_brings_is_read_once(
+def test_in_lockstep_topics_of_every_tick_have_one_subscription_per_reader(
     graph: Graph, nodes: dict[str, Any]
 ) -> None:
     for topic in topics.GRAPH:
@@ -154,29 +154,29 @@ def test_every_parameter_has_a_description_and_a_number_has_a_range(
                 assert len(descriptor.integer_range) == 1, name
 
 
-def test_a_node_is_ready_when_all_who_listen_to_it_are_there(graph: Graph, tmp_path: Any) -> None:
-    told = node_parameters(RunConfig(scenario=load_scenario("case1")), (*NODES, "recorder"))
-    graph.start(WorldSim, told["world_sim"])
+def test_a_node_is_ready_when_all_its_subscribers_are_there(graph: Graph, tmp_path: Any) -> None:
+    parameters = node_parameters(RunConfig(scenario=load_scenario("case1")), (*NODES, "recorder"))
+    graph.start(WorldSim, parameters["world_sim"])
     response = graph.call(Trigger, "world_sim/ready")
     assert not response.success
     assert response.message == "/clock waits for recorder"
     recorder = graph.start(Recorder, {"output": str(tmp_path / "bag")})
     message = ""
 
-    def says(text: str) -> bool:
+    def reports(text: str) -> bool:
         nonlocal message
         message = graph.call(Trigger, "world_sim/ready").message
         return message == text
 
-    graph.until(lambda: says("odom waits for planner, virtual_sensor"))
-    graph.start(VirtualSensor, told["virtual_sensor"])
-    graph.until(lambda: says("odom waits for planner"))
-    graph.start(PlannerNode, told["planner"])
-    graph.until(lambda: says(""))
+    graph.until(lambda: reports("odom waits for planner, virtual_sensor"))
+    graph.start(VirtualSensor, parameters["virtual_sensor"])
+    graph.until(lambda: reports("odom waits for planner"))
+    graph.start(PlannerNode, parameters["planner"])
+    graph.until(lambda: reports(""))
     assert graph.call(Trigger, "world_sim/ready").success
     graph.until(lambda: graph.call(Trigger, "planner/ready").success)
     graph.stop(recorder)
-    graph.until(lambda: says("/clock waits for recorder"))
+    graph.until(lambda: reports("/clock waits for recorder"))
 
 
 def test_a_planner_without_goal_is_not_ready(graph: Graph) -> None:
@@ -190,7 +190,7 @@ def test_everything_works_in_a_namespace(graph: Graph, tmp_path: Any) -> None:
     found = dict(graph.probe.get_topic_names_and_types())
     own = {*RCLPYS_OWN, "/robot1/planner/transition_event"}
     ours = {name: kinds for name, kinds in found.items() if name not in own}
-    assert set(ours) == {n if n in ONE_FOR_ALL else f"/robot1{n}" for n, *_ in TABLE}
+    assert set(ours) == {n if n in ABSOLUTE else f"/robot1{n}" for n, *_ in TABLE}
     world = nodes["world_sim"]
     world.resume()
     graph.until(lambda: world.over, timeout_s=60.0)
@@ -200,7 +200,7 @@ def test_everything_works_in_a_namespace(graph: Graph, tmp_path: Any) -> None:
 
 
 def test_topics_can_be_remapped(graph: Graph) -> None:
-    """To the names of a robot that was there before."""
+    """To the topic names of an existing robot."""
     odom: list[Any] = []
     graph.probe.create_subscription(topics.ODOM.type, "/base/pose", odom.append, topics.TICK_QOS)
     cmd_vel = graph.probe.create_publisher(topics.CMD_VEL.type, "/base/go", topics.TICK_QOS)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rates, ages, levels, orders and the deadman: what needs no ROS to be checked."""
+"""Input health, goal queue and command timeout, without ROS."""
 
 import pytest
 
 from mfba_planner.planning.recovery import Phase
-from mfba_planner.ros.interface.health import Health, InputRate, Level, driving
+from mfba_planner.ros.interface.health import InputHealth, InputRate, Level, driving_status
 from mfba_planner.ros.node_parameters import WorldSimSettings
 from mfba_planner.ros.runtime.command_timeout import CommandTimeout
 from mfba_planner.ros.runtime.goal_queue import GoalQueue
-from mfba_planner.ros.runtime.stale_inputs import watch_period_s
+from mfba_planner.ros.runtime.planner_inputs import watch_period_s
 
 
-def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
+def test_a_rate_is_that_of_the_last_messages_and_falls_without_any() -> None:
     rate = InputRate()
     assert (rate.age_s(5.0), rate.rate_hz(5.0)) == (None, 0.0)
     for k in range(100):
@@ -20,74 +20,74 @@ def test_a_rate_is_that_of_late_and_falls_in_silence() -> None:
     assert round(rate.age_s(10.9) or 0.0, 6) == 1.0
     assert 6.0 < rate.rate_hz(10.9) < 7.0
     rate.add(99, 11.0)
-    assert rate.age_s(11.0) is not None, "the same stamp is no news"
+    assert rate.age_s(11.0) is not None, "the same stamp does not count"
     assert round(rate.age_s(11.0) or 0.0, 6) == 1.1
 
 
 def test_inputs_are_sound_stale_or_refused() -> None:
-    health = Health(("odom", "sectors"))
-    assert health.inputs(0.0, 1.0, {}).level is Level.STALE
-    health.heard("odom", 1, 0.0)
-    health.heard("sectors", 1, 0.5)
-    sound = health.inputs(1.0, 1.0, {})
+    health = InputHealth(("odom", "sectors"))
+    assert health.status(0.0, 1.0, {}).level is Level.STALE
+    health.received("odom", 1, 0.0)
+    health.received("sectors", 1, 0.5)
+    sound = health.status(1.0, 1.0, {})
     assert (sound.level, sound.message) == (Level.OK, "odom and sectors are sound")
-    stale = health.inputs(1.25, 1.0, {})
+    stale = health.status(1.25, 1.0, {})
     assert stale.message == "odom stale for 1.25 s (input_timeout_s=1)"
-    health.judged("odom", "odom is in frame")
-    refused = health.inputs(1.25, 1.0, {"odom: frame": 2, "odom: value": 3})
+    health.set_fault("odom", "odom is in frame")
+    refused = health.status(1.25, 1.0, {"odom: frame": 2, "odom: value": 3})
     assert refused.level is Level.ERROR
     assert refused.message.startswith("refused: odom is in frame; odom stale for")
     assert refused.values["refused"] == "5"
     assert refused.values["refused odom: frame"] == "2"
 
 
-def test_a_planner_that_is_not_active_is_in_order_and_says_so() -> None:
-    status = driving(None, Phase.FREE, "inactive", {})
+def test_a_planner_that_is_not_active_is_ok() -> None:
+    status = driving_status(None, Phase.FREE, "inactive", {})
     assert (status.level, status.message) == (Level.OK, "inactive: commands nothing")
 
 
 A, B, C = (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)
 
 
-def test_goals_are_visited_in_their_order() -> None:
+def test_goals_are_visited_in_sequence() -> None:
     goal_queue = GoalQueue()
-    assert (goal_queue.goal, goal_queue.leg) == (None, "")
-    assert goal_queue.order((A, B, C), over=False)
-    assert (goal_queue.goal, goal_queue.leg, goal_queue.number) == (A, "1 of 3", 1)
-    assert goal_queue.pass_by((0.5, 0.0), 0.1) == 0
-    assert goal_queue.pass_by((0.95, 0.0), 0.1) == 1
-    assert (goal_queue.goal, goal_queue.leg, goal_queue.number) == (B, "2 of 3", 1)
-    assert goal_queue.pass_by(B, 0.1) == 1
-    assert goal_queue.pass_by(C, 0.1) == 0, "the last one is for the planner to reach"
+    assert (goal_queue.goal, goal_queue.goal_index) == (None, "")
+    assert goal_queue.set_goals((A, B, C), finished=False)
+    assert (goal_queue.goal, goal_queue.goal_index, goal_queue.goal_id) == (A, "1 of 3", 1)
+    assert goal_queue.advance((0.5, 0.0), 0.1) == 0
+    assert goal_queue.advance((0.95, 0.0), 0.1) == 1
+    assert (goal_queue.goal, goal_queue.goal_index, goal_queue.goal_id) == (B, "2 of 3", 1)
+    assert goal_queue.advance(B, 0.1) == 1
+    assert goal_queue.advance(C, 0.1) == 0, "the planner itself decides on the last one"
     assert goal_queue.goal == C
 
 
-def test_goals_at_one_place_are_passed_at_once() -> None:
+def test_goals_at_one_position_are_reached_together() -> None:
     goal_queue = GoalQueue()
-    goal_queue.order((A, A, A, B), over=False)
-    assert goal_queue.pass_by(A, 0.1) == 3
+    goal_queue.set_goals((A, A, A, B), finished=False)
+    assert goal_queue.advance(A, 0.1) == 3
 
 
-def test_the_same_order_is_none_unless_the_last_is_over() -> None:
+def test_the_same_goals_again_are_ignored_unless_finished() -> None:
     goal_queue = GoalQueue()
-    goal_queue.order((A, B), over=False)
-    goal_queue.pass_by(A, 0.1)
-    assert not goal_queue.order((A, B), over=False)
-    assert (goal_queue.goal, goal_queue.number) == (B, 1)
-    assert goal_queue.order((A, B), over=True)
-    assert (goal_queue.goal, goal_queue.number) == (A, 2)
-    assert goal_queue.order((B,), over=False)
-    assert goal_queue.leg == "1 of 1"
+    goal_queue.set_goals((A, B), finished=False)
+    goal_queue.advance(A, 0.1)
+    assert not goal_queue.set_goals((A, B), finished=False)
+    assert (goal_queue.goal, goal_queue.goal_id) == (B, 1)
+    assert goal_queue.set_goals((A, B), finished=True)
+    assert (goal_queue.goal, goal_queue.goal_id) == (A, 2)
+    assert goal_queue.set_goals((B,), finished=False)
+    assert goal_queue.goal_index == "1 of 1"
 
 
-def test_cancelled_there_is_no_goal_and_the_same_may_be_ordered_anew() -> None:
+def test_after_cancel_there_is_no_goal_and_the_same_may_be_set_again() -> None:
     goal_queue = GoalQueue()
     assert goal_queue.cancel() is None
-    goal_queue.order((A,), over=False)
+    goal_queue.set_goals((A,), finished=False)
     assert goal_queue.cancel() == A
-    assert (goal_queue.goal, goal_queue.number) == (None, 2)
+    assert (goal_queue.goal, goal_queue.goal_id) == (None, 2)
     assert goal_queue.cancel() is None
-    assert goal_queue.order((A,), over=False)
+    assert goal_queue.set_goals((A,), finished=False)
 
 
 def test_a_twist_holds_for_the_timeout_but_never_less_than_its_tick() -> None:
@@ -97,7 +97,7 @@ def test_a_twist_holds_for_the_timeout_but_never_less_than_its_tick() -> None:
                 cmd_vel_timeout_s=timeout_s, tick_ns=round(tick_s * 1e9), speed_factor=factor
             )
         )
-        command_timeout.heard(100.0)
+        command_timeout.received(100.0)
         return not command_timeout.has_expired(100.0 + after_s)
 
     assert holds(0.5, 0.49)
@@ -111,6 +111,8 @@ def test_a_twist_holds_for_the_timeout_but_never_less_than_its_tick() -> None:
 @pytest.mark.parametrize(
     ("timeout_s", "period_s"), [(0.25, 0.0625), (1.0, 0.25), (60.0, 0.25), (0.001, 0.02)]
 )
-def test_silence_is_looked_for_well_within_its_timeout(timeout_s: float, period_s: float) -> None:
+def test_stale_inputs_are_checked_several_times_per_timeout(
+    timeout_s: float, period_s: float
+) -> None:
     assert watch_period_s(timeout_s, lockstep=False) == period_s
     assert watch_period_s(timeout_s, lockstep=True) == 0.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots that turn, and lidars, in the real graph: the core's decisions, and what goes over it."""
+"""Differential drive and lidar in the real graph: the core's decisions, and the messages."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -50,7 +50,7 @@ def near(robot: Robot) -> Scenario:
     return replace(case, start_m=(9.4, 4.2), goal_m=(9.6, 8.0), robot=robot)
 
 
-def told(scenario: Scenario, planner: PlannerParams) -> RunConfig:
+def run_config(scenario: Scenario, planner: PlannerParams) -> RunConfig:
     return RunConfig(scenario=scenario, planner=planner, seed=3, driver=Driver.IN_PROCESS)
 
 
@@ -62,32 +62,32 @@ def test_the_graph_decides_as_the_core_and_verify_agrees(
     scenario = near(robot)
     if planner.tracks_scan and not robot.lidar.beams:
         scenario = replace(scenario, robot=replace(robot, lidar=Lidar(beams=1080)))
-    run_in_process(told(scenario, planner), tmp_path / "bag", domain_id=domain_id)
+    run_in_process(run_config(scenario, planner), tmp_path / "bag", domain_id=domain_id)
     recorded = read_episode(tmp_path / "bag")
     expected = simulate(scenario, planner=planner, sensor=SensorParams(), seed=3)
     assert recorded.ticks == expected.ticks
     assert digest(recorded.ticks) == digest(expected.ticks)
     assert expected.outcome is Outcome.GOAL_REACHED
     assert recorded.scenario == scenario
-    assert any(tick.vs and any(tick.vs) for tick in recorded.ticks), "nobody was met"
+    assert any(tick.vs and any(tick.vs) for tick in recorded.ticks), "no obstacle was observed"
     report = verify(tmp_path / "bag")
     assert report.is_identical, report.faults
 
 
 def test_verify_knows_which_scans_the_sensor_would_refuse(tmp_path: Path, domain_id: int) -> None:
     scenario = near(SCANNING)
-    run_in_process(told(scenario, PAPER), tmp_path / "bag", domain_id=domain_id)
+    run_in_process(run_config(scenario, PAPER), tmp_path / "bag", domain_id=domain_id)
 
-    def asking(frame: str) -> Callable[[Any], Any]:
+    def expecting(frame: str) -> Callable[[Any], Any]:
         def configure(content: Any) -> Any:
             content["nodes"]["virtual_sensor"]["scan_frame"] = frame
             return content
 
         return configure
 
-    same = rewrite(tmp_path / "bag", tmp_path / "same", list, configure=asking("base_scan"))
+    same = rewrite(tmp_path / "bag", tmp_path / "same", list, configure=expecting("base_scan"))
     assert verify(same).is_identical
-    other = rewrite(tmp_path / "bag", tmp_path / "other", list, configure=asking("rear"))
+    other = rewrite(tmp_path / "bag", tmp_path / "other", list, configure=expecting("rear"))
     report = verify(other)
     assert len(report.faults) == len(report.recorded)
     assert all("/sectors does not match the sensor" in fault for fault in report.faults)
@@ -103,11 +103,11 @@ def start(graph: Graph, config: RunConfig, **more: Any) -> WorldSim:
 
 
 @pytest.mark.parametrize("beams", [360, 720, 1080])
-def test_what_a_lidar_robot_says_and_is_told(graph: Graph, beams: int) -> None:
+def test_the_messages_of_a_lidar_robot(graph: Graph, beams: int) -> None:
     scans, odoms = graph.hear(topics.SCAN), graph.hear(topics.ODOM)
     sectors, twists = graph.hear(topics.SECTORS), graph.hear(topics.CMD_VEL)
     robot = replace(SCANNING, lidar=Lidar(beams=beams, yaw_rad=1.0))
-    world = start(graph, told(near(robot), PAPER))
+    world = start(graph, run_config(near(robot), PAPER))
     world.resume()
     graph.until(lambda: world.world.tick >= 6)
     world.tick_control.paused = True
@@ -130,7 +130,7 @@ def test_what_a_lidar_robot_says_and_is_told(graph: Graph, beams: int) -> None:
     assert odoms[-1].twist.twist.angular.z == world.world.speeds.omega
 
 
-def test_parameters_of_world_sim_make_another_robot_of_it(graph: Graph) -> None:
+def test_parameters_of_world_sim_replace_the_robot(graph: Graph) -> None:
     world = graph.start(
         WorldSim,
         {"scenario": "case2", "robot.drive": "differential", "robot.lidar.beams": 12},
@@ -141,7 +141,7 @@ def test_parameters_of_world_sim_make_another_robot_of_it(graph: Graph) -> None:
 
 
 def test_it_drives_in_real_time_too(tmp_path: Path, domain_id: int) -> None:
-    config = replace(told(near(SCANNING), TRACKING), real_time=True, speed_factor=2.0)
+    config = replace(run_config(near(SCANNING), TRACKING), real_time=True, speed_factor=2.0)
     run_in_process(config, tmp_path / "bag", domain_id=domain_id)
     recorded = read_episode(tmp_path / "bag")
     assert recorded.outcome is Outcome.GOAL_REACHED

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes as users start them: what is wrong is one line and exit code 1, signals are quiet."""
+"""The nodes as programs: an error is one line and exit code 1, signals end them without output."""
 
 import os
 import resource
@@ -43,11 +43,11 @@ def start(
 
 
 def refused(node: str, *args: str, env: dict[str, str], cwd: Path = ROOT) -> str:
-    """The one line of a node that could not begin."""
+    """The one line of a node that could not start."""
     process = start(node, *args, env=env, cwd=cwd)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 1
-    # rcl says in its log, too, that it does not understand arguments.
+    # rcl also logs that it cannot parse arguments.
     assert [line for line in out.splitlines() if "[rcl]: Failed to parse" not in line] == []
     assert err.endswith("\n")
     assert err.count("\n") == 1
@@ -110,8 +110,8 @@ def test_bad_arguments_are_one_line(ros_env: dict[str, str], tmp_path: Path) -> 
 
 
 def test_a_misspelt_parameter_is_named(ros_env: dict[str, str]) -> None:
-    told = parameters("sped_mps:=0.5", "use_sim_time:=false")
-    planner = start("planner", *told, env={**ros_env, "RCUTILS_LOGGING_BUFFERED_STREAM": "1"})
+    arguments = parameters("sped_mps:=0.5", "use_sim_time:=false")
+    planner = start("planner", *arguments, env={**ros_env, "RCUTILS_LOGGING_BUFFERED_STREAM": "1"})
     assert planner.stdout is not None
     line = planner.stdout.readline()
     assert line.endswith("[planner]: sped_mps: no such parameter; did you mean 'speed_mps'?\n")
@@ -120,12 +120,12 @@ def test_a_misspelt_parameter_is_named(ros_env: dict[str, str]) -> None:
     assert planner.returncode == 0
 
 
-def test_a_world_nobody_answers_gives_up_in_one_line(
+def test_a_world_without_commands_gives_up_in_one_line(
     graph: Graph, ros_env: dict[str, str]
 ) -> None:
     odom = graph.hear(topics.ODOM)
-    told = parameters("lockstep:=true", "answer_timeout_s:=0.1", "answer_retries:=2")
-    world = start("world_sim", *told, env=ros_env)
+    arguments = parameters("lockstep:=true", "answer_timeout_s:=0.1", "answer_retries:=2")
+    world = start("world_sim", *arguments, env=ros_env)
     graph.until(lambda: world.poll() is not None, timeout_s=60.0)
     _, err = world.communicate()
     assert world.returncode == 1
@@ -142,8 +142,8 @@ def test_a_full_disk_is_one_line_and_a_bag_that_can_be_recovered(
     graph: Graph, ros_env: dict[str, str], tmp_path: Path
 ) -> None:
     """RLIMIT_FSIZE: the kernel refuses as it does on a full disk, which one chunk fits on."""
-    told = parameters(f"output:={tmp_path / 'bag'}")
-    recorder = start("recorder", *told, env=ros_env, file_limit=CHUNK_BYTES + 200_000)
+    arguments = parameters(f"output:={tmp_path / 'bag'}")
+    recorder = start("recorder", *arguments, env=ros_env, file_limit=CHUNK_BYTES + 200_000)
     plans = graph.writer(topics.PLAN)
     count = 0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Letterboxes over real subscriptions: order, and what falls in while they are emptied."""
+"""Polled subscriptions over DDS: sequence of delivery, and messages sent during a poll."""
 
 import time
 from collections.abc import Callable
@@ -13,62 +13,65 @@ from std_msgs.msg import String
 from mfba_planner.ros.runtime import polled_subscriptions
 from mfba_planner.ros.runtime.polled_subscriptions import PolledSubscriptions
 
-Post = Callable[[str, str], None]
+Publish = Callable[[str, str], None]
 
 
 @pytest.fixture
-def heard() -> list[str]:
+def received() -> list[str]:
     return []
 
 
 @pytest.fixture
-def boxes(graph: Graph, heard: list[str]) -> PolledSubscriptions:
-    """Two topics, late and early; the box of late is looked into first."""
+def polled(graph: Graph, received: list[str]) -> PolledSubscriptions:
+    """Two topics, late and early; late is polled first."""
     made = PolledSubscriptions()
 
     def deliver(message: Any) -> None:
-        heard.append(deserialize_message(message.data, String).data)
+        received.append(deserialize_message(message.data, String).data)
 
     for name in ("late", "early"):
-        box = graph.probe.create_subscription(
+        subscription = graph.probe.create_subscription(
             String, name, lambda _: None, 10, callback_group=made.group, raw=True
         )
-        made.add([box], deliver)
+        made.add([subscription], deliver)
     return made
 
 
 @pytest.fixture
-def post(graph: Graph) -> Post:
+def publish(graph: Graph) -> Publish:
     writers = {name: graph.probe.create_publisher(String, name, 10) for name in ("late", "early")}
     return lambda name, text: writers[name].publish(String(data=text))
 
 
-def until_heard(boxes: PolledSubscriptions, heard: list[str], count: int) -> None:
+def poll_until(polled: PolledSubscriptions, received: list[str], count: int) -> None:
     deadline = time.monotonic() + 5.0
-    while len(heard) < count:
-        assert time.monotonic() < deadline, heard
-        boxes.empty()
+    while len(received) < count:
+        assert time.monotonic() < deadline, received
+        polled.poll()
 
 
-def test_letters_are_handed_on_as_they_were_sent(
-    boxes: PolledSubscriptions, heard: list[str], post: Post
+def test_messages_are_delivered_sorted_by_send_time(
+    polled: PolledSubscriptions, received: list[str], publish: Publish
 ) -> None:
     for number in range(6):
-        post(("early", "late")[number % 2], str(number))
-    until_heard(boxes, heard, 6)
-    assert heard == list("012345")
+        publish(("early", "late")[number % 2], str(number))
+    poll_until(polled, received, 6)
+    assert received == list("012345")
 
 
-def test_what_was_sent_after_a_round_began_waits_for_the_next(
-    boxes: PolledSubscriptions, heard: list[str], post: Post, monkeypatch: pytest.MonkeyPatch
+def test_what_was_sent_after_a_poll_started_waits_for_the_next(
+    polled: PolledSubscriptions,
+    received: list[str],
+    publish: Publish,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The clock says when a round begins: long before the letters were sent, here."""
-    post("early", "first")
-    until_heard(boxes, heard, 1)
-    post("early", "second")
+    """The patched clock starts the poll long before the messages were sent."""
+    publish("early", "first")
+    poll_until(polled, received, 1)
+    publish("early", "second")
     with monkeypatch.context() as patch:
         patch.setattr(polled_subscriptions.time, "time_ns", lambda: 0)
-        boxes.empty()
-        assert heard == ["first"]
-        boxes.empty()
-        assert heard == ["first", "second"], "it waits once at most"
+        polled.poll()
+        assert received == ["first"]
+        polled.poll()
+        assert received == ["first", "second"], "it waits once at most"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's QoS as it is recorded, and recorded QoS as a publisher offers it again."""
+"""QoS profiles to the recorded form and back."""
 
 import pytest
 from rclpy.duration import Duration
@@ -17,7 +17,7 @@ def facts(qos: QoSProfile) -> tuple[object, ...]:
 
 
 @pytest.mark.parametrize("topic", topics.GRAPH, ids=lambda topic: topic.name)
-def test_what_we_offer_comes_back_from_its_record(topic: topics.Topic) -> None:
+def test_our_profiles_survive_the_round_trip(topic: topics.Topic) -> None:
     assert facts(profile(offered(topic.qos))) == facts(topic.qos)
 
 

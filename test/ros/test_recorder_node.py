@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""recorder: everything that was said, once, under the right time, and what explains it."""
+"""recorder: every message once, with the right log time, and the configuration."""
 
 import time
 from collections import Counter
@@ -72,10 +72,10 @@ def test_there_is_one_message_per_tick(bag: Path) -> None:
     assert found["/markers"] > 3
 
 
-def test_every_topic_somebody_writes_is_there_with_its_type_and_qos(bag: Path) -> None:
+def test_every_topic_with_a_writer_is_recorded_with_its_type_and_qos(bag: Path) -> None:
     with BagReader(bag) as reader:
         found = dict(reader.topics)
-    # The paper's robot has no lidar, and its odometry does not err.
+    # The paper's robot has neither a lidar nor odometry noise.
     others = (topics.SCAN, topics.GROUND_TRUTH)
     written = [topic for topic in topics.GRAPH if topic.writers and topic not in others]
     assert set(found) == {in_bag(topic) for topic in written}
@@ -97,7 +97,7 @@ def test_log_times_are_simulated_time(bag: Path) -> None:
         assert message.log_time_ns >= now
         now = message.log_time_ns
         header = getattr(message.message, "header", None)
-        # A goal is stamped when it is given, health is that of the very moment.
+        # A goal has the stamp of its request, diagnostics that of the present time.
         if header is not None and message.topic not in ("/goal_pose", "/diagnostics"):
             assert message.log_time_ns == stamp_ns(header.stamp), message.topic
     latched = [m for m in messages if m.topic in ("/goal_pose", "/outcome")]
@@ -117,10 +117,8 @@ def test_the_bag_holds_all_parameters_and_the_facts(bag: Path) -> None:
     assert {"python", "numpy", "mfba_planner"} <= set(facts)
 
 
-def test_parameters_are_asked_for_across_contexts(
-    graph: Graph, domain_id: int, tmp_path: Path
-) -> None:
-    """As across processes: only DDS leads from the recorder to the nodes."""
+def test_parameters_are_read_across_contexts(graph: Graph, domain_id: int, tmp_path: Path) -> None:
+    """As across processes: recorder and nodes share only DDS."""
     context = Context()
     context.init(domain_id=domain_id)
     others = Graph(context)
@@ -134,11 +132,11 @@ def test_parameters_are_asked_for_across_contexts(
         )
         assert recorder.missing().startswith("parameters of planner, virtual_sensor, world_sim")
 
-        def answered() -> bool:
+        def parameters_read() -> bool:
             others.settle()
             return not recorder.missing()
 
-        graph.until(answered)
+        graph.until(parameters_read)
         graph.stop(recorder)
         with BagReader(tmp_path / "bag") as reader:
             configuration = read_configuration(reader)
@@ -160,7 +158,7 @@ def record(graph: Graph, path: Path, **parameters: Any) -> Recorder:
     return graph.start(Recorder, {"output": str(path), **parameters})
 
 
-def test_log_times_are_of_the_wall_where_time_is_not_simulated(
+def test_log_times_are_wall_times_where_time_is_not_simulated(
     graph: Graph, tmp_path: Path
 ) -> None:
     recorder = record(graph, tmp_path / "bag")
@@ -189,10 +187,10 @@ def test_what_comes_before_the_first_clock_is_held_for_it(graph: Graph, tmp_path
         ]
 
 
-def test_what_is_said_while_the_world_moves_on_is_logged_under_its_tick(
+def test_what_is_published_after_the_next_tick_is_logged_under_its_own_tick(
     graph: Graph, tmp_path: Path
 ) -> None:
-    """The planner publishes its reasons after cmd_vel; other stamps are nobody's tick."""
+    """The planner publishes decisions after cmd_vel; other stamps belong to no tick."""
     recorder = record(graph, tmp_path / "bag", sim_time=True)
     plan, clock = graph.writer(topics.PLAN), graph.writer(topics.CLOCK)
     for stamp in (10, 20, 30):
@@ -216,9 +214,7 @@ def test_what_was_held_is_not_lost_without_any_clock(graph: Graph, tmp_path: Pat
 
 
 @pytest.mark.parametrize("sim_time", [False, True])
-def test_other_peoples_writers_are_recorded_once(
-    graph: Graph, tmp_path: Path, sim_time: bool
-) -> None:
+def test_foreign_writers_are_recorded_once(graph: Graph, tmp_path: Path, sim_time: bool) -> None:
     """A best-effort lidar and RViz's volatile goals, beside reliable and latched ones."""
     recorder = record(graph, tmp_path / "bag", sim_time=sim_time)
     graph.writer(topics.CLOCK).publish(clock_msg(1))
@@ -243,7 +239,7 @@ def test_on_a_robot_odom_of_best_effort_is_recorded_too(graph: Graph, tmp_path: 
     assert counts(tmp_path / "bag") == {"/odom": 2}
 
 
-def test_an_episode_in_real_time_keeps_the_decision_not_the_stops_after_it(
+def test_an_episode_in_real_time_keeps_the_decision_not_the_later_stops(
     graph: Graph, tmp_path: Path
 ) -> None:
     nodes = [
@@ -252,7 +248,7 @@ def test_an_episode_in_real_time_keeps_the_decision_not_the_stops_after_it(
         planner := graph.start(PlannerNode, {"input_timeout_s": 0.1, "seed": 2}),
     ]
     recorder = record(graph, tmp_path / "bag")
-    recorder.explain({node.get_name(): params.values(node) for node in nodes})
+    recorder.attach_parameters({node.get_name(): params.values(node) for node in nodes})
     outcomes = graph.hear(topics.DECISION)
     graph.until(lambda: planner.goals.goal_queue.goal is not None)
     for _ in range(2):

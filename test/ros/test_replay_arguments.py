@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""replay's command line: what it means, and what is refused in one line."""
+"""replay's command line: the settings it gives, and what is refused in one line."""
 
 import pytest
 
@@ -12,7 +12,7 @@ from mfba_planner.ros.replaying.replay_arguments import (
 )
 
 
-def test_everything_can_be_said() -> None:
+def test_every_option_is_parsed() -> None:
     line = (
         "bag --rate 2 --loop --start-offset 1.5 --clock --start-paused --wait-timeout 3"
         " --topics a b --exclude c --inputs-of planner --remap a:=d b:=/e"
@@ -42,7 +42,7 @@ def test_the_defaults_are_those_of_the_settings() -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "text"),
     [
         ("", "the following arguments are required: BAG; see `replay --help`"),
         ("bag --rate 0", "rate=0.0: out of range"),
@@ -62,15 +62,15 @@ def test_the_defaults_are_those_of_the_settings() -> None:
         ("bag --as-fast-as-possible --rate 2", "rate=2 with --as-fast-as-possible: one excludes"),
     ],
 )
-def test_mistakes_are_told_in_one_line(line: str, said: str) -> None:
-    with pytest.raises(ConfigError) as told:
+def test_mistakes_are_reported_in_one_line(line: str, text: str) -> None:
+    with pytest.raises(ConfigError) as error:
         parse(line.split())
-    assert str(told.value).startswith(said)
-    assert "\n" not in str(told.value)
+    assert str(error.value).startswith(text)
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
-    ("line", "ours", "for_ros"),
+    ("line", "own", "for_ros"),
     [
         ("bag --remap a:=b", "bag --remap a:=b", ""),
         ("bag --ros-args -r a:=b", "bag", "--ros-args -r a:=b"),
@@ -82,5 +82,5 @@ def test_mistakes_are_told_in_one_line(line: str, said: str) -> None:
         ),
     ],
 )
-def test_ros_gets_its_own_arguments_only(line: str, ours: str, for_ros: str) -> None:
-    assert split_ros_args(line.split()) == (ours.split(), for_ros.split())
+def test_ros_gets_its_own_arguments_only(line: str, own: str, for_ros: str) -> None:
+    assert split_ros_args(line.split()) == (own.split(), for_ros.split())

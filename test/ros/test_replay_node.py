@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""replay on the executor of its readers: what arrives, in which order, and what can be told."""
+"""replay on the executor of its readers: messages, their sequence, services and errors."""
 
 import time
 from collections.abc import Callable
@@ -60,23 +60,23 @@ def start(graph: Graph, bag: Path, line: str = "") -> Replay:
 def until(
     graph: Graph, replay: Replay, condition: Callable[[], bool], timeout_s: float = 20.0
 ) -> None:
-    """Turn replay and everybody else until a fact holds."""
+    """Spin replay and all other nodes until a condition holds."""
     deadline = time.monotonic() + timeout_s
     while not condition():
-        assert time.monotonic() < deadline, f"not so after {timeout_s} s"
+        assert time.monotonic() < deadline, f"not true after {timeout_s} s"
         graph.executor.spin_once(timeout_sec=min(replay.advance(), 0.002))
 
 
 def play(graph: Graph, replay: Replay, timeout_s: float = 20.0) -> None:
     until(graph, replay, lambda: replay.finished, timeout_s)
-    for _ in range(4 * COUNT):  # what the readers have not taken yet
+    for _ in range(4 * COUNT):  # messages the readers have not taken yet
         graph.executor.spin_once(timeout_sec=0.0)
 
 
 def hear(graph: Graph, kind: Any, name: str, qos: QoSProfile | int = 1000) -> list[Any]:
-    heard: list[Any] = []
-    graph.probe.create_subscription(kind, name, heard.append, qos)
-    return heard
+    received: list[Any] = []
+    graph.probe.create_subscription(kind, name, received.append, qos)
+    return received
 
 
 def call(graph: Graph, replay: Replay, name: str) -> Trigger.Response:
@@ -90,7 +90,7 @@ def call(graph: Graph, replay: Replay, name: str) -> Trigger.Response:
 @pytest.mark.parametrize(
     ("line", "depth"), [("--rate 20", 1000), ("--rate 1000", 1000), ("--as-fast-as-possible", 10)]
 )
-def test_every_message_arrives_as_it_was_in_order(
+def test_every_message_arrives_unchanged_and_in_sequence(
     graph: Graph, bag: Path, line: str, depth: int
 ) -> None:
     odoms, scans = hear(graph, Odometry, "odom", depth), hear(graph, LaserScan, "scan", depth)
@@ -169,8 +169,8 @@ def test_it_pauses_steps_and_resumes(graph: Graph, bag: Path) -> None:
     assert odoms == [odometry(i) for i in range(COUNT)]
 
 
-class StandingClock:
-    """A player's clock that goes on when it is told to, however long a test takes."""
+class ManualClock:
+    """A player's clock that advances only when a test advances it."""
 
     def __init__(self) -> None:
         self.now_ns = SECOND
@@ -182,8 +182,8 @@ class StandingClock:
 def test_a_pause_shifts_what_follows(
     graph: Graph, bag: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """To the nanosecond: nothing is poured out, skipped or late, on a machine of any speed."""
-    clock = StandingClock()
+    """To the nanosecond: no burst, nothing skipped or late, on a machine of any speed."""
+    clock = ManualClock()
     monkeypatch.setattr(bag_player, "time", clock)
     odoms = hear(graph, Odometry, "odom")
     replay = start(graph, bag, "--topics odom --rate 2")
@@ -217,7 +217,7 @@ def test_at_the_end_a_step_is_refused(graph: Graph, bag: Path) -> None:
     play(graph, replay)
 
 
-def test_a_loop_begins_again_with_what_is_latched(graph: Graph, bag: Path) -> None:
+def test_a_loop_restarts_with_what_is_latched(graph: Graph, bag: Path) -> None:
     odoms = hear(graph, Odometry, "odom")
     goals = hear(graph, PoseStamped, "goal_pose", LATCHED_QOS)
     clocks = hear(graph, Clock, "/clock")
@@ -226,9 +226,9 @@ def test_a_loop_begins_again_with_what_is_latched(graph: Graph, bag: Path) -> No
     assert not replay.finished
     assert odoms[:COUNT] == [odometry(i) for i in range(20, COUNT)] * 2
     assert len(goals) > 3
-    told = [c.clock.sec * SECOND + c.clock.nanosec for c in clocks]
-    assert any(later < earlier for earlier, later in zip(told, told[1:]))
-    assert min(told) >= START_NS + SECOND // 5
+    times = [c.clock.sec * SECOND + c.clock.nanosec for c in clocks]
+    assert any(later < earlier for earlier, later in zip(times, times[1:]))
+    assert min(times) >= START_NS + SECOND // 5
 
 
 @pytest.mark.parametrize("line", ["--rate 5", "--as-fast-as-possible --wait-for-subscribers odom"])
@@ -243,35 +243,35 @@ def test_the_clock_rises_and_never_overtakes_a_message(
             time_ns = START_NS + i * step
             writer.write("/odom", serialize_message(odometry(i)), time_ns, time_ns)
             writer.write("/clock", serialize_message(clock_msg(1)), time_ns, time_ns)
-    heard: list[tuple[int, str, int]] = []  # when sent, what, which log time
+    received: list[tuple[int, str, int]] = []  # send time, topic, log time
 
     def on_clock(message: Clock, info: Any) -> None:
         stamp_ns = message.clock.sec * SECOND + message.clock.nanosec
-        heard.append((info["source_timestamp"], "clock", stamp_ns))
+        received.append((info["source_timestamp"], "clock", stamp_ns))
 
     def on_odom(message: Odometry, info: Any) -> None:
         stamp_ns = START_NS + message.header.stamp.sec * step
-        heard.append((info["source_timestamp"], "odom", stamp_ns))
+        received.append((info["source_timestamp"], "odom", stamp_ns))
 
     subscribe: Any = graph.probe.create_subscription
     subscribe(Clock, "/clock", on_clock, 1000)
     subscribe(Odometry, "odom", on_odom, 1000)
     play(graph, start(graph, tmp_path / "bag", f"{line} --clock 200"))
-    if "rate" in line:  # a reader may lag behind; only as fast as possible it is waited for
-        heard.sort()
-    clocks = [stamp for _, what, stamp in heard if what == "clock"]
+    if "rate" in line:  # a reader may lag behind; only --as-fast-as-possible waits for it
+        received.sort()
+    clocks = [stamp for _, what, stamp in received if what == "clock"]
     assert clocks == sorted(clocks)
     assert clocks[0] == START_NS
     assert len(clocks) > COUNT / 4
     following = START_NS
-    for _, what, stamp in heard:
+    for _, what, stamp in received:
         if what == "odom":
             following = min(stamp + step, START_NS + (COUNT - 1) * step)
         assert stamp <= following
 
 
 def tick_bag(path: Path, ticks: int) -> Path:
-    """What a planner reads, tick by tick, with a latched goal at the very moment of the first."""
+    """A planner's inputs tick by tick, with a latched goal at the time of the first tick."""
     params = SensorParams()
     tick = OfferedQos(depth=1000)
     with BagWriter(path) as writer:
@@ -289,7 +289,7 @@ def tick_bag(path: Path, ticks: int) -> Path:
     return path
 
 
-def test_at_full_speed_a_planner_answers_every_tick_of_more_than_it_can_hold(
+def test_at_full_speed_a_planner_decides_every_tick_of_a_bag_longer_than_its_history(
     graph: Graph, tmp_path: Path
 ) -> None:
     ticks = topics.TICK_QOS.depth + 200
@@ -321,15 +321,15 @@ def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
     assert (len(decisions), len(vectors)) == (133, 133)
     found = [decision(why, sector_ranges(ring)) for why, ring in zip(decisions, sectors)]
     assert {tick.mode for tick in found} == {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE}
-    alone = redecide_recording(FOREIGN, Robot(robot_radius_m=0.3))
-    assert digest(found) == alone.digest, "verify decides as the nodes do"
+    redecided = redecide_recording(FOREIGN, Robot(robot_radius_m=0.3))
+    assert digest(found) == redecided.digest, "verify decides as the nodes do"
 
 
-def test_it_waits_for_subscribers_and_says_for_whom(graph: Graph, bag: Path) -> None:
+def test_it_waits_for_subscribers_and_names_the_topics(graph: Graph, bag: Path) -> None:
     replay = start(graph, bag, "--as-fast-as-possible --topics odom scan --wait-timeout 0.2")
-    with pytest.raises(GraphError) as told:
+    with pytest.raises(GraphError) as raised:
         play(graph, replay)
-    assert str(told.value) == (
+    assert str(raised.value) == (
         "too few subscribers on /odom, /scan after 0.2 s; start the readers or raise "
         "--wait-timeout"
     )
@@ -339,8 +339,8 @@ def test_it_waits_for_subscribers_and_says_for_whom(graph: Graph, bag: Path) -> 
 def test_it_waits_until_the_last_of_them_is_there(graph: Graph, bag: Path) -> None:
     odoms = hear(graph, Odometry, "odom")
     replay = start(graph, bag, "--rate 100 --wait-for-subscribers 2 --topics odom")
-    begin = time.monotonic()
-    until(graph, replay, lambda: time.monotonic() > begin + 0.2)
+    start_s = time.monotonic()
+    until(graph, replay, lambda: time.monotonic() > start_s + 0.2)
     assert not odoms
     second = hear(graph, Odometry, "odom", qos_profile_sensor_data)
     play(graph, replay)
@@ -351,8 +351,8 @@ def test_it_waits_until_the_last_of_them_is_there(graph: Graph, bag: Path) -> No
 def test_it_waits_until_the_nodes_are_ready_for_each_other(graph: Graph) -> None:
     graph.start(VirtualSensor, {"source": "scan", "wait_for": "planner"})
     replay = start(graph, FOREIGN, "--inputs-of virtual_sensor --wait-for-subscribers")
-    begin = time.monotonic()
-    until(graph, replay, lambda: time.monotonic() > begin + 0.2)
+    start_s = time.monotonic()
+    until(graph, replay, lambda: time.monotonic() > start_s + 0.2)
     assert not replay.player.counts
     graph.start(PlannerNode, {})
     until(graph, replay, lambda: bool(replay.player.counts))
@@ -362,7 +362,7 @@ def test_a_reader_that_hangs_is_named(graph: Graph, bag: Path) -> None:
     hanging = rclpy.create_node("hanging", context=graph.context)
     hanging.create_subscription(Odometry, "odom", lambda _: None, 1000)
     replay = start(graph, bag, "--as-fast-as-possible --wait-timeout 0.3")
-    with pytest.raises(GraphError, match=r"^/hanging: no answer for 0\.3 s; "):
+    with pytest.raises(GraphError, match=r"^/hanging: no response for 0\.3 s; "):
         play(graph, replay)
     hanging.destroy_node()
 
@@ -378,19 +378,19 @@ def test_a_reader_that_leaves_is_not_waited_for(graph: Graph, bag: Path) -> None
     assert len(odoms) == COUNT
 
 
-def test_a_reader_that_cannot_be_asked_does_not_stop_it(graph: Graph, bag: Path) -> None:
+def test_a_reader_without_parameter_services_does_not_stop_it(graph: Graph, bag: Path) -> None:
     node = rclpy.create_node("mute", context=graph.context, start_parameter_services=False)
-    heard: list[Any] = []
-    node.create_subscription(Odometry, "odom", heard.append, 1000)
+    received: list[Any] = []
+    node.create_subscription(Odometry, "odom", received.append, 1000)
     graph.executor.add_node(node)
     play(graph, start(graph, bag, "--as-fast-as-possible"))
-    assert len(heard) == COUNT
+    assert len(received) == COUNT
     graph.executor.remove_node(node)
     node.destroy_node()
 
 
 @pytest.mark.parametrize(
-    ("path", "line", "error", "said"),
+    ("path", "line", "error", "text"),
     [
         ("none", "", BagError, "none: does not exist; "),
         ("bag", "--start-offset 9", ConfigError, "start_offset=9 s: beyond the end of "),
@@ -400,9 +400,9 @@ def test_a_reader_that_cannot_be_asked_does_not_stop_it(graph: Graph, bag: Path)
     ],
 )
 def test_what_cannot_be_played_is_refused(
-    graph: Graph, bag: Path, path: str, line: str, error: type[Exception], said: str
+    graph: Graph, bag: Path, path: str, line: str, error: type[Exception], text: str
 ) -> None:
-    with pytest.raises(error) as told:
+    with pytest.raises(error) as raised:
         start(graph, bag.parent / path, line)
-    assert said in str(told.value)
-    assert "\n" not in str(told.value)
+    assert text in str(raised.value)
+    assert "\n" not in str(raised.value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""replay as a program beside other processes: nothing lost, times kept, clean ends."""
+"""replay as a program beside other processes: nothing lost, times kept, clean exits."""
 
 import signal
 import statistics
@@ -28,7 +28,7 @@ FAST = ["--as-fast-as-possible", "--wait-timeout", "30"]
 
 
 class Stage:
-    """A place for programs that meet the test's own graph."""
+    """Starts programs in the domain of the test's own graph."""
 
     def __init__(self, graph: Graph, cwd: Path, env: dict[str, str]) -> None:
         self.graph = graph
@@ -38,14 +38,14 @@ class Stage:
     def run(self, name: str, *args: str) -> Program:
         return Program(name, *args, cwd=self.cwd, more_env=self.env)
 
-    def listen_until_its_end(self, program: Program, timeout_s: float = 120.0) -> None:
-        """Spin the graph until the program has ended, which must be a good end."""
+    def spin_until_exit(self, program: Program, timeout_s: float = 120.0) -> None:
+        """Spin the graph until the program has exited with code 0 and without stderr."""
         self.graph.until(lambda: program.process.poll() is not None, timeout_s)
         self.graph.settle()
         assert (program.end(), program.stderr) == (0, "")
 
     def matched(self, topic: topics.Topic) -> bool:
-        """Whether what the probe hears of a topic has a writer."""
+        """Whether the probe's subscription to a topic has a publisher."""
         return any(
             s.get_publisher_count() > 0
             for s in self.graph.probe.subscriptions
@@ -69,7 +69,7 @@ def test_at_full_speed_a_reader_with_a_short_history_loses_nothing(
     subscribe(Odometry, "odom", odoms.append, DEFAULT_DEPTH)
     subscribe(LaserScan, "scan", scans.append, DEFAULT_DEPTH)
     with stage.run("replay", "bag", *FAST, "--wait-for-subscribers", "odom", "scan") as replay:
-        stage.listen_until_its_end(replay)
+        stage.spin_until_exit(replay)
     assert odoms == [odometry(i) for i in range(count)]
     assert scans == [scan(i) for i in range(count)]
 
@@ -81,12 +81,12 @@ def test_at_full_speed_messages_larger_than_the_transport_holds_arrive(
     write_bag(tmp_path / "bag", count, beams=beams)
     sizes: list[int] = []
 
-    def note(data: Any) -> None:
+    def callback(data: Any) -> None:
         sizes.append(len(data))
 
-    stage.graph.probe.create_subscription(LaserScan, "scan", note, DEFAULT_DEPTH, raw=True)
+    stage.graph.probe.create_subscription(LaserScan, "scan", callback, DEFAULT_DEPTH, raw=True)
     with stage.run("replay", "bag", *FAST, "--topics", "scan") as replay:
-        stage.listen_until_its_end(replay)
+        stage.spin_until_exit(replay)
     assert len(sizes) == count
     assert min(sizes) > 4 * beams
 
@@ -103,21 +103,21 @@ def test_a_fresh_planner_fed_at_full_speed_decides_as_it_was_recorded(
     run_in_process(config, tmp_path / "bag", domain_id=domain_id)
     recorded = recorded_decisions(tmp_path / "bag")
     assert len(recorded) > 50
-    heard = stage.graph.hear(topics.DECISION)
+    received = stage.graph.hear(topics.DECISION)
     settings = ["lockstep:=true", "seed:=3"]
     with stage.run("planner", "--ros-args", *(x for s in settings for x in ("-p", s))):
         stage.graph.until(lambda: stage.matched(topics.DECISION))
         with stage.run("replay", "bag", *FAST, "--inputs-of", "planner") as replay:
-            stage.listen_until_its_end(replay)
-        stage.graph.until(lambda: len(heard) >= len(recorded))
-    assert [decision(message, ()) for message in heard] == recorded
+            stage.spin_until_exit(replay)
+        stage.graph.until(lambda: len(received) >= len(recorded))
+    assert [decision(message, ()) for message in received] == recorded
 
 
 @pytest.mark.parametrize("speed", [["--rate", "10"], FAST])
 def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
     stage: Stage, speed: list[str]
 ) -> None:
-    heard = stage.graph.hear(topics.DECISION)
+    received = stage.graph.hear(topics.DECISION)
     sensor = ["source:=scan", "lockstep:=true", "wait_for:=planner"]
     with (
         stage.run("virtual_sensor", "--ros-args", *(x for s in sensor for x in ("-p", s))),
@@ -126,18 +126,18 @@ def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
         stage.graph.until(lambda: stage.matched(topics.DECISION))
         nodes = ["--inputs-of", "virtual_sensor", "planner", "--wait-for-subscribers"]
         with stage.run("replay", str(FOREIGN), *speed, *nodes) as replay:
-            stage.listen_until_its_end(replay)
+            stage.spin_until_exit(replay)
             assert "played 267 messages" in replay.stdout
-        stage.graph.until(lambda: len(heard) >= 133)
+        stage.graph.until(lambda: len(received) >= 133)
         stage.graph.settle()
-    assert len(heard) == 133
-    modes = [decision(message, ()).mode for message in heard]
+    assert len(received) == 133
+    modes = [decision(message, ()).mode for message in received]
     assert set(modes) == {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE}
 
 
 def test_the_foreign_bags_missing_type_is_named(stage: Stage) -> None:
     with stage.run("mfba", "replay", str(FOREIGN), "--rate", "1000") as replay:
-        stage.listen_until_its_end(replay)
+        stage.spin_until_exit(replay)
         assert (
             "left out /tf_static (1 messages): tf2_msgs/msg/TFMessage: this message type is not "
             "installed; "
@@ -150,12 +150,12 @@ def test_at_rate_one_the_times_between_messages_are_kept(stage: Stage, tmp_path:
     write_bag(tmp_path / "bag", count)
     arrived: list[float] = []
 
-    def note(_: bytes) -> None:
+    def callback(_: bytes) -> None:
         arrived.append(time.monotonic())
 
-    stage.graph.probe.create_subscription(Odometry, "odom", note, 1000, raw=True)
+    stage.graph.probe.create_subscription(Odometry, "odom", callback, 1000, raw=True)
     with stage.run("replay", "bag", "--topics", "odom", "--wait-for-subscribers") as replay:
-        stage.listen_until_its_end(replay)
+        stage.spin_until_exit(replay)
     assert len(arrived) == count
     errors = [abs((b - a) - 0.01) for a, b in pairwise(arrived)]
     assert statistics.median(errors) < 0.005
@@ -170,7 +170,7 @@ def test_at_rate_one_the_times_between_messages_are_kept(stage: Stage, tmp_path:
         (FAST[0], signal.SIGTERM),  # waiting for subscribers
     ],
 )
-def test_it_ends_quietly_when_told_to(
+def test_it_exits_without_output_on_a_signal(
     stage: Stage, tmp_path: Path, line: str, number: int
 ) -> None:
     write_bag(tmp_path / "bag", 20)
@@ -188,7 +188,7 @@ def test_it_ends_quietly_when_told_to(
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "text"),
     [
         ("", "replay: the following arguments are required: BAG; see `replay --help`"),
         ("none", "replay: none: does not exist; give a .mcap file or a bag directory"),
@@ -202,14 +202,14 @@ def test_it_ends_quietly_when_told_to(
     ],
 )
 def test_a_mistake_is_one_line_and_one(
-    tmp_path: Path, domain_id: int, line: str, said: str
+    tmp_path: Path, domain_id: int, line: str, text: str
 ) -> None:
     file = write_bag(tmp_path / "bag", 20)
     (tmp_path / "torn.mcap").write_bytes(file.read_bytes()[:-300])
     (tmp_path / "empty.mcap").touch()
     done = complete("replay", *line.split(), cwd=tmp_path, ROS_DOMAIN_ID=str(domain_id))
     assert done.process.returncode == 1
-    assert done.stderr.startswith(said)
+    assert done.stderr.startswith(text)
     assert done.stderr.count("\n") == 1
 
 

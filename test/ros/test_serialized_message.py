@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stamps read from serialized messages, against rclpy's own reading."""
+"""Stamps read from serialized messages equal those of the messages."""
 
 import struct
 

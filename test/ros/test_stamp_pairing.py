@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two streams joined by stamp, whatever the order in which their messages come."""
+"""Two topics joined by stamp, in any sequence of arrival."""
 
 import pytest
 from hypothesis import given, settings
@@ -15,7 +15,7 @@ Pairs = StampPairs[str, str]
 
 @st.composite
 def interleavings(draw: st.DrawFn) -> list[tuple[str, int]]:
-    """Two streams of rising stamps, shuffled into each other but each in its own order."""
+    """Two topics with rising stamps, interleaved at random."""
     both = sorted(draw(st.sets(st.integers(0, 10_000), max_size=12)))
     sides = draw(st.lists(st.booleans(), min_size=2 * len(both), max_size=2 * len(both)))
     waiting = {"a": iter(both), "b": iter(both)}
@@ -33,30 +33,28 @@ def add(pairs: Pairs, side: str, stamp_ns: int) -> tuple[str, str] | None:
 
 
 @given(interleavings())
-def test_every_stamp_is_answered_exactly_once_and_in_order(mixed: list[tuple[str, int]]) -> None:
+def test_every_stamp_is_paired_exactly_once_and_in_sequence(mixed: list[tuple[str, int]]) -> None:
     pairs = Pairs()
-    answers = [pair for side, stamp in mixed if (pair := add(pairs, side, stamp))]
+    pairs_found = [pair for side, stamp in mixed if (pair := add(pairs, side, stamp))]
     stamps = sorted({stamp for _, stamp in mixed})
-    assert answers == [(f"a{stamp}", f"b{stamp}") for stamp in stamps]
+    assert pairs_found == [(f"a{stamp}", f"b{stamp}") for stamp in stamps]
     assert not pairs._a
     assert not pairs._b
 
 
 @given(interleavings(), st.sets(st.integers(0, 10_000)))
-def test_a_part_that_never_comes_holds_nothing_up(
-    mixed: list[tuple[str, int]], lost: set[int]
-) -> None:
+def test_a_lost_message_delays_no_other_pair(mixed: list[tuple[str, int]], lost: set[int]) -> None:
     pairs = Pairs()
     arrived = [(side, stamp) for side, stamp in mixed if side == "a" or stamp not in lost]
-    answers = [pair for side, stamp in arrived if (pair := add(pairs, side, stamp))]
+    pairs_found = [pair for side, stamp in arrived if (pair := add(pairs, side, stamp))]
     stamps = sorted({stamp for _, stamp in mixed} - lost)
-    assert answers == [(f"a{stamp}", f"b{stamp}") for stamp in stamps]
+    assert pairs_found == [(f"a{stamp}", f"b{stamp}") for stamp in stamps]
 
 
-@pytest.mark.parametrize("again", [False, True])
+@pytest.mark.parametrize("repeat", [False, True])
 @pytest.mark.parametrize("side", ["a", "b"])
-def test_a_stamp_that_goes_back_is_refused(side: str, again: bool) -> None:
-    pairs = Pairs(again=again)
+def test_a_stamp_that_goes_back_is_refused(side: str, repeat: bool) -> None:
+    pairs = Pairs(repeat=repeat)
     add(pairs, "a", 10)
     assert add(pairs, "b", 10) == ("a10", "b10")
     for old in (9, 0, -1):
@@ -76,10 +74,10 @@ def test_a_repeated_stamp_is_refused(side: str) -> None:
         add(pairs, side, 10)
 
 
-def test_a_pair_that_comes_again_as_a_whole_is_answered_again_where_that_is_wanted() -> None:
-    pairs = Pairs(again=True)
-    answers = [add(pairs, side, stamp) for side, stamp in zip("abbaab", [7] * 6)]
-    assert answers == [None, ("a7", "b7"), None, ("a7", "b7"), None, ("a7", "b7")]
+def test_with_repeat_a_pair_is_returned_again_when_both_messages_are_repeated() -> None:
+    pairs = Pairs(repeat=True)
+    pairs_found = [add(pairs, side, stamp) for side, stamp in zip("abbaab", [7] * 6)]
+    assert pairs_found == [None, ("a7", "b7"), None, ("a7", "b7"), None, ("a7", "b7")]
     assert add(pairs, "a", 8) is None
     assert add(pairs, "b", 8) == ("a8", "b8")
     with pytest.raises(InputError):
@@ -94,23 +92,23 @@ def test_the_newest_of_two_messages_with_one_stamp_counts() -> None:
 
 
 class BoundedMemory(RuleBasedStateMachine):
-    """Any stamps at all, on either side: memory stays bounded, answers only rise."""
+    """Any stamps at all, on either side: memory stays bounded, paired stamps only rise."""
 
     def __init__(self) -> None:
         super().__init__()
         self.pairs = Pairs()
-        self.answered = -1
+        self.paired_ns = -1
 
     @rule(side=st.sampled_from("ab"), stamp=st.integers(-5, 200))
     def message(self, side: str, stamp: int) -> None:
         try:
             pair = add(self.pairs, side, stamp)
         except InputError:
-            assert stamp <= self.answered
+            assert stamp <= self.paired_ns
             return
         if pair:
-            assert stamp > self.answered
-            self.answered = stamp
+            assert stamp > self.paired_ns
+            self.paired_ns = stamp
 
     @invariant()
     def nothing_piles_up(self) -> None:
@@ -119,14 +117,14 @@ class BoundedMemory(RuleBasedStateMachine):
         assert len(self.pairs._b) <= limit
 
 
-def test_memory_is_bounded_whatever_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_is_bounded_for_any_messages(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stamp_pairing, "WAITING_LIMIT", 4)
     run_state_machine_as_test(
         BoundedMemory, settings=settings(max_examples=30, stateful_step_count=40)
     )
 
 
-def test_a_stream_without_partner_forgets_its_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_topic_without_partner_drops_its_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stamp_pairing, "WAITING_LIMIT", 3)
     pairs = Pairs()
     for stamp in range(10):

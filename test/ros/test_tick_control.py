@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When the world may tick, as a table of what happens."""
+"""When the simulated world may tick: lockstep, pauses, repetitions."""
 
 from typing import Any
 
@@ -15,67 +15,74 @@ def tick_control(**settings: Any) -> TickControl:
     return TickControl(WorldSimSettings(**(defaults | settings)))
 
 
-def test_a_tick_stays_open_until_its_answer() -> None:
-    world = tick_control()
-    assert world.may_move_on()
-    world.published(0.0)
-    assert world.is_open
-    assert not world.may_move_on()
-    world.answered()
-    assert world.may_move_on()
+def test_a_tick_is_open_until_its_commands_are_received() -> None:
+    control = tick_control()
+    assert control.may_advance()
+    control.open_tick(0.0)
+    assert control.is_open
+    assert not control.may_advance()
+    control.close_tick()
+    assert control.may_advance()
 
 
-def test_a_pause_keeps_the_answer_for_later() -> None:
-    world = tick_control()
-    world.published(0.0)
-    world.paused = True
-    assert world.cannot_step() == "refused: the planner has not answered the present tick yet"
-    world.answered()
-    assert not world.may_move_on()
-    assert world.cannot_step() == ""
-    assert world.resume()
-    assert world.cannot_step() == "refused: not paused; pause first"
-    assert not world.resume(), "it was not paused"
+def test_during_a_pause_the_commands_are_kept() -> None:
+    control = tick_control()
+    control.open_tick(0.0)
+    control.paused = True
+    assert control.step_refusal() == "refused: the present tick has no command yet"
+    control.close_tick()
+    assert not control.may_advance()
+    assert control.step_refusal() == ""
+    assert control.resume()
+    assert control.step_refusal() == "refused: not paused; pause first"
+    assert not control.resume(), "it was not paused"
 
 
 def test_after_a_pause_an_open_tick_still_waits() -> None:
-    world = tick_control(start_paused=True)
-    world.published(0.0)
-    assert not world.resume()
-    assert world.answered()
+    control = tick_control(start_paused=True)
+    control.open_tick(0.0)
+    assert not control.resume()
+    assert control.close_tick()
 
 
 def test_a_tick_is_repeated_after_each_timeout_and_then_given_up() -> None:
-    world = tick_control()
-    assert not world.must_repeat(100.0, 0), "nothing is open"
-    world.published(10.0)
+    control = tick_control()
+    assert not control.must_repeat(100.0, 0), "nothing is open"
+    control.open_tick(10.0)
     times = [11.9, 12.0, 13.9, 14.1, 15.0, 16.2]
-    assert [world.must_repeat(now, 7) for now in times] == [False, True, False, True, False, True]
+    assert [control.must_repeat(now, 7) for now in times] == [
+        False,
+        True,
+        False,
+        True,
+        False,
+        True,
+    ]
     line = r"^tick 7: no goal_step of its stamp and cmd_vel though published 4 times, 2 s apart"
     with pytest.raises(GraphError, match=line):
-        world.must_repeat(18.3, 7)
+        control.must_repeat(18.3, 7)
 
 
-def test_an_answer_ends_the_repetitions_and_the_next_tick_has_all_of_them() -> None:
-    world = tick_control(answer_retries=1)
+def test_a_command_ends_the_repetitions_and_the_next_tick_has_all_of_them() -> None:
+    control = tick_control(answer_retries=1)
     for tick in range(3):
         start = 10.0 * tick
-        world.published(start)
-        assert world.must_repeat(start + 2.0, tick)
-        world.answered()
-        assert not world.must_repeat(start + 9.0, tick)
+        control.open_tick(start)
+        assert control.must_repeat(start + 2.0, tick)
+        control.close_tick()
+        assert not control.must_repeat(start + 9.0, tick)
 
 
 def test_no_retries_at_all() -> None:
-    world = tick_control(answer_retries=0)
-    world.published(0.0)
+    control = tick_control(answer_retries=0)
+    control.open_tick(0.0)
     with pytest.raises(GraphError, match="published 1 times"):
-        world.must_repeat(2.0, 0)
+        control.must_repeat(2.0, 0)
 
 
-def test_in_real_time_no_tick_is_open_and_no_answer_moves_the_world() -> None:
-    world = tick_control(lockstep=False)
-    world.published(0.0)
-    assert not world.is_open
-    assert not world.may_move_on()
-    assert not world.must_repeat(1e9, 0)
+def test_in_real_time_no_tick_is_open_and_no_command_advances_the_world() -> None:
+    control = tick_control(lockstep=False)
+    control.open_tick(0.0)
+    assert not control.is_open
+    assert not control.may_advance()
+    assert not control.must_repeat(1e9, 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which topics are played, under which name and type; and who is waited for."""
+"""Which topics are played, with which name and type, and which subscribers are awaited."""
 
 import sys
 
@@ -127,7 +127,7 @@ def test_the_recorded_qos_is_offered() -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "text"),
     [
         ("--topics odm", "--topics /odm: not there; did you mean '/odom'?"),
         ("--exclude odm", "--exclude /odm: not there; did you mean '/odom'?"),
@@ -138,13 +138,13 @@ def test_the_recorded_qos_is_offered() -> None:
         ("--remap odom:=text", "--remap: /odom and /text would both be /text, but their types"),
     ],
 )
-def test_what_cannot_be_chosen_is_told(line: str, said: str) -> None:
-    with pytest.raises(ConfigError) as told:
+def test_a_bad_selection_is_refused(line: str, text: str) -> None:
+    with pytest.raises(ConfigError) as raised:
         chosen([topic("/odom", "nav_msgs/msg/Odometry"), topic("/text")], line)
-    assert str(told.value).startswith(said)
+    assert str(raised.value).startswith(text)
 
 
-def test_nothing_left_says_which_types_are_missing() -> None:
+def test_an_empty_selection_names_the_missing_types() -> None:
     with pytest.raises(ConfigError, match=r"left out /tf .* not installed; .* there: /tf"):
         chosen([topic("/tf", "tf2_msgs/msg/TFMessage")])
 
@@ -161,7 +161,7 @@ def test_nothing_left_says_which_types_are_missing() -> None:
         ("--as-fast-as-possible --inputs-of planner", {"/odom": 1, "/goal_pose": 1}),
     ],
 )
-def test_who_is_waited_for(line: str, wanted: dict[str, int] | None) -> None:
+def test_which_subscribers_are_awaited(line: str, wanted: dict[str, int] | None) -> None:
     settings = parse(["bag", *line.split()])
     recorded = {
         "/odom": topic("/odom", "nav_msgs/msg/Odometry"),
@@ -171,7 +171,7 @@ def test_who_is_waited_for(line: str, wanted: dict[str, int] | None) -> None:
     assert awaited(played, settings, resolve) == wanted
 
 
-def test_only_played_topics_can_be_waited_for() -> None:
+def test_only_played_topics_can_be_awaited() -> None:
     settings = parse(["bag", "--wait-for-subscribers", "odm"])
     played, _ = choose({"/odom": topic("/odom")}, settings, resolve)
     with pytest.raises(ConfigError, match=r"--wait-for-subscribers /odm: .* '/odom'"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The layouts name topics that exist, of the type and QoS that a display can show."""
+"""The viewer layouts name existing topics, with types and QoS that their displays accept."""
 
 import json
 import re
@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import yaml
-from planner_talk import LOCKSTEP, Talk
+from planner_talk import LOCKSTEP, PlannerHarness
 from project import ROOT
 from ros_graph import Graph
 from std_srvs.srv import Trigger
@@ -20,7 +20,7 @@ from mfba_planner.ros.interface.serialized_message import type_name
 LAYOUT = ROOT / "layout"
 GRAPH = {f"/{topic.name.lstrip('/')}": topic for topic in topics.GRAPH}
 PLUGINS = "rviz_default_plugins/"
-# What rviz_default_plugins' plugins_description.xml (Jazzy) says of those that are used here.
+# What rviz_default_plugins' plugins_description.xml (Jazzy) lists for those used here.
 DISPLAYS = {
     "Grid": None,
     "MarkerArray": "visualization_msgs/msg/MarkerArray",
@@ -49,7 +49,7 @@ def foxglove() -> Any:
     return json.loads((LAYOUT / "foxglove.json").read_text(encoding="utf-8"))
 
 
-def test_rviz_is_told_plugins_that_exist(rviz: Any) -> None:
+def test_rviz_plugins_exist(rviz: Any) -> None:
     manager = rviz["Visualization Manager"]
     assert {panel["Class"] for panel in rviz["Panels"]} == {f"rviz_common/{p}" for p in PANELS}
     assert {d["Class"] for d in manager["Displays"]} == {PLUGINS + name for name in DISPLAYS}
@@ -81,7 +81,7 @@ def test_rviz_shows_topics_of_the_graph_with_their_type_and_qos(rviz: Any) -> No
 
 
 def paths(layout: Any) -> Iterator[str]:
-    """Every topic or message path that a panel is told."""
+    """Every topic or message path of a panel."""
     for name, panel in layout["configById"].items():
         if name.startswith("3D!"):
             yield from panel["topics"]
@@ -90,24 +90,24 @@ def paths(layout: Any) -> Iterator[str]:
         yield from (path["value"] for path in panel.get("paths", []))
 
 
-def test_foxglove_is_told_topics_and_fields_that_exist(foxglove: Any) -> None:
-    seen = set()
+def test_foxglove_topics_and_fields_exist(foxglove: Any) -> None:
+    used = set()
     for path in paths(foxglove):
         name = re.match(r"/[a-z_/]+", path)
         assert name, path
         topic = GRAPH[name.group()]
-        seen.add(name.group())
+        used.add(name.group())
         kind: Any = topic.type
         for field in re.findall(r"\.(\w+)", path[name.end() :]):
-            told = kind.get_fields_and_field_types()
-            assert field in told, path
-            inner = re.sub(r"sequence<(.+)>|\[\d*\]", r"\1", told[field])
+            fields = kind.get_fields_and_field_types()
+            assert field in fields, path
+            inner = re.sub(r"sequence<(.+)>|\[\d*\]", r"\1", fields[field])
             package, _, name_of = inner.partition("/")
             kind = getattr(import_module(f"{package}.msg"), name_of) if name_of else None
-    assert len(seen) >= 10
+    assert len(used) >= 10
 
 
-def test_foxglove_places_every_panel_once_and_knows_their_kinds(foxglove: Any) -> None:
+def test_foxglove_lays_out_every_panel_once_and_their_types_exist(foxglove: Any) -> None:
     def leaves(node: Any) -> list[str]:
         if isinstance(node, str):
             return [node]
@@ -122,8 +122,8 @@ def test_foxglove_places_every_panel_once_and_knows_their_kinds(foxglove: Any) -
     assert {"globalVariables", "userNodes", "playbackConfig"} <= set(foxglove)
 
 
-def test_the_service_that_foxglove_calls_is_there(graph: Graph, foxglove: Any) -> None:
+def test_the_service_that_foxglove_calls_exists(graph: Graph, foxglove: Any) -> None:
     panel = foxglove["configById"]["CallService!cancel"]
-    Talk(graph, LOCKSTEP)
+    PlannerHarness(graph, LOCKSTEP)
     assert json.loads(panel["requestPayload"]) == {}
     assert graph.call(Trigger, panel["serviceName"]).success

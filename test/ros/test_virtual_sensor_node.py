@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""virtual_sensor: the core's sectors for any world or scan, and blindness instead of freedom."""
+"""virtual_sensor: the core's sectors for any world or scan, NaN sectors for refused inputs."""
 
 import math
 from typing import Any
@@ -49,7 +49,7 @@ def scan(stamp: int, ranges: Any = (1.0,) * 360, **changes: Any) -> LaserScan:
 
 
 class Sensor:
-    """A virtual sensor, what it is given and what it says."""
+    """A virtual sensor, publishers of its inputs and lists of its outputs."""
 
     def __init__(self, graph: Graph, parameters: dict[str, Any]) -> None:
         self.graph = graph
@@ -60,8 +60,8 @@ class Sensor:
         self.vectors = graph.hear(topics.SENSORY_VECTOR)
         self.node = graph.start(VirtualSensor, parameters)
 
-    def answers(self, *messages: Any) -> list[LaserScan]:
-        """Publish in this order and return the sectors that come of it."""
+    def measure_all(self, *messages: Any) -> list[LaserScan]:
+        """Publish the messages one after another; return the sectors that follow."""
         count = len(self.sectors)
         writers = {Odometry: self.odom, PoseArray: self.obstacles, LaserScan: self.scan}
         for message in messages:
@@ -69,8 +69,8 @@ class Sensor:
         self.graph.settle()
         return self.sectors[count:]
 
-    def answer(self, *messages: Any) -> LaserScan:
-        (only,) = self.answers(*messages)
+    def measure(self, *messages: Any) -> LaserScan:
+        (only,) = self.measure_all(*messages)
         return only
 
 
@@ -85,44 +85,44 @@ def is_blind(message: LaserScan) -> bool:
 def test_sectors_are_the_cores_for_many_worlds(graph: Graph) -> None:
     sensor = Sensor(graph, {"obstacle_radii_m": RADII, "robot_radius_m": ROBOT_RADIUS_M})
     rng = np.random.default_rng(2)
-    seen = set()
+    vectors = set()
     for stamp in range(1, 121):
         x, y, *rest = rng.uniform(-3.0, 3.0, 12).tolist()
         centers = list(zip(rest[::2], rest[1::2]))
         messages = [odom(stamp, x, y, yaw=stamp), obstacles(stamp, *centers)]
-        answer = sensor.answer(*(messages if stamp % 2 else reversed(messages)))
+        sectors = sensor.measure(*(messages if stamp % 2 else reversed(messages)))
         circles = [(c, r + ROBOT_RADIUS_M) for c, r in zip(centers, RADII)]
         expected = sense_circles((x, y), circles, SensorParams())
-        assert ranges_of(answer) == expected
-        assert stamp_ns(answer.header.stamp) == stamp
-        assert answer.header.frame_id == "odom"
+        assert ranges_of(sectors) == expected
+        assert stamp_ns(sectors.header.stamp) == stamp
+        assert sectors.header.frame_id == "odom"
         vs = sensory_vector(expected)
-        assert tuple(answer.intensities) == vs
+        assert tuple(sectors.intensities) == vs
         assert tuple(sensor.vectors[-1].data) == vs
-        seen.add(vs)
+        vectors.add(vs)
     assert len(sensor.vectors) == 120
-    assert len(seen) > 50, "the worlds were too much alike to say anything"
+    assert len(vectors) > 50, "the worlds were too much alike"
 
 
-def test_one_radius_stands_for_all(graph: Graph) -> None:
+def test_one_radius_holds_for_all_obstacles(graph: Graph) -> None:
     sensor = Sensor(graph, {"obstacle_radii_m": [0.5], "robot_radius_m": 0.1})
-    answer = sensor.answer(odom(1), obstacles(1, (1.0, 0.0), (0.0, 1.0)))
+    sectors = sensor.measure(odom(1), obstacles(1, (1.0, 0.0), (0.0, 1.0)))
     expected = sense_circles((0.0, 0.0), [((1.0, 0.0), 0.6), ((0.0, 1.0), 0.6)], SensorParams())
-    assert ranges_of(answer) == expected
+    assert ranges_of(sectors) == expected
 
 
 def test_no_obstacle_is_all_free(graph: Graph) -> None:
     sensor = Sensor(graph, {})
-    assert ranges_of(sensor.answer(odom(1), obstacles(1))) == (INF,) * 12
+    assert ranges_of(sensor.measure(odom(1), obstacles(1))) == (INF,) * 12
     assert tuple(sensor.vectors[0].data) == (0,) * 12
 
 
 def test_radii_that_do_not_fit_make_it_blind(graph: Graph) -> None:
     sensor = Sensor(graph, {"obstacle_radii_m": [0.3, 0.4]})
-    assert is_blind(sensor.answer(odom(1), obstacles(1, (1.0, 0.0))))
-    assert is_blind(sensor.answer(odom(2), obstacles(2)))
-    assert not is_blind(sensor.answer(odom(3), obstacles(3, (1.0, 0.0), (2.0, 0.0))))
-    assert sensor.node._refusals.count == 2
+    assert is_blind(sensor.measure(odom(1), obstacles(1, (1.0, 0.0))))
+    assert is_blind(sensor.measure(odom(2), obstacles(2)))
+    assert not is_blind(sensor.measure(odom(3), obstacles(3, (1.0, 0.0), (2.0, 0.0))))
+    assert sensor.node._refused_inputs.count == 2
 
 
 @pytest.mark.parametrize("bad", [math.nan, INF, -INF])
@@ -135,26 +135,29 @@ def test_a_bad_number_blinds_it_for_one_tick(graph: Graph, bad: float) -> None:
         (obstacles(4, (0.0, bad)), odom(4)),
     ]
     for pair in given:
-        assert is_blind(sensor.answer(*pair))
-    assert not sensor.vectors, "a blind sensor has no bits to show"
-    assert ranges_of(sensor.answer(odom(5), obstacles(5))) == (INF,) * 12
-    assert sensor.node._refusals.count == 4
+        assert is_blind(sensor.measure(*pair))
+    assert not sensor.vectors, "without sectors there is no sensory vector"
+    assert ranges_of(sensor.measure(odom(5), obstacles(5))) == (INF,) * 12
+    assert sensor.node._refused_inputs.count == 4
 
 
-def test_each_pair_is_answered_when_it_is_whole(graph: Graph) -> None:
+def test_each_pair_is_measured_when_it_is_complete(graph: Graph) -> None:
     sensor = Sensor(graph, {})
-    assert not sensor.answers(odom(1), odom(2), odom(3))
-    assert [stamp_ns(m.header.stamp) for m in sensor.answers(obstacles(2), obstacles(3))] == [2, 3]
-    assert not sensor.answers(obstacles(1)), "backwards"
-    assert not sensor.answers(odom(1))
-    assert sensor.node._refusals.count == 2
+    assert not sensor.measure_all(odom(1), odom(2), odom(3))
+    assert [stamp_ns(m.header.stamp) for m in sensor.measure_all(obstacles(2), obstacles(3))] == [
+        2,
+        3,
+    ]
+    assert not sensor.measure_all(obstacles(1)), "backwards"
+    assert not sensor.measure_all(odom(1))
+    assert sensor.node._refused_inputs.count == 2
 
 
-def test_a_tick_that_is_published_again_is_answered_again(graph: Graph) -> None:
+def test_a_repeated_tick_is_measured_again(graph: Graph) -> None:
     """A planner that was restarted gets its sectors though the sensor was not."""
     sensor = Sensor(graph, {})
-    first = sensor.answer(odom(1), obstacles(1, (1.0, 0.0)))
-    assert sensor.answer(obstacles(1, (1.0, 0.0)), odom(1)) == first
+    first = sensor.measure(odom(1), obstacles(1, (1.0, 0.0)))
+    assert sensor.measure(obstacles(1, (1.0, 0.0)), odom(1)) == first
 
 
 LOCKSTEP_SCAN = {"source": "scan", "lockstep": True}
@@ -162,7 +165,7 @@ REAL_SCAN = {"source": "scan"}
 
 
 def core_scan(message: LaserScan, yaw: float) -> tuple[float, ...]:
-    """The core's answer to a scan; LaserScan holds single precision."""
+    """The core's sectors of a scan; LaserScan holds single precision."""
     sent = Scan(
         ranges_m=np.array(message.ranges),
         angle_min_rad=message.angle_min,
@@ -185,62 +188,62 @@ def test_sectors_of_any_scan_are_the_cores(graph: Graph, scan_yaw: float) -> Non
         values[0] = INF  # one beam at least is usable
         message = scan(stamp, values.astype(np.float32).tolist())
         yaw = float(rng.uniform(-3.0, 3.0))
-        answer = sensor.answer(odom(stamp, 5.0, 5.0, yaw), message)
-        assert ranges_of(answer) == pytest.approx(core_scan(message, yaw + scan_yaw), rel=1e-5)
-        assert stamp_ns(answer.header.stamp) == stamp
+        sectors = sensor.measure(odom(stamp, 5.0, 5.0, yaw), message)
+        assert ranges_of(sectors) == pytest.approx(core_scan(message, yaw + scan_yaw), rel=1e-5)
+        assert stamp_ns(sectors.header.stamp) == stamp
 
 
 def test_the_sectors_stay_aligned_with_odom_when_the_robot_turns(graph: Graph) -> None:
     """A return straight ahead of a robot that looks north (yaw 90) lies in sectors 3 and 4."""
     sensor = Sensor(graph, LOCKSTEP_SCAN)
     ahead = [0.9] + [INF] * 359
-    answer = sensor.answer(odom(1, yaw=math.pi / 2), scan(1, ahead))
-    assert [i for i, r in enumerate(answer.ranges, start=1) if r < INF] == [3, 4]
+    sectors = sensor.measure(odom(1, yaw=math.pi / 2), scan(1, ahead))
+    assert [i for i, r in enumerate(sectors.ranges, start=1) if r < INF] == [3, 4]
     turned = Sensor(graph, {**LOCKSTEP_SCAN, "scan_yaw": math.pi / 2})
     graph.stop(sensor.node)
-    answer = turned.answer(odom(2), scan(2, ahead))
-    assert [i for i, r in enumerate(answer.ranges, start=1) if r < INF] == [3, 4]
+    sectors = turned.measure(odom(2), scan(2, ahead))
+    assert [i for i, r in enumerate(sectors.ranges, start=1) if r < INF] == [3, 4]
 
 
-def test_a_scan_in_another_frame_blinds_and_both_are_named(graph: Graph) -> None:
+def test_a_scan_in_another_frame_blinds_and_both_frames_are_named(graph: Graph) -> None:
     sensor = Sensor(graph, {**LOCKSTEP_SCAN, "scan_frame": "base_scan"})
     other = scan(1)
     other.header.frame_id = "rear"
-    assert all(map(math.isnan, sensor.answer(odom(1), other).ranges))
-    assert sensor.node._refusals.by_kind == {"scan: frame": 1}
-    assert sensor.node._refusals.last == (
+    assert all(map(math.isnan, sensor.measure(odom(1), other).ranges))
+    assert sensor.node._refused_inputs.by_kind == {"scan: frame": 1}
+    assert sensor.node._refused_inputs.last == (
         "scan is in frame 'rear', not 'base_scan'; transform it, or set scan_frame"
     )
-    assert not any(map(math.isnan, sensor.answer(odom(2), scan(2)).ranges))
+    assert not any(map(math.isnan, sensor.measure(odom(2), scan(2)).ranges))
 
 
 def test_lockstep_joins_scan_and_odom_by_stamp(graph: Graph) -> None:
     sensor = Sensor(graph, LOCKSTEP_SCAN)
-    assert not sensor.answers(odom(1, yaw=1.0), scan(2))
-    assert stamp_ns(sensor.answer(odom(2)).header.stamp) == 2
+    assert not sensor.measure_all(odom(1, yaw=1.0), scan(2))
+    assert stamp_ns(sensor.measure(odom(2)).header.stamp) == 2
 
 
-def test_in_real_time_each_scan_is_answered_with_the_newest_odom(graph: Graph) -> None:
+def test_in_real_time_each_scan_is_measured_with_the_newest_odom(graph: Graph) -> None:
     sensor = Sensor(graph, REAL_SCAN)
     ahead = [0.9] + [INF] * 359
-    assert is_blind(sensor.answer(scan(7, ahead))), "no odom yet"
-    assert not sensor.answers(odom(3, yaw=math.pi / 2))
+    assert is_blind(sensor.measure(scan(7, ahead))), "no odom yet"
+    assert not sensor.measure_all(odom(3, yaw=math.pi / 2))
     for stamp in (8, 9):
-        answer = sensor.answer(scan(stamp, ahead))
-        assert [i for i, r in enumerate(answer.ranges, start=1) if r < INF] == [3, 4]
-        assert stamp_ns(answer.header.stamp) == stamp
-    sensor.answers(odom(4, math.nan))
-    assert is_blind(sensor.answer(scan(10, ahead)))
+        sectors = sensor.measure(scan(stamp, ahead))
+        assert [i for i, r in enumerate(sectors.ranges, start=1) if r < INF] == [3, 4]
+        assert stamp_ns(sectors.header.stamp) == stamp
+    sensor.measure_all(odom(4, math.nan))
+    assert is_blind(sensor.measure(scan(10, ahead)))
 
 
-def test_a_lidar_with_best_effort_is_heard_and_a_reliable_one_only_once(graph: Graph) -> None:
+def test_a_best_effort_lidar_is_received_and_a_reliable_one_only_once(graph: Graph) -> None:
     sensor = Sensor(graph, REAL_SCAN)
-    sensor.answers(odom(1))
+    sensor.measure_all(odom(1))
     reliable = sensor.scan
     sensor.scan = graph.writer(topics.SCAN, qos=qos_profile_sensor_data)
-    assert len(sensor.answers(scan(2))) == 1
+    assert len(sensor.measure_all(scan(2))) == 1
     sensor.scan = reliable
-    assert len(sensor.answers(scan(3), scan(4))) == 2
+    assert len(sensor.measure_all(scan(3), scan(4))) == 2
 
 
 @pytest.mark.parametrize(
@@ -255,30 +258,30 @@ def test_a_lidar_with_best_effort_is_heard_and_a_reliable_one_only_once(graph: G
     ],
     ids=["all-nan", "empty", "too-near", "angle-nan", "increment-inf", "no-range"],
 )
-def test_a_scan_that_says_nothing_blinds_it(graph: Graph, message: LaserScan) -> None:
+def test_an_unusable_scan_blinds_it(graph: Graph, message: LaserScan) -> None:
     sensor = Sensor(graph, LOCKSTEP_SCAN)
-    assert is_blind(sensor.answer(odom(1), message))
+    assert is_blind(sensor.measure(odom(1), message))
     assert not sensor.vectors
-    assert sensor.node._refusals.count == 1
-    assert not is_blind(sensor.answer(odom(2), scan(2)))
+    assert sensor.node._refused_inputs.count == 1
+    assert not is_blind(sensor.measure(odom(2), scan(2)))
 
 
-def test_an_empty_lidar_hall_is_free(graph: Graph) -> None:
+def test_a_scan_without_returns_is_free(graph: Graph) -> None:
     sensor = Sensor(graph, LOCKSTEP_SCAN)
-    assert ranges_of(sensor.answer(odom(1), scan(1, [INF] * 360))) == (INF,) * 12
+    assert ranges_of(sensor.measure(odom(1), scan(1, [INF] * 360))) == (INF,) * 12
 
 
 def test_its_range_and_sectors_can_be_set_while_it_runs(graph: Graph) -> None:
     sensor = Sensor(graph, {"robot_radius_m": 0.3, "obstacle_radii_m": [0.3]})
     world = obstacles(1, (2.0, 0.0))
-    assert ranges_of(sensor.answer(odom(1), world)) == (INF,) * 12
+    assert ranges_of(sensor.measure(odom(1), world)) == (INF,) * 12
     assert graph.set_parameter("virtual_sensor", "sensing_range_m", 1.5) == ""
     assert graph.set_parameter("virtual_sensor", "sectors", 8) == ""
     world.header.stamp = time_msg(2)
-    answer = sensor.answer(odom(2), world)
+    sectors = sensor.measure(odom(2), world)
     expected = SensorParams(sensing_range_m=1.5, sectors=8)
-    assert ranges_of(answer) == sense_circles((0.0, 0.0), [((2.0, 0.0), 0.6)], expected)
-    assert min(answer.ranges) < INF
+    assert ranges_of(sectors) == sense_circles((0.0, 0.0), [((2.0, 0.0), 0.6)], expected)
+    assert min(sectors.ranges) < INF
 
 
 @pytest.mark.parametrize(
@@ -317,7 +320,7 @@ def test_what_cannot_be_set_is_refused_with_the_reason(
         ({"robot_radius_m": INF}, r"^robot_radius_m=inf"),
     ],
 )
-def test_parameters_are_judged_at_the_door(
+def test_bad_parameters_are_refused_at_start(
     graph: Graph, parameters: dict[str, Any], line: str
 ) -> None:
     with pytest.raises(ConfigError, match=line):
@@ -333,7 +336,7 @@ def test_it_starts_afresh_when_time_is_set_back(graph: Graph) -> None:
         graph.until(lambda: sensor.node.get_clock().now().nanoseconds == stamp)
 
     set_time(10**9)
-    sensor.answer(odom(10**9), obstacles(10**9))
-    assert not sensor.answers(odom(5), obstacles(5))
+    sensor.measure(odom(10**9), obstacles(10**9))
+    assert not sensor.measure_all(odom(5), obstacles(5))
     set_time(5)
-    assert len(sensor.answers(odom(5), obstacles(5))) == 1
+    assert len(sensor.measure_all(odom(5), obstacles(5))) == 1

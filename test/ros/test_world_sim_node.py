@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""world_sim as others see it: its ticks, its services, and what it does with a bad Twist."""
+"""world_sim: its ticks, its services, and its reaction to a bad Twist."""
 
 import json
 import math
@@ -42,7 +42,7 @@ def twist(vx: float = 0.0, vy: float = 0.0) -> Twist:
 
 
 class Driver:
-    """A world and somebody who answers its ticks by hand."""
+    """A world whose ticks are commanded by hand."""
 
     def __init__(self, graph: Graph, parameters: dict[str, Any], kind: Any = Twist) -> None:
         self.graph = graph
@@ -66,16 +66,16 @@ class Driver:
         self.graph.until(lambda: len(self.odom) >= count)
         assert len(self.odom) == count
 
-    def send(self, message: Any, stamp: int | None = None) -> None:
-        """Answer a tick, the present one if no stamp is given."""
+    def command(self, message: Any, stamp: int | None = None) -> None:
+        """Publish the command of a tick, of the present one if no stamp is given."""
         stamp = self.stamps[-1] if stamp is None else stamp
         self.goal_step.publish(pose_stamped_msg((0.0, 0.0), stamp, "odom"))
         self.cmd_vel.publish(message)
 
-    def answer(self, message: Any) -> None:
-        """Answer the present tick and wait for the next one."""
+    def drive(self, message: Any) -> None:
+        """Publish the command of the present tick and wait for the next one."""
         count = len(self.odom)
-        self.send(message)
+        self.command(message)
         self.wait_for_ticks(count + 1)
 
     def trigger(self, name: str) -> Any:
@@ -87,54 +87,54 @@ class Driver:
 
 @pytest.fixture
 def driver(graph: Graph) -> Driver:
-    """A lockstep world whose first tick is out."""
+    """A lockstep world whose first tick is published."""
     started = Driver(graph, {"scenario": scenario(), **LOCKSTEP})
     started.wait_for_ticks(1)
     return started
 
 
-def test_lockstep_waits_for_each_answer(driver: Driver) -> None:
+def test_lockstep_waits_for_each_command(driver: Driver) -> None:
     for tick in range(1, 6):
         driver.graph.settle()
         assert len(driver.odom) == tick
-        driver.answer(twist(0.1, -0.2))
+        driver.drive(twist(0.1, -0.2))
     dt = TICK_NS * NANO
     assert driver.positions[1] == (0.1 * dt, -0.2 * dt)
     assert driver.positions[5] == pytest.approx((0.5 * dt, -1.0 * dt))
 
 
-def test_a_second_twist_for_one_tick_is_not_an_answer_to_the_next(driver: Driver) -> None:
+def test_a_second_twist_of_one_tick_does_not_command_the_next(driver: Driver) -> None:
     driver.pause(True)
-    driver.send(twist(0.1))
+    driver.command(twist(0.1))
     driver.graph.settle()
-    driver.send(twist(50.0))
+    driver.command(twist(50.0))
     driver.graph.settle()
     driver.trigger("step")
     driver.wait_for_ticks(2)
     assert driver.positions[1] == (0.1 * TICK_NS * NANO, 0.0)
 
 
-def test_an_answer_to_a_tick_of_the_past_is_none_to_the_present_one(driver: Driver) -> None:
-    """As a planner's that was asked twice: it answers twice."""
-    driver.answer(twist(0.1))
-    driver.send(twist(9.0), stamp=TICK_NS)
+def test_a_command_of_an_earlier_tick_does_not_command_the_present_one(driver: Driver) -> None:
+    """As from a planner that received a tick twice: it commands twice."""
+    driver.drive(twist(0.1))
+    driver.command(twist(9.0), stamp=TICK_NS)
     driver.graph.settle()
     assert len(driver.odom) == 2
-    driver.answer(twist(0.2))
+    driver.drive(twist(0.2))
     assert driver.positions[2][0] == pytest.approx(0.3 * TICK_NS * NANO)
 
 
-def test_a_twist_without_a_goal_step_is_no_answer(driver: Driver) -> None:
+def test_a_twist_without_a_goal_step_is_no_command(driver: Driver) -> None:
     driver.cmd_vel.publish(twist(9.0))
     driver.graph.settle()
     assert len(driver.odom) == 1
-    driver.answer(twist(0.1))
+    driver.drive(twist(0.1))
     assert driver.positions[1] == (0.1 * TICK_NS * NANO, 0.0)
 
 
 def test_one_stamp_per_tick_rising_from_above_zero(driver: Driver) -> None:
     for _ in range(4):
-        driver.answer(twist())
+        driver.drive(twist())
     driver.graph.settle()
     assert driver.stamps == [TICK_NS * (tick + 1) for tick in range(5)]
     assert [stamp_ns(message.clock) for message in driver.clock] == driver.stamps
@@ -148,7 +148,7 @@ def test_obstacles_are_the_closed_form_of_time(graph: Graph) -> None:
         driver = Driver(graph, {"scenario": name, **LOCKSTEP})
         driver.wait_for_ticks(1)
         for _ in range(60):
-            driver.answer(twist())
+            driver.drive(twist())
         graph.settle()
         shipped = load_scenario(name)
         for tick, message in enumerate(driver.obstacles):
@@ -157,22 +157,22 @@ def test_obstacles_are_the_closed_form_of_time(graph: Graph) -> None:
         graph.stop(driver.world)
 
 
-def test_what_moves_first_is_told_the_velocity_it_moved_with(driver: Driver) -> None:
-    driver.answer(twist(0.3, 0.4))
+def test_odometry_holds_the_velocity_of_the_last_tick(driver: Driver) -> None:
+    driver.drive(twist(0.3, 0.4))
     linear = driver.odom[1].twist.twist.linear
     assert (linear.x, linear.y) == (0.3, 0.4)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_the_robot_stands_on_a_twist_that_is_not_finite(driver: Driver, bad: float) -> None:
-    driver.answer(twist(0.5))
+    driver.drive(twist(0.5))
     for message in (twist(bad), twist(0.0, bad), Twist(angular=Vector3(z=bad))):
-        driver.answer(message)
+        driver.drive(message)
     assert len(set(driver.positions[1:])) == 1
-    assert driver.world._refusals.count == 3
+    assert driver.world._refused_inputs.count == 3
 
 
-def test_an_unanswered_tick_is_published_again_and_then_given_up(graph: Graph) -> None:
+def test_a_tick_without_command_is_repeated_and_then_given_up(graph: Graph) -> None:
     driver = Driver(graph, {"lockstep": True, "answer_timeout_s": 0.05, "answer_retries": 2})
     line = r"^tick 0: no goal_step of its stamp and cmd_vel though published 3 times, 0\.05 s"
     with pytest.raises(GraphError, match=line):
@@ -181,16 +181,16 @@ def test_an_unanswered_tick_is_published_again_and_then_given_up(graph: Graph) -
     assert len({str(message) for message in driver.obstacles}) == 1
 
 
-def test_a_late_answer_to_a_repeated_tick_counts_once(graph: Graph) -> None:
+def test_a_late_command_of_a_repeated_tick_counts_once(graph: Graph) -> None:
     driver = Driver(graph, {"lockstep": True, "answer_timeout_s": 0.05, "answer_retries": 10**6})
     graph.until(lambda: len(driver.odom) >= 3)
-    driver.send(twist(0.1))
+    driver.command(twist(0.1))
     graph.until(lambda: driver.stamps[-1] > TICK_NS)
     assert driver.stamps[-1] == 2 * TICK_NS
 
 
-def test_lockstep_begins_when_somebody_listens(graph: Graph) -> None:
-    """Started by hand, a world may be long alone: that is no failure."""
+def test_lockstep_starts_when_odom_has_a_subscriber(graph: Graph) -> None:
+    """Started by hand, a world may run long without subscribers: that is no fault."""
     world = graph.start(
         WorldSim, {"lockstep": True, "answer_timeout_s": 0.05, "answer_retries": 0}
     )
@@ -201,10 +201,10 @@ def test_lockstep_begins_when_somebody_listens(graph: Graph) -> None:
     graph.until(lambda: len(odom) == 1)
 
 
-def test_lockstep_begins_when_those_it_waits_for_are_there(graph: Graph) -> None:
-    told = {"lockstep": True, "answer_timeout_s": 0.05, "wait_for": "virtual_sensor"}
-    graph.start(WorldSim, told)
-    odom = graph.hear(topics.ODOM)  # somebody listens, but not everybody it waits for
+def test_lockstep_starts_when_the_nodes_of_wait_for_are_there(graph: Graph) -> None:
+    parameters = {"lockstep": True, "answer_timeout_s": 0.05, "wait_for": "virtual_sensor"}
+    graph.start(WorldSim, parameters)
+    odom = graph.hear(topics.ODOM)  # odom has a subscriber, but virtual_sensor is missing
     started = time.monotonic()
     graph.until(lambda: time.monotonic() > started + 0.5)
     assert odom == []
@@ -212,10 +212,10 @@ def test_lockstep_begins_when_those_it_waits_for_are_there(graph: Graph) -> None
     graph.until(lambda: len(odom) > 0)
 
 
-def test_pause_holds_the_world_until_it_is_lifted(driver: Driver) -> None:
+def test_pause_stops_the_world_until_it_ends(driver: Driver) -> None:
     response = driver.pause(True)
     assert (response.success, response.message) == (True, "paused")
-    driver.send(twist(0.1))
+    driver.command(twist(0.1))
     driver.graph.settle()
     assert len(driver.odom) == 1
     response = driver.pause(False)
@@ -224,7 +224,7 @@ def test_pause_holds_the_world_until_it_is_lifted(driver: Driver) -> None:
     assert driver.positions[1] == (0.1 * TICK_NS * NANO, 0.0)
     assert driver.pause(False).message == "running"
     driver.graph.settle()
-    assert len(driver.odom) == 2, "lifting no pause is no answer"
+    assert len(driver.odom) == 2, "ending no pause is no command"
 
 
 def test_step_is_one_tick(driver: Driver) -> None:
@@ -232,9 +232,9 @@ def test_step_is_one_tick(driver: Driver) -> None:
     driver.pause(True)
     refused = driver.trigger("step")
     assert not refused.success
-    assert refused.message == "refused: the planner has not answered the present tick yet"
+    assert refused.message == "refused: the present tick has no command yet"
     for tick in range(1, 4):
-        driver.send(twist(0.1))
+        driver.command(twist(0.1))
         driver.graph.settle()
         response = driver.trigger("step")
         assert (response.success, response.message) == (True, f"tick {tick}")
@@ -251,12 +251,12 @@ def test_started_paused_nothing_moves_before_the_first_step(graph: Graph) -> Non
     assert driver.stamps == [TICK_NS]
 
 
-def test_reset_puts_everything_back_but_the_stamps(graph: Graph) -> None:
+def test_reset_restores_everything_but_the_stamps(graph: Graph) -> None:
     driver = Driver(graph, {"scenario": scenario(obstacles=OBSTACLES), **LOCKSTEP})
     goals = graph.hear(topics.GOAL_POSE)
     driver.wait_for_ticks(1)
-    driver.answer(twist(0.5))
-    driver.answer(twist(0.5))
+    driver.drive(twist(0.5))
+    driver.drive(twist(0.5))
     response = driver.trigger("reset")
     assert (response.success, response.message) == (True, f"tick 0 at stamp {4 * TICK_NS} ns")
     driver.wait_for_ticks(4)
@@ -268,22 +268,22 @@ def test_reset_puts_everything_back_but_the_stamps(graph: Graph) -> None:
     assert len(goals) == 2
 
 
-def test_an_answer_from_before_a_reset_does_not_move_the_new_run(driver: Driver) -> None:
+def test_a_command_from_before_a_reset_does_not_move_the_new_run(driver: Driver) -> None:
     driver.trigger("reset")
     driver.wait_for_ticks(2)
-    driver.send(twist(9.0), stamp=TICK_NS)  # the answer to the tick that was swept away
+    driver.command(twist(9.0), stamp=TICK_NS)  # the command of the tick before the reset
     driver.graph.settle()
     assert len(driver.odom) == 2
-    driver.answer(twist(0.1))
+    driver.drive(twist(0.1))
     assert driver.positions[2] == (0.1 * TICK_NS * NANO, 0.0)
 
 
 def test_initialpose_puts_the_robot_elsewhere(driver: Driver) -> None:
     teleport = driver.graph.writer(topics.INITIALPOSE)
-    there = PoseWithCovariance(pose=pose_msg(5.0, -6.0, math.pi / 2))
-    teleport.publish(PoseWithCovarianceStamped(pose=there))
+    pose = PoseWithCovariance(pose=pose_msg(5.0, -6.0, math.pi / 2))
+    teleport.publish(PoseWithCovarianceStamped(pose=pose))
     driver.graph.settle()
-    driver.answer(twist(0.5, 0.0))
+    driver.drive(twist(0.5, 0.0))
     pose = robot_pose(driver.odom[1])
     # Forward in the body frame is +y for a robot that looks north.
     assert pose.position == pytest.approx((5.0, -6.0 + 0.5 * TICK_NS * NANO))
@@ -295,9 +295,9 @@ def test_an_initialpose_that_is_not_finite_is_refused(driver: Driver) -> None:
     nowhere = PoseWithCovariance(pose=pose_msg(math.nan, 0.0))
     driver.graph.writer(topics.INITIALPOSE).publish(PoseWithCovarianceStamped(pose=nowhere))
     driver.graph.settle()
-    driver.answer(twist())
+    driver.drive(twist())
     assert driver.positions == [(0.0, 0.0)] * 2
-    assert driver.world._refusals.count == 1
+    assert driver.world._refused_inputs.count == 1
 
 
 def ends(driver: Driver) -> list[tuple[str, str]]:
@@ -306,9 +306,9 @@ def ends(driver: Driver) -> list[tuple[str, str]]:
 
 def test_the_run_ends_at_the_goal(driver: Driver) -> None:
     dt = TICK_NS * NANO
-    driver.answer(twist(0.5 / dt))
-    driver.answer(twist(0.49 / dt))
-    driver.send(twist(1.0))
+    driver.drive(twist(0.5 / dt))
+    driver.drive(twist(0.49 / dt))
+    driver.command(twist(1.0))
     driver.graph.until(lambda: driver.world.over)
     driver.graph.settle()
     assert len(driver.odom) == 3
@@ -326,8 +326,8 @@ def test_the_run_ends_at_the_time_limit(graph: Graph) -> None:
     driver = Driver(graph, {"scenario": scenario(time_limit_s=limit_s), **LOCKSTEP})
     driver.wait_for_ticks(1)
     for _ in range(3):
-        driver.answer(twist())
-    driver.send(twist())
+        driver.drive(twist())
+    driver.command(twist())
     graph.until(lambda: driver.world.over)
     graph.settle()
     assert len(driver.odom) == 4
@@ -340,9 +340,9 @@ def test_run_on_goes_on(graph: Graph) -> None:
         graph, {"scenario": scenario(time_limit_s=limit_s), "run_on": True, **LOCKSTEP}
     )
     driver.wait_for_ticks(1)
-    driver.answer(twist(1.0 / (TICK_NS * NANO)))
+    driver.drive(twist(1.0 / (TICK_NS * NANO)))
     for _ in range(5):
-        driver.answer(twist())
+        driver.drive(twist())
     assert ends(driver) == [("running", "0")]
 
 
@@ -362,7 +362,7 @@ def test_real_time_ticks_on_a_wall_timer_with_the_newest_twist(graph: Graph) -> 
     assert steps == pytest.approx([0.01] * len(steps))
 
 
-def test_real_time_begins_when_those_it_waits_for_are_there(graph: Graph) -> None:
+def test_real_time_starts_when_the_nodes_of_wait_for_are_there(graph: Graph) -> None:
     driver = Driver(graph, {"speed_factor": 1000.0, "wait_for": "virtual_sensor"})
     graph.settle()
     assert driver.odom == []
@@ -384,7 +384,7 @@ def test_real_time_can_be_paused_and_stepped(graph: Graph) -> None:
     assert len(driver.odom) == count
 
 
-def test_a_stamped_twist_is_taken_where_it_is_asked_for(graph: Graph) -> None:
+def test_stamped_twists_are_followed_where_enabled(graph: Graph) -> None:
     parameters = {"enable_stamped_cmd_vel": True, "scenario": scenario(), **LOCKSTEP}
     driver = Driver(graph, parameters, TwistStamped)
     driver.wait_for_ticks(1)
@@ -396,9 +396,9 @@ def test_a_stamped_twist_is_taken_where_it_is_asked_for(graph: Graph) -> None:
     assert driver.positions[1] == (0.2 * TICK_NS * NANO, 0.0)
 
 
-def test_goal_and_state_are_there_for_whoever_comes_late(driver: Driver) -> None:
+def test_goal_and_outcome_are_latched_for_late_subscribers(driver: Driver) -> None:
     for _ in range(3):
-        driver.answer(twist())
+        driver.drive(twist())
     goals = driver.graph.hear(topics.GOAL_POSE)
     outcome = driver.graph.hear(topics.OUTCOME)
     driver.graph.until(lambda: bool(goals and outcome))
@@ -407,13 +407,13 @@ def test_goal_and_state_are_there_for_whoever_comes_late(driver: Driver) -> None
     assert outcome[0].message == "running"
 
 
-def test_views_come_at_their_own_low_rate(graph: Graph) -> None:
+def test_views_are_published_at_their_own_low_rate(graph: Graph) -> None:
     period_s = 3 * TICK_NS * NANO
     trail, marks = graph.hear(topics.TRAIL), graph.hear(topics.MARKERS)
     driver = Driver(graph, {"scenario": "case2", "view_period_s": period_s, **LOCKSTEP})
     driver.wait_for_ticks(1)
     for _ in range(6):
-        driver.answer(twist(0.1))
+        driver.drive(twist(0.1))
     graph.settle()
     assert [len(path.poses) for path in trail] == [1, 2, 3]
     assert len(marks) == 3
@@ -447,7 +447,7 @@ def test_the_whole_scenario_is_a_parameter(graph: Graph) -> None:
         ({"lockstep": "yes"}, r"^parameter lockstep='yes': wrong type; give a bool"),
     ],
 )
-def test_parameters_are_judged_at_the_door(
+def test_bad_parameters_are_refused_at_start(
     graph: Graph, parameters: dict[str, Any], line: str
 ) -> None:
     with pytest.raises(ConfigError, match=line):

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a node is made of: its publishers, its subscriptions, and what it reports of itself."""
+"""The publishers, subscriptions and diagnostics that the nodes consist of."""
 
 from .. import require_ros  # noqa: F401

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot is told by its planner: by every Twist, or by the one that answers a stamp."""
+"""world_sim's cmd_vel and goal_step of one robot: the command that the robot follows."""
 
 from __future__ import annotations
 
@@ -18,35 +18,36 @@ from ..interface.serialized_message import header_stamp_ns
 from ..node_parameters import WorldSimSettings
 from ..runtime.command_matching import CommandMatching
 from ..runtime.command_timeout import CommandTimeout
-from ..runtime.node_runtime import GraphNode, Refusals
+from ..runtime.graph_node import GraphNode
 from ..runtime.polled_subscriptions import PolledSubscriptions, SerializedMessage
+from ..runtime.refused_inputs import RefusedInputs
 from .robot_namespace import NamespacedNode
 
 REST: Point = (0.0, 0.0)
 
 
 class CommandSubscriptions:
-    """The subscriptions of world_sim to cmd_vel and goal_step, and what they have told last."""
+    """Lockstep: the command of the tick's stamp. Real time: the newest, until it times out."""
 
     def __init__(
         self,
         node: GraphNode | NamespacedNode,
         settings: WorldSimSettings,
         world: Callable[[], World],
-        refusals: Refusals,
-        on_heard: Callable[[], None],
+        refused_inputs: RefusedInputs,
+        on_cmd_vel: Callable[[], None],
     ) -> None:
-        """Subscribe for the robot of a world; in lockstep on_heard says that a Twist has come."""
-        self.told: Point = REST  # as World.step takes it
+        """Subscribe for the robot of a world; in lockstep call on_cmd_vel after each Twist."""
+        self.command: Point = REST  # as World.step takes it
         self._settings = settings
         self._world = world
-        self._refusals = refusals
-        self._on_heard = on_heard
+        self._refused_inputs = refused_inputs
+        self._notify = on_cmd_vel
         self._command_matching = CommandMatching()
         self._command_timeout = CommandTimeout(settings)
         stamped = TwistStamped if settings.enable_stamped_cmd_vel else None
-        node.listen(topics.CMD_VEL, self._on_cmd_vel, stamped)
-        # Looked into when a Twist has come: nothing more to wake up for.
+        node.subscribe(topics.CMD_VEL, self._on_cmd_vel, stamped)
+        # Polled when a Twist was received: the executor need not wake up for it.
         self._goal_steps = PolledSubscriptions()
         step = topics.GOAL_STEP
         node.subscribe_polled(
@@ -54,42 +55,42 @@ class CommandSubscriptions:
         )
 
     def take(self, stamp: int) -> bool:
-        """Lockstep: whether the Twist that answers this stamp has come, once; it is obeyed."""
+        """Lockstep: follow the Twist of this stamp; False if it was not received or is taken."""
         if not self._settings.enable_stamped_cmd_vel:
-            self._goal_steps.empty()
+            self._goal_steps.poll()
         message = self._command_matching.take(stamp)
         if message is not None:
-            self._obey(message)
+            self._convert(message)
         return message is not None
 
-    def rest(self) -> None:
-        """Forget what was told."""
-        self.told = REST
+    def stop(self) -> None:
+        """Set the command to rest."""
+        self.command = REST
 
-    def rest_if_silent(self) -> None:
-        """Real time: forget what was told too long ago."""
+    def stop_if_timed_out(self) -> None:
+        """Real time: rest where the last Twist is too old."""
         if self._command_timeout.has_expired(time.monotonic()):
-            self.rest()
+            self.stop()
 
-    def _obey(self, message: Any) -> None:
-        """Do what a Twist says, and rest where it cannot be meant."""
-        self.rest()
+    def _convert(self, message: Any) -> None:
+        """Make a Twist the command; rest where it is refused."""
+        self.stop()
         world = self._world()
         try:
-            self.told = told(message, world.scenario.robot, world.pose.yaw)
+            self.command = told(message, world.scenario.robot, world.pose.yaw)
         except InputError as error:
-            self._refusals.add(error)
+            self._refused_inputs.add(error)
 
     def _on_cmd_vel(self, message: Any, info: Any) -> None:
         if not self._settings.lockstep:
-            self._command_timeout.heard(time.monotonic())
-            self._obey(message)
+            self._command_timeout.received(time.monotonic())
+            self._convert(message)
             return
         sent_ns = info["source_timestamp"]
         if self._settings.enable_stamped_cmd_vel:
-            self._command_matching.goal_step(stamp_ns(message.header.stamp), sent_ns)
-        self._command_matching.cmd_vel(message, sent_ns)
-        self._on_heard()
+            self._command_matching.add_goal_step(stamp_ns(message.header.stamp), sent_ns)
+        self._command_matching.add_cmd_vel(message, sent_ns)
+        self._notify()
 
     def _on_goal_step(self, message: SerializedMessage) -> None:
-        self._command_matching.goal_step(header_stamp_ns(message.data), message.sent_ns)
+        self._command_matching.add_goal_step(header_stamp_ns(message.data), message.sent_ns)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""/diagnostics, as planner and virtual_sensor publish it."""
+"""The publisher of /diagnostics in planner and virtual_sensor."""
 
 from __future__ import annotations
 
@@ -10,42 +10,42 @@ from ...core.types import NANO
 from ..interface import to_messages, topics
 from ..interface.health import Status
 from ..node_parameters import PlannerSettings, VirtualSensorSettings
-from ..runtime.node_runtime import GraphNode
+from ..runtime.graph_node import GraphNode
 
 
-class DiagnosticTopic:
-    """The publisher of /diagnostics: once in a period, and at once when something changes.
+class DiagnosticsPublisher:
+    """Publishes /diagnostics once a period, and at once when something changes.
 
-    Its stamps are those of what the node hears, and go on with a steady clock in between.
+    Its stamps follow those of the node's inputs; in between, a steady clock is added.
     """
 
     def __init__(self, node: GraphNode, settings: PlannerSettings | VirtualSensorSettings) -> None:
-        """Advertise it."""
+        """Advertise /diagnostics."""
         self._publisher = node.advertise(topics.DIAGNOSTICS)
-        self._who = node.get_fully_qualified_name().lstrip("/")
+        self._node_name = node.get_fully_qualified_name().lstrip("/")
         self._hardware_id = settings.hardware_id
         self._period_ns = round(settings.diagnostics_period_s / NANO)
         self._last_ns = -1
         self._last_summary: list[Any] = []
         self._stamp_ns, self._stamp_s = node.get_clock().now().nanoseconds, time.monotonic()
 
-    def at(self, stamp_ns: int, now_s: float) -> None:
-        """What was heard is stamped stamp_ns; told the same again, time goes on all the same."""
+    def set_time(self, stamp_ns: int, now_s: float) -> None:
+        """An input has this stamp; with the same stamp again the time keeps running."""
         if stamp_ns != self._stamp_ns:
             self._stamp_ns, self._stamp_s = stamp_ns, now_s
 
     def is_due(self, now_s: float) -> bool:
-        """Whether a period has passed since the last, or time was set back."""
+        """Whether a period has passed since the last message, or time was set back."""
         stamp_ns = self._stamp(now_s)
         return not 0 <= self._last_ns <= stamp_ns < self._last_ns + self._period_ns
 
-    def publish(self, statuses: list[Status], now_s: float, *, news: bool) -> None:
-        """Publish what is due, has changed its level, or is news for another reason."""
+    def publish(self, statuses: list[Status], now_s: float, *, changed: bool) -> None:
+        """Publish if a period has passed, a level has changed, or `changed` is True."""
         summary = [status.summary for status in statuses]
-        if news or summary != self._last_summary or self.is_due(now_s):
+        if changed or summary != self._last_summary or self.is_due(now_s):
             self._last_summary, self._last_ns = summary, self._stamp(now_s)
             message = to_messages.diagnostics_msg(
-                statuses, self._who, self._hardware_id, self._last_ns
+                statuses, self._node_name, self._hardware_id, self._last_ns
             )
             self._publisher.publish(message)
 

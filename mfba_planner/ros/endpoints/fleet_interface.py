@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All robots of the simulated world, and who of them the present tick is for."""
+"""The robots of the simulated world: their topics, and the Fleet or World they move in."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from ...simulation.scenario import Scenario
 from ...simulation.world import World
 from ..interface import to_messages, topics
 from ..node_parameters import WorldSimSettings
-from ..runtime.node_runtime import GraphNode, Refusals
+from ..runtime.graph_node import GraphNode
+from ..runtime.refused_inputs import RefusedInputs
 from .robot_interface import RobotInterface
 
 
 class SingleRobot:
-    """The world of one robot, handled as a Fleet is."""
+    """The world of one robot, with the methods of a Fleet."""
 
     def __init__(self, world: World) -> None:
-        """Take the world as it is."""
+        """Take the world in its present state."""
         self.world, self.robot_worlds = world, [world]
 
     @property
@@ -30,107 +31,107 @@ class SingleRobot:
 
     @property
     def outcomes(self) -> list[Outcome | None]:
-        """As Fleet.outcomes; of the robot as it is now, since somebody may have put it there."""
+        """As Fleet.outcomes; recomputed, since initialpose may have moved the robot."""
         return [self.world.outcome()]
 
-    def step(self, told: dict[int, Point]) -> None:
+    def step(self, commands: dict[int, Point]) -> None:
         """As Fleet.step()."""
-        self.world.step(told[0])
+        self.world.step(commands[0])
 
 
 class FleetInterface:
-    """One robot, or a fleet's: they move together, and arrive one by one."""
+    """One robot or a fleet: all move in one step, each is active until it has its outcome."""
 
     def __init__(
         self,
         node: GraphNode,
         settings: WorldSimSettings,
         scenario: Scenario,
-        refusals: Refusals,
-        on_heard: Callable[[], None],
+        refused_inputs: RefusedInputs,
+        on_cmd_vel: Callable[[], None],
     ) -> None:
-        """Advertise and subscribe for all; begin() comes before anything else."""
+        """Advertise and subscribe for all robots; reset() must be called first."""
         self._settings, self._scenario = settings, scenario
-        self._time = node.advertise(topics.CLOCK)
+        self._clock = node.advertise(topics.CLOCK)
         self.robots = [
-            RobotInterface(node, settings, name, scenario, refusals, on_heard)
+            RobotInterface(node, settings, name, scenario, refused_inputs, on_cmd_vel)
             for name in scenario.robot_names or ("",)
         ]
 
     @property
     def tick(self) -> int:
         """The present tick."""
-        return self._all.tick
+        return self._state.tick
 
     @property
     def world(self) -> World | Fleet:
-        """The world as it is now; of several robots their Fleet."""
-        return self._all.world if isinstance(self._all, SingleRobot) else self._all
+        """The present World; of several robots their Fleet."""
+        return self._state.world if isinstance(self._state, SingleRobot) else self._state
 
     @property
     def have_subscribers(self) -> bool:
-        """Whether somebody reads each robot's odom."""
-        return all(robot.has_subscribers for robot in self.robots)
+        """Whether each robot's odom has a subscriber."""
+        return all(robot.publishers.has_odom_subscriber for robot in self.robots)
 
-    def begin(self, stamp_ns: int) -> None:
-        """All are at their starts, at tick 0, whose stamp this is."""
+    def reset(self, stamp_ns: int) -> None:
+        """Put all robots at their starts, at tick 0, whose stamp this is."""
         s, scenario = self._settings, self._scenario
-        told = (scenario, s.tick_ns, s.goal_tolerance_m, s.seed)
-        self._all: SingleRobot | Fleet = (
-            Fleet(*told) if scenario.robots else SingleRobot(World(*told))
+        arguments = (scenario, s.tick_ns, s.goal_tolerance_m, s.seed)
+        self._state: SingleRobot | Fleet = (
+            Fleet(*arguments) if scenario.robots else SingleRobot(World(*arguments))
         )
-        for robot, place in zip(self.robots, self._all.robot_worlds):
-            robot.begin(place, stamp_ns)
-        self._asked = dict(enumerate(self.robots))
+        for robot, world in zip(self.robots, self._state.robot_worlds):
+            robot.reset(world, stamp_ns)
+        self._active = dict(enumerate(self.robots))
 
-    def publish(self, stamp_ns: int) -> None:
-        """Publish the present tick to whom it is for; to others too in real time."""
+    def publish_tick(self, stamp_ns: int) -> None:
+        """Publish the present tick of the active robots; in real time of all."""
         for robot in self.robots:
-            robot.answered = False
-        self.publish_again(stamp_ns)
+            robot.has_command = False
+        self.repeat_tick(stamp_ns)
 
-    def publish_again(self, stamp_ns: int) -> None:
-        """Publish the present tick to those who have not answered it."""
-        self._time.publish(to_messages.clock_msg(stamp_ns))
-        # In real time a robot that has arrived must see on: its planner would call it blind.
-        for robot in self._asked.values() if self._settings.lockstep else self.robots:
-            if not robot.answered:
-                robot.tick(stamp_ns)
+    def repeat_tick(self, stamp_ns: int) -> None:
+        """Publish the present tick of the robots whose command is missing."""
+        self._clock.publish(to_messages.clock_msg(stamp_ns))
+        # In real time robots that have arrived too: their planners would call their inputs stale.
+        for robot in self._active.values() if self._settings.lockstep else self.robots:
+            if not robot.has_command:
+                robot.publish_tick(stamp_ns)
 
-    def have_answered(self, stamp_ns: int) -> bool:
-        """Lockstep: whether all answers to this stamp have come."""
-        for robot in self._asked.values():
-            robot.take(stamp_ns)
-        return all(robot.answered for robot in self._asked.values())
+    def take_commands(self, stamp_ns: int) -> bool:
+        """Lockstep: take the commands of this stamp; whether all active robots have theirs."""
+        for robot in self._active.values():
+            robot.has_command = robot.has_command or robot.commands.take(stamp_ns)
+        return all(robot.has_command for robot in self._active.values())
 
-    def absent(self) -> str:
-        """Lockstep: who has not answered; empty of one that is alone."""
-        return ", ".join(robot.name for robot in self._asked.values() if not robot.answered)
+    def without_command(self) -> str:
+        """Lockstep: the robots whose command is missing; empty for a single robot."""
+        return ", ".join(robot.name for robot in self._active.values() if not robot.has_command)
 
-    def rest_if_silent(self) -> None:
-        """Real time: let those rest who have been told nothing for too long."""
+    def stop_if_timed_out(self) -> None:
+        """Real time: stop the robots whose last command is too old."""
         for robot in self.robots:
-            robot.rest_if_silent()
+            robot.commands.stop_if_timed_out()
 
     def step(self) -> bool:
-        """Do what was told last; False, and nothing is done, when all have come to their end."""
+        """Move the active robots by their commands; False, and nothing moves, if none is left."""
         if not self._settings.run_on:
-            self._end_who_is_there()
-        if not self._asked:
+            self._end_finished()
+        if not self._active:
             return False
-        self._all.step({number: robot.told for number, robot in self._asked.items()})
+        self._state.step({n: robot.commands.command for n, robot in self._active.items()})
         return True
 
-    def _end_who_is_there(self) -> None:
-        outcomes = self._all.outcomes
-        for number, robot in [*self._asked.items()]:
+    def _end_finished(self) -> None:
+        outcomes = self._state.outcomes
+        for number, robot in [*self._active.items()]:
             if outcome := outcomes[number]:
-                robot.end(outcome)
-                del self._asked[number]
+                robot.publishers.publish_outcome(outcome, robot.world.tick + 1)
+                del self._active[number]
 
-    def ends(self) -> str:
-        """How it ended, in words."""
-        found = [outcome.value for outcome in self._all.outcomes if outcome]
+    def outcome_text(self) -> str:
+        """The outcomes of all robots in words."""
+        found = [outcome.value for outcome in self._state.outcomes if outcome]
         if len(found) == 1:
             return found[0]
-        return ", ".join(f"{found.count(end)} {end}" for end in sorted({*found}))
+        return ", ".join(f"{found.count(text)} {text}" for text in sorted({*found}))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the planner is told where to go: goal_pose, waypoints and ~/cancel."""
+"""The planner's goals from goal_pose and waypoints, and the service ~/cancel."""
 
 from __future__ import annotations
 
@@ -10,77 +10,79 @@ from std_srvs.srv import Trigger
 
 from ...core.errors import InputError
 from ...core.geometry import Point, Pose2D
+from ...core.types import Refused
 from ...recording.from_messages import goal_point, waypoint_points
 from ..interface import topics
 from ..runtime.goal_queue import GoalQueue
-from ..runtime.node_runtime import GraphNode, Refusals
+from ..runtime.graph_node import GraphNode
+from ..runtime.refused_inputs import RefusedInputs
 
 
 class GoalSubscriptions:
-    """Errands as messages give them; the newest order counts, one that is refused changes nothing.
+    """The newest message sets the goals; one that is refused changes nothing.
 
-    An order of what is being done already is none, unless that is over.
+    The same goals again change nothing either, unless the planner has finished them.
     """
 
     def __init__(
         self,
         node: GraphNode,
         frame: str,
-        refusals: Refusals,
-        is_over: Callable[[], bool],
+        refused_inputs: RefusedInputs,
+        is_finished: Callable[[], bool],
         on_new: Callable[[], None],
     ) -> None:
-        """Offer ~/cancel; frame is that of all goals, on_new is called for a new order."""
-        self._node, self._frame, self._refusals = node, frame, refusals
-        self._is_over, self._on_new = is_over, on_new
-        self.forget()
+        """Advertise ~/cancel; frame is that of all goals, on_new is called for new goals."""
+        self._node, self._frame, self._refused_inputs = node, frame, refused_inputs
+        self._is_finished, self._on_new = is_finished, on_new
+        self.reset()
         node.create_service(Trigger, "~/cancel", self._on_cancel)
 
-    def forget(self) -> None:
-        """As if nothing had ever been ordered."""
+    def reset(self) -> None:
+        """Forget all goals."""
         self.goal_queue = GoalQueue()
         self.any_received = False
 
-    def listen(self) -> None:
-        """Subscribe."""
-        self._node.listen(topics.GOAL_POSE, self._on_goal)
-        self._node.listen(topics.WAYPOINTS, self._on_waypoints)
+    def subscribe(self) -> None:
+        """Subscribe to goal_pose and waypoints."""
+        self._node.subscribe(topics.GOAL_POSE, self._on_goal_pose)
+        self._node.subscribe(topics.WAYPOINTS, self._on_waypoints)
 
-    def next_from(self, pose: Pose2D | str, tolerance_m: float) -> Point | None:
-        """Where to go from here: of several goals, the first that is not reached."""
+    def advance(self, pose: Pose2D | Refused, tolerance_m: float) -> Point | None:
+        """The present goal: of several, the first that is not reached at this pose."""
         if not isinstance(pose, str):
-            before = self.goal_queue.leg
-            if self.goal_queue.pass_by(pose.position, tolerance_m):
-                self._tell(f"goal {before} reached: on to {self.goal_queue.goal}")
+            before = self.goal_queue.goal_index
+            if self.goal_queue.advance(pose.position, tolerance_m):
+                self._log(f"goal {before} reached: on to {self.goal_queue.goal}")
         return self.goal_queue.goal
 
-    def is_under_way(self) -> bool:
-        """Whether somebody gives goals, of which a planner this young has not heard the last."""
+    def is_expected(self) -> bool:
+        """Whether goal_pose has a publisher, and no goal was received since this node started."""
         return not self.any_received and self._node.count_publishers(topics.GOAL_POSE.name) > 0
 
-    def _tell(self, text: str) -> None:
+    def _log(self, text: str) -> None:
         self._node.get_logger().info(text)
 
-    def _on_goal(self, message: Any) -> None:
-        self._order("goal_pose", lambda: (goal_point(message, self._frame),))
+    def _on_goal_pose(self, message: Any) -> None:
+        self._set_goals("goal_pose", lambda: (goal_point(message, self._frame),))
 
     def _on_waypoints(self, message: Any) -> None:
-        self._order("waypoints", lambda: waypoint_points(message, self._frame))
+        self._set_goals("waypoints", lambda: waypoint_points(message, self._frame))
 
-    def _order(self, name: str, read: Callable[[], tuple[Point, ...]]) -> None:
+    def _set_goals(self, name: str, convert: Callable[[], tuple[Point, ...]]) -> None:
         try:
-            goals = read()
+            goals = convert()
         except InputError as error:
-            self._refusals.add(error, name)
+            self._refused_inputs.add(error, name)
             return
         self.any_received = True
-        if self.goal_queue.order(goals, over=self._is_over()):
+        if self.goal_queue.set_goals(goals, finished=self._is_finished()):
             self._on_new()
-            self._tell(f"{name}: on to {self.goal_queue.goal}, goal {self.goal_queue.leg}")
+            self._log(f"{name}: on to {self.goal_queue.goal}, goal {self.goal_queue.goal_index}")
 
     def _on_cancel(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         goal = self.goal_queue.cancel()
         response.success = goal is not None
-        response.message = f"no longer on the way to {goal}" if goal else "there was no goal"
-        self._tell(f"cancel: {response.message}")
+        response.message = f"no longer driving to {goal}" if goal else "there was no goal"
+        self._log(f"cancel: {response.message}")
         return response

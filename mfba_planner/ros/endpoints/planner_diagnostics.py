@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner reports of itself on /diagnostics, and when."""
+"""The planner's /diagnostics: the state of its inputs, and its last decision."""
 
 from __future__ import annotations
 
@@ -8,63 +8,66 @@ import time
 from ...core.types import Decision
 from ...planning.supervised_planner import SupervisedPlanner
 from ...recording.from_messages import points_text
-from ..interface.health import Health, driving
+from ..interface.health import InputHealth, driving_status
 from ..node_parameters import PlannerSettings
 from ..runtime.goal_queue import GoalQueue
-from ..runtime.node_runtime import GraphNode, Refusals
-from .diagnostics_publisher import DiagnosticTopic
+from ..runtime.graph_node import GraphNode
+from ..runtime.refused_inputs import RefusedInputs
+from .diagnostics_publisher import DiagnosticsPublisher
 
 
-class PlannerHealth:
-    """Listens to what the planner hears and decides; publishes once in a period and on changes."""
+class PlannerDiagnostics:
+    """Records inputs and decisions; publishes once a period and when something changes."""
 
-    def __init__(self, node: GraphNode, settings: PlannerSettings, refusals: Refusals) -> None:
+    def __init__(
+        self, node: GraphNode, settings: PlannerSettings, refused_inputs: RefusedInputs
+    ) -> None:
         """Advertise /diagnostics."""
-        self._topic = DiagnosticTopic(node, settings)
-        self._refusals = refusals
-        self._health = Health(("odom", "sectors"))
-        self._seen: tuple[object, ...] = ()
+        self._publisher = DiagnosticsPublisher(node, settings)
+        self._refused_inputs = refused_inputs
+        self._health = InputHealth(("odom", "sectors"))
+        self._published: tuple[object, ...] = ()
 
-    def heard(self, name: str, stamp_ns: int, now_s: float, fault: str) -> None:
-        """An input came; fault is why its content is refused, "": it is sound."""
-        self._health.heard(name, stamp_ns, now_s)
-        self._health.judged(name, fault)
+    def input_received(self, name: str, stamp_ns: int, now_s: float, fault: str) -> None:
+        """An input was received; fault is why its content is refused, "" if it is not."""
+        self._health.received(name, stamp_ns, now_s)
+        self._health.set_fault(name, fault)
 
-    def decided(
+    def decision_made(
         self,
         decision: Decision,
         path_planner: SupervisedPlanner,
         goal_queue: GoalQueue,
         state: str,
     ) -> None:
-        """Report at once where something has changed; everything else can wait."""
+        """Publish at once what has changed, everything else once a period."""
         now_s = time.monotonic()
-        self._topic.at(decision.stamp_ns, now_s)
-        seen = (decision.mode, path_planner.phase, goal_queue.number, *self._health.faults)
-        news, self._seen = seen != self._seen, seen
-        if news or self._topic.is_due(now_s):
-            self.report(decision, path_planner, goal_queue, state, news=news)
+        self._publisher.set_time(decision.stamp_ns, now_s)
+        present = (decision.mode, path_planner.phase, goal_queue.goal_id, *self._health.faults)
+        changed, self._published = present != self._published, present
+        if changed or self._publisher.is_due(now_s):
+            self.publish(decision, path_planner, goal_queue, state, changed=changed)
 
-    def report(
+    def publish(
         self,
         decision: Decision | None,
         path_planner: SupervisedPlanner,
         goal_queue: GoalQueue,
         state: str,
         *,
-        news: bool = False,
+        changed: bool = False,
     ) -> None:
-        """Publish, if it is time to, or if a level has changed."""
+        """Publish if a period has passed, or if something has changed."""
         now_s, timeout_s = time.monotonic(), path_planner.params.input_timeout_s
         values = {
             "method": path_planner.params.label,
             "goal": points_text([goal_queue.goal] if goal_queue.goal else []),
-            "goal_index": goal_queue.leg,
-            "goal_id": str(goal_queue.number),
-            "last refused": self._refusals.last,
+            "goal_index": goal_queue.goal_index,
+            "goal_id": str(goal_queue.goal_id),
+            "last refused": self._refused_inputs.last,
         }
         statuses = [
-            self._health.inputs(now_s, timeout_s, self._refusals.by_kind),
-            driving(decision, path_planner.phase, state, values),
+            self._health.status(now_s, timeout_s, self._refused_inputs.by_kind),
+            driving_status(decision, path_planner.phase, state, values),
         ]
-        self._topic.publish(statuses, now_s, news=news)
+        self._publisher.publish(statuses, now_s, changed=changed)

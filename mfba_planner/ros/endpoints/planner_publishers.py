@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What planner says: the move, and everything about the decision."""
+"""The planner's publishers: goal_step and cmd_vel, then plan, decision and markers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...core.types import Decision, Mode
 from ...planning.odometry_jump import is_jump_reason
 from ..interface import markers, to_messages, topics
 from ..node_parameters import PlannerSettings
-from ..runtime.node_runtime import GraphNode
+from ..runtime.graph_node import GraphNode
 
 
 class PlannerPublishers:
@@ -21,35 +21,40 @@ class PlannerPublishers:
     def __init__(
         self, node: GraphNode, settings: PlannerSettings, tick_ns: Callable[[], int]
     ) -> None:
-        """Advertise them all; cmd_vel is what the base is told for a tick."""
+        """Advertise all topics; cmd_vel holds for one tick."""
         self._settings, self._tick_ns = settings, tick_ns
         self._log = node.get_logger()
-        self._who = node.get_fully_qualified_name()
+        self._node_name = node.get_fully_qualified_name()
         self._goal_step = node.advertise(topics.GOAL_STEP)
         self._plan = node.advertise(topics.PLAN)
         self._decision = node.advertise(topics.DECISION)
         self._markers = node.advertise(topics.MARKERS)
-        self.reach_m = 0.0  # of the sectors: what the ring shows
         self._view = markers.RateLimit(settings.view_period_s)
         stamped = TwistStamped if settings.enable_stamped_cmd_vel else None
         self._cmd_vel = node.advertise(topics.CMD_VEL, stamped)
 
-    def decided(
-        self, decision: Decision, algorithm: str, refused: int, more: Mapping[str, str]
+    def publish_decision(
+        self,
+        decision: Decision,
+        algorithm: str,
+        refused: int,
+        goal_fields: Mapping[str, str],
+        ring_radius_m: float,
     ) -> None:
-        """What the world waits for first, everything about the decision while it moves on."""
-        self.move(decision)
+        """Publish the command first, as the world waits for it, then the rest of the decision."""
+        self.publish_command(decision)
         if decision.mode is Mode.STOPPED or is_jump_reason(decision.reason):
             self._log.warning(decision.reason, throttle_duration_sec=1.0)
         frame = self._settings.odom_frame
         self._plan.publish(to_messages.plan_msg(decision, frame))
-        reason = to_messages.decision_msg(decision, algorithm, refused, self._who, more)
-        self._decision.publish(reason)
+        self._decision.publish(
+            to_messages.decision_msg(decision, algorithm, refused, self._node_name, goal_fields)
+        )
         if self._view.due(decision.stamp_ns):
-            self._markers.publish(markers.decision_markers(decision, frame, self.reach_m))
+            self._markers.publish(markers.decision_markers(decision, frame, ring_radius_m))
 
-    def move(self, decision: Decision) -> None:
-        """Publish goal_step, then cmd_vel: the stamp of the one is the other's as well."""
+    def publish_command(self, decision: Decision) -> None:
+        """Publish goal_step, then cmd_vel: the stamp of goal_step is also that of cmd_vel."""
         s, stamp, tick_ns = self._settings, decision.stamp_ns, self._tick_ns()
         self._goal_step.publish(
             to_messages.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame)
@@ -60,10 +65,10 @@ class PlannerPublishers:
         else:
             self._cmd_vel.publish(to_messages.twist_msg(decision, s, tick_ns))
 
-    def halt(self, place: Point, stamp_ns: int) -> None:
-        """Command rest, here, without having decided anything."""
+    def publish_stop(self, position: Point, stamp_ns: int) -> None:
+        """Command rest at this position, without a decision."""
         s = self._settings
-        self._goal_step.publish(to_messages.pose_stamped_msg(place, stamp_ns, s.odom_frame))
+        self._goal_step.publish(to_messages.pose_stamped_msg(position, stamp_ns, s.odom_frame))
         if s.enable_stamped_cmd_vel:
             rest = TwistStamped()
             to_messages.set_header(rest.header, stamp_ns, s.base_frame)

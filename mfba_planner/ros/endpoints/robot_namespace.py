@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The graph's topics as one robot of a fleet has them: below its name."""
+"""The graph's topics in the namespace of one robot of a fleet."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from ..interface.topics import GRAPH, Topic
-from ..runtime.node_runtime import GraphNode
+from ..runtime.graph_node import GraphNode
 from ..runtime.polled_subscriptions import Deliver, PolledSubscriptions
 
 
 def below(namespace: str, topic: Topic) -> Topic:
-    """The topic in a namespace; absolute names stay what they are."""
+    """The topic in a namespace; absolute names are kept."""
     if not namespace or topic.name.startswith("/"):
         return topic
     return replace(topic, name=f"{namespace}/{topic.name}")
 
 
-def everywhere(namespaces: set[str]) -> Iterator[tuple[Topic, str]]:
-    """Every topic of the graph and what it is called, then those of the namespaces."""
+def graph_topics(namespaces: set[str]) -> Iterator[tuple[Topic, str]]:
+    """Every topic of the graph with its name, then those of the namespaces."""
     for namespace in ("", *sorted(namespaces)):
         for topic in GRAPH:
-            called = below(namespace, topic).name
-            if not namespace or called != topic.name:
-                yield topic, called
+            name = below(namespace, topic).name
+            if not namespace or name != topic.name:
+                yield topic, name
 
 
 class NamespacedNode:
-    """A node that speaks and listens in a namespace other than its own."""
+    """A node that publishes and subscribes in a namespace other than its own."""
 
     def __init__(self, node: GraphNode, namespace: str) -> None:
         """Nothing is created yet."""
@@ -42,17 +42,20 @@ class NamespacedNode:
         """As GraphNode.advertise()."""
         return self._node.advertise(below(self._namespace, topic), message_type)
 
-    def listen(self, topic: Topic, callback: Callable[..., None], kind: Any = None) -> None:
-        """As GraphNode.listen()."""
-        self._node.listen(below(self._namespace, topic), callback, kind)
+    def subscribe(
+        self, topic: Topic, callback: Callable[..., None], message_type: Any = None
+    ) -> None:
+        """As GraphNode.subscribe()."""
+        self._node.subscribe(below(self._namespace, topic), callback, message_type)
 
     def subscribe_polled(
         self,
         polled: PolledSubscriptions,
-        kind: Any,
+        message_type: Any,
         name: str,
         deliver: Deliver,
         profiles: list[QoSProfile],
     ) -> None:
-        """As GraphNode.open_boxes()."""
-        self._node.subscribe_polled(polled, kind, f"{self._namespace}/{name}", deliver, profiles)
+        """As GraphNode.subscribe_polled()."""
+        name = f"{self._namespace}/{name}"
+        self._node.subscribe_polled(polled, message_type, name, deliver, profiles)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scenario that world_sim is told, its robot changed by the parameters robot.*."""
+"""world_sim's scenario, its robot changed by the parameters robot.*."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from ...scenarios.scenario_files import load_scenario
 from ...simulation.scenario import Scenario
 from ..interface import parameters
 from ..node_parameters import RobotParameters
-from ..runtime.node_runtime import GraphNode
+from ..runtime.graph_node import GraphNode
 
 
 def declare_scenario(node: GraphNode, source: str) -> Scenario:
-    """Load a scenario, declare its robot's options and state the whole; ConfigError if bad."""
+    """Load a scenario, declare robot.* and the whole as scenario_json; ConfigError if bad."""
     scenario = load_scenario(source)
-    rig = parameters.declare(node, RobotParameters(robot=scenario.robot), read_only=True)
-    scenario = replace(scenario, robot=rig.robot)
+    declared = parameters.declare(node, RobotParameters(robot=scenario.robot), read_only=True)
+    scenario = replace(scenario, robot=declared.robot)
     parameters.state(node, "scenario_json", scenario_to_json(scenario), "scenario in full")
     return scenario

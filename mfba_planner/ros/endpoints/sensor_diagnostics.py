@@ -1,48 +1,54 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What virtual_sensor reports of its inputs on /diagnostics: why the planner is blind."""
+"""virtual_sensor's /diagnostics: the state of its inputs, and why its sectors are blind."""
 
 from __future__ import annotations
 
 import time
 
-from ..interface.health import Health
+from ..interface.health import InputHealth
 from ..node_parameters import VirtualSensorSettings
-from ..runtime.node_runtime import GraphNode, Refusals
-from ..runtime.stale_inputs import watch_period_s
-from .diagnostics_publisher import DiagnosticTopic
+from ..runtime.graph_node import GraphNode
+from ..runtime.planner_inputs import watch_period_s
+from ..runtime.refused_inputs import RefusedInputs
+from .diagnostics_publisher import DiagnosticsPublisher
 
 
-class SensorHealth:
-    """Listens to what the sensor hears; publishes once in a period and on changes."""
+class SensorDiagnostics:
+    """Records the sensor's inputs; publishes once a period and when something changes."""
 
     def __init__(
-        self, node: GraphNode, settings: VirtualSensorSettings, refusals: Refusals, source: str
+        self,
+        node: GraphNode,
+        settings: VirtualSensorSettings,
+        refused_inputs: RefusedInputs,
+        source: str,
     ) -> None:
         """Advertise /diagnostics; source is the topic measured from, beside odom."""
-        self._topic = DiagnosticTopic(node, settings)
-        self._refusals = refusals
+        self._publisher = DiagnosticsPublisher(node, settings)
+        self._refused_inputs = refused_inputs
         self._source = source
-        self._health = Health(("odom", source))
+        self._health = InputHealth(("odom", source))
         self._timeout_s = settings.input_timeout_s
-        self._seen: tuple[str, ...] = ()
-        node.every(watch_period_s(self._timeout_s, lockstep=settings.lockstep), self.report)
+        self._published: tuple[str, ...] = ()
+        period_s = watch_period_s(self._timeout_s, lockstep=settings.lockstep)
+        node.create_wall_timer(period_s, self.publish)
 
-    def heard(self, name: str, stamp_ns: int) -> None:
-        """An input came."""
+    def input_received(self, name: str, stamp_ns: int) -> None:
+        """An input was received."""
         now_s = time.monotonic()
-        self._health.heard(name, stamp_ns, now_s)
-        if name == self._source:  # one of the two: their stamps need not be in step
-            self._topic.at(stamp_ns, now_s)
+        self._health.received(name, stamp_ns, now_s)
+        if name == self._source:  # only one of the two: their stamps may differ
+            self._publisher.set_time(stamp_ns, now_s)
 
-    def judged(self, name: str, fault: str) -> None:
-        """What is wrong with the newest of an input, "": it is sound; said at once if new."""
-        self._health.judged(name, fault)
-        if self._health.faults != self._seen:
-            self._seen = self._health.faults
-            self.report(news=True)
+    def set_fault(self, name: str, fault: str) -> None:
+        """Why the newest of an input is refused, "" if it is not; published at once if new."""
+        self._health.set_fault(name, fault)
+        if self._health.faults != self._published:
+            self._published = self._health.faults
+            self.publish(changed=True)
 
-    def report(self, *, news: bool = False) -> None:
-        """Publish, if it is time to, or if something has fallen silent."""
+    def publish(self, *, changed: bool = False) -> None:
+        """Publish if a period has passed, or if something has changed."""
         now_s = time.monotonic()
-        status = self._health.inputs(now_s, self._timeout_s, self._refusals.by_kind)
-        self._topic.publish([status], now_s, news=news)
+        status = self._health.status(now_s, self._timeout_s, self._refused_inputs.by_kind)
+        self._publisher.publish([status], now_s, changed=changed)

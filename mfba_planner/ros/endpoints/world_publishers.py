@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What world_sim says: the tick, the goal, how the run stands, and views for people."""
+"""world_sim's publishers of one robot: the tick, the goal, the outcome, and views for people."""
 
 from __future__ import annotations
 
@@ -12,53 +12,53 @@ from ...simulation.robot_model import Robot
 from ...simulation.world import World
 from ..interface import markers, to_messages, topics
 from ..node_parameters import WorldSimSettings
-from ..runtime.node_runtime import GraphNode
+from ..runtime.graph_node import GraphNode
 from .robot_namespace import NamespacedNode
 
-TRAIL_POINTS = 500  # one per view period; the newest part of a longer trail is shown
+TRAIL_POINTS = 500  # one per view period; of a longer trail the newest is shown
 
 
 class WorldPublishers:
-    """The publishers of world_sim for one robot; the time is everybody's."""
+    """The publishers of world_sim for one robot; /clock is FleetInterface's."""
 
     def __init__(
         self, node: GraphNode | NamespacedNode, settings: WorldSimSettings, robot: Robot
     ) -> None:
-        """Advertise them all."""
+        """Advertise all topics."""
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
         self._odom = node.advertise(topics.ODOM)
-        errs = robot.noise.of_odometry
-        self._truth = node.advertise(topics.GROUND_TRUTH) if errs else None
-        # Of a robot with a lidar the sensor takes the scan; obstacles are for people and bags.
+        noisy = robot.noise.of_odometry
+        self._truth = node.advertise(topics.GROUND_TRUTH) if noisy else None
+        # With a lidar virtual_sensor reads scan; obstacles is then for people and bags only.
         self._scan_frame = settings.scan_frame
         self._scan = node.advertise(topics.SCAN) if robot.lidar.beams else None
-        seen_by = () if self._scan else topics.OBSTACLES.readers
-        self._obstacles = node.advertise(replace(topics.OBSTACLES, readers=seen_by))
+        readers = () if self._scan else topics.OBSTACLES.readers
+        self._obstacles = node.advertise(replace(topics.OBSTACLES, readers=readers))
         self._goal = node.advertise(topics.GOAL_POSE)
         self._outcome = node.advertise(topics.OUTCOME)
         self._trail = node.advertise(topics.TRAIL)
         self._markers = node.advertise(topics.MARKERS)
         self._tf = node.advertise(topics.TF) if topics.TF else None
-        self._path: deque[Point] = deque(maxlen=TRAIL_POINTS)
+        self._positions: deque[Point] = deque(maxlen=TRAIL_POINTS)
         self._view = markers.RateLimit(settings.view_period_s)
 
     @property
-    def have_subscribers(self) -> bool:
-        """Whether somebody reads odom."""
+    def has_odom_subscriber(self) -> bool:
+        """Whether odom has a subscriber."""
         return bool(self._odom.get_subscription_count())
 
-    def begin(self, goal: Point, stamp_ns: int) -> None:
-        """A run begins: where it leads to, and that it is under way."""
-        self._path.clear()
+    def publish_start(self, goal: Point, stamp_ns: int) -> None:
+        """Publish a new run's goal, and that it is running."""
+        self._positions.clear()
         self._goal.publish(to_messages.pose_stamped_msg(goal, stamp_ns, self._frame))
         self._outcome.publish(to_messages.outcome_msg(None, 0))
 
-    def end(self, outcome: Outcome, ticks: int) -> None:
-        """A run has ended."""
+    def publish_outcome(self, outcome: Outcome, ticks: int) -> None:
+        """Publish how the run has ended."""
         self._outcome.publish(to_messages.outcome_msg(outcome, ticks))
 
-    def tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
-        """One tick under one stamp; odom completes the sensor's pair, views can wait."""
+    def publish_tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
+        """Publish one tick: the sensor's inputs first, odom last of them; then views."""
         frame, reading = self._frame, world.read()
         centers = world.centers()
         turn = 0.0
@@ -83,6 +83,6 @@ class WorldPublishers:
             self._scan.publish(to_messages.scan_msg(reading.scan, stamp_ns, self._scan_frame))
         self._odom.publish(odom)
         if self._view.due(stamp_ns):
-            self._path.append(world.pose.position)
-            self._trail.publish(to_messages.path_msg(list(self._path), stamp_ns, frame))
+            self._positions.append(world.pose.position)
+            self._trail.publish(to_messages.path_msg(list(self._positions), stamp_ns, frame))
             self._markers.publish(markers.world_markers(world, stamp_ns, frame))

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What nodes exchange: topics and QoS, parameters, conversions, health."""
+"""Topics and QoS, parameters, conversion to messages, markers, input health."""
 
 from .. import require_ros  # noqa: F401

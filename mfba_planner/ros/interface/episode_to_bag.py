@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run of the core driver as the bag that the graph would have recorded of it."""
+"""Writes a core driver's run as the bag that the graph would have recorded."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .qos_conversion import offered
 from .serialized_message import type_name
 
 _FRAME, _BASE = "odom", "base_link"
-_SAID = (
+_TOPICS = (
     topics.CLOCK, topics.ODOM, topics.OBSTACLES, topics.SECTORS, topics.SENSORY_VECTOR,
     topics.GOAL_POSE, topics.GOAL_STEP, topics.PLAN, topics.CMD_VEL, topics.DECISION,
     topics.OUTCOME,
@@ -29,10 +29,10 @@ _SAID = (
 
 
 def write_episode_bag(episode: Episode, directory: Path, facts: Mapping[str, Any] = {}) -> None:
-    """Write a bag with all that is said in every tick; facts go with what explains the run.
+    """Write a bag with every tick's messages; facts are added to the run's configuration.
 
     Where a planner read no sectors, the bag holds those that the sensor would have measured.
-    Raises OutputError where nothing can be written; nothing half-written stays behind then.
+    Raises OutputError where nothing can be written; an incomplete bag is deleted.
     """
     config = RunConfig(
         scenario=episode.scenario,
@@ -45,7 +45,7 @@ def write_episode_bag(episode: Episode, directory: Path, facts: Mapping[str, Any
     nodes["world_sim"]["scenario_json"] = scenario_to_json(episode.scenario)
     writer = BagWriter(directory)
     try:
-        for topic in _SAID:
+        for topic in _TOPICS:
             writer.add_topic(_name(topic), type_name(topic.type), offered(topic.qos))
         attach_configuration(writer, {"nodes": nodes, "run": {**run_facts(config), **facts}})
         for stamp_ns, topic, message in _messages(episode):
@@ -61,7 +61,7 @@ def _name(topic: topics.Topic) -> str:
 
 
 def _messages(episode: Episode) -> Iterator[tuple[int, topics.Topic, Any]]:
-    """All messages of the run in order: (stamp, topic, message)."""
+    """All messages of the run, first to last: (stamp, topic, message)."""
     if not episode.ticks:
         return
     first, last = episode.ticks[0].stamp_ns, episode.ticks[-1].stamp_ns
@@ -80,7 +80,7 @@ def _messages(episode: Episode) -> Iterator[tuple[int, topics.Topic, Any]]:
 def _tick_messages(
     episode: Episode, tick: Decision, velocity: tuple[float, float]
 ) -> Iterator[tuple[topics.Topic, Any]]:
-    """What the world, the sensor and the planner say; velocity is that of the step before."""
+    """The messages of world, sensor and planner; velocity is that of the previous tick."""
     scenario, stamp, time_s = episode.scenario, tick.stamp_ns, episode.time_s(tick.stamp_ns)
     circles = scenario.enlarged(time_s)
     ranges = tick.ranges_m or sense_circles(tick.pose.position, circles, episode.sensor)
@@ -93,7 +93,7 @@ def _tick_messages(
     )
     yield topics.SENSORY_VECTOR, to_messages.sensory_vector_msg(sensory_vector(ranges))
     yield topics.PLAN, to_messages.plan_msg(tick, _FRAME)
-    law = episode.label
-    yield topics.DECISION, to_messages.decision_msg(tick, law, 0, f"/{topics.PLANNER}")
+    decision = to_messages.decision_msg(tick, episode.label, 0, f"/{topics.PLANNER}")
+    yield topics.DECISION, decision
     yield topics.GOAL_STEP, to_messages.pose_stamped_msg(tick.waypoint, stamp, _FRAME)
     yield topics.CMD_VEL, to_messages.twist_msg(tick, scenario.robot, episode.planner.tick_ns)

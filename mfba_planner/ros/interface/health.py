@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a node is, in the words of /diagnostics. No ROS here."""
+"""Rates, ages and faults of a node's inputs as /diagnostics reports them. No ROS here."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ class Status(NamedTuple):
 
     @property
     def summary(self) -> tuple[str, Level, str]:
-        """What makes it another status, figures aside."""
+        """What counts as a change, figures aside."""
         return (self.name, self.level, self.values.get("silent", ""))
 
 
 class InputRate:
-    """When messages of one input came; now_s is of any steady clock."""
+    """When messages of one input were received; now_s is of any steady clock."""
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Start with no message."""
         self._times_s: deque[float] = deque(maxlen=WINDOW)
         self._stamp_ns = -1
 
     def add(self, stamp_ns: int, now_s: float) -> None:
-        """A message was accepted; one with the stamp of the last is no news."""
+        """A message was accepted; one with the stamp of the last does not count."""
         if stamp_ns != self._stamp_ns:
             self._stamp_ns = stamp_ns
             self._times_s.append(now_s)
@@ -56,40 +56,40 @@ class InputRate:
         return now_s - self._times_s[-1] if self._times_s else None
 
     def rate_hz(self, now_s: float) -> float:
-        """Messages per second of late; it falls while none comes."""
+        """Messages per second over the last WINDOW; it falls while none is received."""
         if len(self._times_s) < 2:
             return 0.0
         lasted_s = max(now_s, self._times_s[-1]) - self._times_s[0]
         return (len(self._times_s) - 1) / lasted_s if lasted_s > 0.0 else 0.0
 
 
-class Health:
-    """Joins what is known about inputs and decisions into statuses."""
+class InputHealth:
+    """Rate, age and fault of each input of a node."""
 
     def __init__(self, inputs: tuple[str, ...]) -> None:
-        """Watch these inputs."""
-        self.pulses = {name: InputRate() for name in inputs}
+        """Start with nothing received on these inputs."""
+        self.rates = {name: InputRate() for name in inputs}
         self._faults: dict[str, str] = {}
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is wrong with the newest of each input, "": nothing."""
+        """Why the newest of each input is refused, "" if it is not."""
         return tuple(self._faults.values())
 
-    def heard(self, name: str, stamp_ns: int, now_s: float) -> None:
-        """An input came."""
-        self.pulses[name].add(stamp_ns, now_s)
+    def received(self, name: str, stamp_ns: int, now_s: float) -> None:
+        """An input was received."""
+        self.rates[name].add(stamp_ns, now_s)
 
-    def judged(self, name: str, fault: str) -> None:
-        """Why the newest of an input is refused, "": it is sound."""
+    def set_fault(self, name: str, fault: str) -> None:
+        """Why the newest of an input is refused, "" if it is not."""
         self._faults[name] = fault
 
-    def inputs(self, now_s: float, timeout_s: float, refused: Mapping[str, int]) -> Status:
-        """Rates, ages and refusals, and what is wrong."""
+    def status(self, now_s: float, timeout_s: float, refused: Mapping[str, int]) -> Status:
+        """The status "inputs": rates, ages, refused messages by kind, and faults."""
         fault = next(filter(None, self.faults), "")
         values: dict[str, str] = {}
         silent: dict[str, str] = {}
-        for name, rate in self.pulses.items():
+        for name, rate in self.rates.items():
             age_s = rate.age_s(now_s)
             if age_s is None:
                 silent[name] = f"no {name} yet"
@@ -107,20 +107,20 @@ class Health:
             )
         if silent:
             return Status("inputs", Level.STALE, "; ".join(silent.values()), values)
-        return Status("inputs", Level.OK, f"{' and '.join(self.pulses)} are sound", values)
+        return Status("inputs", Level.OK, f"{' and '.join(self.rates)} are sound", values)
 
 
-def driving(
+def driving_status(
     decision: Decision | None, phase: Phase, state: str, values: Mapping[str, str]
 ) -> Status:
-    """What the planner does and why; state is that of its life cycle."""
-    told = {"state": state, "mode": decision.mode.value if decision else "none"}
-    told |= {"recovery": phase.value, **values}
+    """The status "driving": mode and reason of a decision; state is that of the life cycle."""
+    fields = {"state": state, "mode": decision.mode.value if decision else "none"}
+    fields |= {"recovery": phase.value, **values}
     if state != "active":
-        return Status("driving", Level.OK, f"{state}: commands nothing", told)
+        return Status("driving", Level.OK, f"{state}: commands nothing", fields)
     if decision is None:
-        return Status("driving", Level.OK, "nothing decided yet", told)
+        return Status("driving", Level.OK, "nothing decided yet", fields)
     level = {Mode.STOPPED: Level.ERROR, Mode.BLOCKED: Level.WARN}.get(decision.mode, Level.OK)
     if phase is Phase.GIVEN_UP:
         level = Level.ERROR
-    return Status("driving", level, decision.reason, told)
+    return Status("driving", level, decision.reason, fields)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What RViz and Foxglove show: obstacles, and around the robot ring, sectors, gap; and tf."""
+"""Markers for RViz and Foxglove: obstacles, and the robot's ring, sectors and gap; and tf."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .to_messages import pose_msg, set_header
 
 Rgba = tuple[float, float, float, float]
 
-# Okabe and Ito's palette: told apart by everybody.
+# Okabe and Ito's palette, for any colour vision.
 ORANGE: Rgba = (0.90, 0.62, 0.0, 0.9)
 SKY: Rgba = (0.34, 0.71, 0.91, 0.9)
 GREEN: Rgba = (0.0, 0.62, 0.45, 0.9)
@@ -37,11 +37,11 @@ MODE_COLORS = {
     Mode.STOPPED: VERMILION,
     Mode.ARRIVED: GREEN,
 }
-ARROW_S = 2.0  # a velocity arrow shows where the obstacle will be after so long
+ARROW_S = 2.0  # a velocity arrow ends where the obstacle will be after this time
 
 
 class RateLimit:
-    """Viewers need no message per tick: says when a period of simulated time has passed."""
+    """Whether a period of simulated time has passed: viewers need no message per tick."""
 
     def __init__(self, period_s: float) -> None:
         """The first stamp is due."""
@@ -49,7 +49,7 @@ class RateLimit:
         self._last_ns: int | None = None
 
     def due(self, stamp_ns: int) -> bool:
-        """Whether to show something at this stamp; also when time was set back."""
+        """Whether to publish at this stamp; True also when time was set back."""
         last = self._last_ns
         if last is not None and last <= stamp_ns < last + self._period_ns:
             return False
@@ -73,23 +73,23 @@ def world_markers(world: World, stamp_ns: int, frame_id: str) -> MarkerArray:
     return _array(marks, stamp_ns, frame_id)
 
 
-def decision_markers(decision: Decision, frame_id: str, reach_m: float) -> MarkerArray:
-    """Mode, ring, sectors, gap, candidates and step around the robot; reach_m is the ring's."""
+def decision_markers(decision: Decision, frame_id: str, ring_radius_m: float) -> MarkerArray:
+    """Mode, ring, sectors, gap, candidates and goal step around the robot."""
     color = MODE_COLORS[decision.mode]
     position, waypoint = decision.pose.position, decision.waypoint
     n = len(decision.ranges_m)
-    reach_m = reach_m if math.isfinite(reach_m) else 0.0
+    reach_m = ring_radius_m if math.isfinite(ring_radius_m) else 0.0
     ring = [towards(position, k * math.tau / RING, reach_m) for k in range(RING + 1)]
     ahead = towards(position, bearing(position, waypoint), reach_m)
     vx, vy = decision.velocity
-    there = (position[0] + vx, position[1] + vy)
+    tip = (position[0] + vx, position[1] + vy)
     marks = [
         _line("ring", 0, ring if reach_m else [], 0.03, color),
-        _line("spokes", 0, _spokes(position, n, reach_m), 0.01, GREY, kind=Marker.LINE_LIST),
+        _line("spokes", 0, _spokes(position, n, reach_m), 0.01, GREY, Marker.LINE_LIST),
         _fan("lit", position, decision.ranges_m, reach_m),
-        _line("sectors", 0, _outlines(decision), 0.03, ORANGE, kind=Marker.LINE_LIST),
+        _line("sectors", 0, _outlines(decision), 0.03, ORANGE, Marker.LINE_LIST),
         _arrow("gap", 0, [position, ahead] if decision.gap else [], GREEN),
-        _arrow("velocity", 0, [position, there] if there != position else [], color),
+        _arrow("velocity", 0, [position, tip] if tip != position else [], color),
         _line("goal_step", 0, [position, waypoint], 0.06, color),
         _points("candidates", 0, decision.candidates, GREEN),
         _text("mode", position, decision.mode.value.replace("_", " "), color),
@@ -104,7 +104,7 @@ def _spokes(position: Point, n: int, reach_m: float) -> list[Point]:
 
 
 def _outlines(decision: Decision) -> list[Point]:
-    """Each lit sector as far as it is free."""
+    """Each set sector as far as it is free."""
     position, lit = decision.pose.position, []
     width = math.tau / max(len(decision.ranges_m), 1)
     for i, r in enumerate(decision.ranges_m):
@@ -115,7 +115,7 @@ def _outlines(decision: Decision) -> list[Point]:
 
 
 def _fan(namespace: str, position: Point, ranges_m: Ranges, reach_m: float) -> Marker:
-    """The area of all lit sectors, out to the ring."""
+    """The area of all set sectors, out to the ring."""
     corners: list[Point] = []
     width = math.tau / max(len(ranges_m), 1)
     for i, r in enumerate(ranges_m):
@@ -166,31 +166,31 @@ def _line(
     points: Sequence[Point],
     width: float,
     rgba: Rgba,
-    kind: int = Marker.LINE_STRIP,
+    marker_type: int = Marker.LINE_STRIP,
 ) -> Marker:
     mark = _points(namespace, number, points, rgba)
-    mark.type = kind
+    mark.type = marker_type
     mark.scale = Vector3(x=width, y=0.0, z=0.0)
     return mark
 
 
 def _arrow(namespace: str, number: int, points: Sequence[Point], rgba: Rgba) -> Marker:
-    """From the first to the second of two points, or nothing."""
+    """An arrow from the first to the second of two points; none without points."""
     mark = _points(namespace, number, points, rgba)
     mark.type, mark.scale = Marker.ARROW, Vector3(x=0.05, y=0.12, z=0.12)
     return mark
 
 
-def _text(namespace: str, place: Point, text: str, rgba: Rgba) -> Marker:
-    """Words above a place, turned to whoever looks."""
-    mark = _disc(namespace, 0, place, 0.0, rgba)
+def _text(namespace: str, position: Point, text: str, rgba: Rgba) -> Marker:
+    """A label above a position, facing the viewer."""
+    mark = _disc(namespace, 0, position, 0.0, rgba)
     mark.type, mark.text = Marker.TEXT_VIEW_FACING, text
     mark.pose.position.z, mark.scale = 0.5, Vector3(x=0.0, y=0.0, z=0.2)
     return mark
 
 
 def _points(namespace: str, number: int, points: Sequence[Point], rgba: Rgba) -> Marker:
-    """A list of points; one without any is deleted in the viewer, where it would be an error."""
+    """A list of points; an empty one is deleted, as viewers report it as an error."""
     return Marker(
         ns=namespace,
         id=number,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options as ROS parameters: declared with description, type and range; checked in the core."""
+"""Options as ROS parameters: declared with description, type and range, checked as a whole."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ def declare(node: Node, defaults: T, *, read_only: bool = False) -> T:
     found: dict[str, Any] = {}
     for name, default, item in walk(defaults):
         spec: Spec = item.metadata["spec"]
-        start = default.value if isinstance(default, Enum) else default
+        initial = default.value if isinstance(default, Enum) else default
         descriptor = _descriptor(spec, default, read_only)
         try:
-            found[name] = node.declare_parameter(name, start, descriptor).value
+            found[name] = node.declare_parameter(name, initial, descriptor).value
         except InvalidParameterTypeException:
-            kind = type(start).__name__
+            kind = type(initial).__name__
             hint = " (write 1.0, not 1)" if kind == "float" else ""
             raise ConfigError(
                 f"parameter {name}={_given(node, name)!r}: wrong type; give a {kind}{hint}"
             ) from None
         except InvalidParameterValueException as error:
-            override(defaults, {name: _given(node, name)})  # says it better
+            override(defaults, {name: _given(node, name)})  # raises a clearer message
             raise ConfigError(f"parameter {name}: {error}; {spec.doc}") from None
     return override(defaults, found)
 
 
 def _given(node: Node, name: str) -> Any:
-    """What the user gave for a parameter; rclpy's exceptions only quote it in a sentence."""
+    """The value given for a parameter; rclpy's exceptions hold it only within a sentence."""
     return plain(node._parameter_overrides[name].value)
 
 
@@ -76,26 +76,26 @@ def _descriptor(spec: Spec, default: Any, read_only: bool) -> ParameterDescripto
 
 
 def follow(node: Node, current: Callable[[], Any], apply: Callable[[Any], None]) -> None:
-    """Let parameters of a dataclass be set later: checked as a whole, refused with the reason."""
+    """Let parameters be set at run time: checked as a whole, refused with the reason."""
 
     def changed(parameters: list[Parameter]) -> Any:
         known = {name for name, _, _ in walk(current())}
         return override(current(), {p.name: p.value for p in parameters if p.name in known})
 
-    def judge(parameters: list[Parameter]) -> SetParametersResult:
+    def validate(parameters: list[Parameter]) -> SetParametersResult:
         try:
             changed(parameters)
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    node.add_on_set_parameters_callback(judge)
-    # Only what everybody has accepted is applied.
+    node.add_on_set_parameters_callback(validate)
+    # Applied only after all callbacks have accepted the values.
     node.add_post_set_parameters_callback(lambda parameters: apply(changed(parameters)))
 
 
 def state(node: Node, name: str, value: str, doc: str) -> None:
-    """Declare what a node has made of its parameters: to be read, whatever was given for it."""
+    """Declare a read-only parameter whose value the node sets; a value given for it is ignored."""
     descriptor = ParameterDescriptor(description=doc, read_only=True)
     node.declare_parameter(name, value, descriptor, ignore_override=True)
 
@@ -104,7 +104,7 @@ def declare_radii(node: Node, default: list[float]) -> list[float]:
     """Declare obstacle_radii_m, the one parameter that is a list; ConfigError if unusable."""
     name = "obstacle_radii_m"
     descriptor = ParameterDescriptor(
-        description="radius per obstacle, in the order of obstacles; one stands for all [m]",
+        description="radius per obstacle, as obstacles lists them; a single one holds for all [m]",
         read_only=True,
     )
     try:
@@ -119,7 +119,7 @@ def declare_radii(node: Node, default: list[float]) -> list[float]:
 
 
 def warn_of_unknown(node: Node) -> None:
-    """Name what was given but is no parameter of the node; rclpy passes over it in silence."""
+    """Warn of values given for parameters that the node does not have; rclpy ignores them."""
     declared = list(node._parameters)
     for name in node._parameter_overrides:
         if not node.has_parameter(name):
@@ -133,5 +133,5 @@ def values(node: Node) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """A parameter's value as JSON knows it: arrays become lists."""
+    """A parameter's value as plain data: arrays become lists."""
     return list(value) if hasattr(value, "tolist") or isinstance(value, tuple) else value

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's QoS profiles and the recorded ones, both ways."""
+"""Converts QoS profiles between rclpy's and the recorded form."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def offered(profile: QoSProfile) -> OfferedQos:
 
 
 def profile(recorded: OfferedQos) -> QoSProfile:
-    """A profile for a publisher that offers what was recorded; unknown words give defaults."""
+    """A publisher's profile that offers what was recorded; unknown values give defaults."""
     history = HistoryPolicy.KEEP_ALL if recorded.history == "keep_all" else HistoryPolicy.KEEP_LAST
     best_effort = recorded.reliability == "best_effort"
     latched = recorded.durability == "transient_local"
@@ -46,5 +46,5 @@ def profile(recorded: OfferedQos) -> QoSProfile:
 
 
 def _duration(nanoseconds: int) -> Duration:
-    """A duration; the infinite one is 0 for rclpy, which then leaves it to the middleware."""
+    """A duration; infinite is 0 for rclpy, which leaves it to the middleware."""
     return Duration(nanoseconds=0 if nanoseconds >= FOREVER_NS else nanoseconds)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Core values as messages; recording/from_messages.py holds the other direction."""
+"""Converts core values to messages; recording/from_messages.py holds the other direction."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from .health import Status
 
 OMNIDIRECTIONAL = Base()
 
-# Messages are made whole and then filled in: a value handed to a constructor is built twice, as
-# rclpy's message classes build the default as well.
+# Messages are constructed empty and then filled in: a value passed to a constructor costs twice,
+# as rclpy's message classes construct the default as well.
 
 
 def set_stamp(stamp: Time, stamp_ns: int) -> None:
@@ -53,7 +53,7 @@ def set_header(header: Header, stamp_ns: int, frame_id: str) -> Header:
 def set_pose(pose: Pose, x: float, y: float, yaw_rad: float = 0.0) -> Pose:
     """Fill in a planar pose (REP-103); return it."""
     pose.position.x, pose.position.y = x, y
-    if yaw_rad:  # the default is no turn at all
+    if yaw_rad:  # the default is no rotation
         pose.orientation.z, pose.orientation.w = half_turn(yaw_rad)
     return pose
 
@@ -76,7 +76,7 @@ def odometry_msg(
     stamp_ns: int,
     frame_id: str,
     child_frame_id: str,
-    turn_radps: float = 0.0,
+    yaw_rate_radps: float = 0.0,
 ) -> Odometry:
     """The robot's pose in frame_id; velocity (odom frame, m/s) is given in the body frame."""
     message = Odometry()
@@ -85,12 +85,12 @@ def odometry_msg(
     set_pose(message.pose.pose, *pose)
     linear = message.twist.twist.linear
     linear.x, linear.y = rotated(velocity, -pose.yaw)
-    message.twist.twist.angular.z = turn_radps
+    message.twist.twist.angular.z = yaw_rate_radps
     return message
 
 
 def scan_msg(scan: Scan, stamp_ns: int, frame_id: str) -> LaserScan:
-    """A scan of a simulated lidar; all beams are of one moment."""
+    """A scan of a simulated lidar; all beams are measured at the stamp."""
     message = LaserScan()
     set_header(message.header, stamp_ns, frame_id)
     message.angle_min, message.angle_increment = scan.angle_min_rad, scan.angle_increment_rad
@@ -101,7 +101,7 @@ def scan_msg(scan: Scan, stamp_ns: int, frame_id: str) -> LaserScan:
 
 
 def obstacles_msg(centers: Sequence[Point], stamp_ns: int, frame_id: str) -> PoseArray:
-    """Obstacle centres, in scenario order."""
+    """Obstacle centres, as the scenario lists them."""
     message = PoseArray()
     set_header(message.header, stamp_ns, frame_id)
     message.poses = [pose_msg(x, y) for x, y in centers]
@@ -150,7 +150,7 @@ def path_msg(points: Sequence[Point], stamp_ns: int, frame_id: str) -> Path:
 
 
 def plan_msg(decision: Decision, frame_id: str) -> Path:
-    """Pose now, goal step, goal: what the planner means to do."""
+    """Polyline from the pose over the goal step to the goal."""
     points = [decision.pose.position]
     if decision.waypoint != points[-1]:
         points.append(decision.waypoint)
@@ -160,7 +160,7 @@ def plan_msg(decision: Decision, frame_id: str) -> Path:
 
 
 def twist_msg(decision: Decision, base: Base = OMNIDIRECTIONAL, tick_ns: int = 0) -> Twist:
-    """The goal step as a velocity in the body frame (m/s, rad/s), as the base can drive it."""
+    """The goal step as a velocity in the body frame (m/s, rad/s), as the base can follow it."""
     message = Twist()
     linear = message.linear
     linear.x, linear.y, message.angular.z = body_velocity(decision, base, tick_ns)
@@ -170,13 +170,13 @@ def twist_msg(decision: Decision, base: Base = OMNIDIRECTIONAL, tick_ns: int = 0
 def twist_stamped_msg(
     decision: Decision, frame_id: str, base: Base = OMNIDIRECTIONAL, tick_ns: int = 0
 ) -> TwistStamped:
-    """The same with a stamp, as Nav2's enable_stamped_cmd_vel."""
+    """twist_msg with a stamp, as Nav2's enable_stamped_cmd_vel."""
     message = TwistStamped(twist=twist_msg(decision, base, tick_ns))
     set_header(message.header, decision.stamp_ns, frame_id)
     return message
 
 
-_NOTHING: Mapping[str, str] = MappingProxyType({})
+_NO_FIELDS: Mapping[str, str] = MappingProxyType({})
 _LEVELS = {
     Mode.BLOCKED: DiagnosticStatus.WARN,
     Mode.STOPPED: DiagnosticStatus.ERROR,
@@ -184,9 +184,13 @@ _LEVELS = {
 
 
 def decision_msg(
-    decision: Decision, algorithm: str, refused: int, name: str, more: Mapping[str, str] = _NOTHING
+    decision: Decision,
+    algorithm: str,
+    refused: int,
+    name: str,
+    fields: Mapping[str, str] = _NO_FIELDS,
 ) -> DiagnosticArray:
-    """Why the planner did what it did; floats as text that gives back the same floats."""
+    """A decision in full; floats as text that gives back the same floats."""
     values = {
         "mode": decision.mode.value,
         "vs": bits_text(decision.vs),
@@ -199,7 +203,7 @@ def decision_msg(
         "candidates": points_text(decision.candidates),
         "algorithm": algorithm,
         "refused_inputs": str(refused),
-        **more,
+        **fields,
     }
     status = DiagnosticStatus(level=_LEVELS.get(decision.mode, DiagnosticStatus.OK), name=name)
     status.message = decision.reason
@@ -212,9 +216,9 @@ def decision_msg(
 
 
 def diagnostics_msg(
-    statuses: Sequence[Status], who: str, hardware_id: str, stamp_ns: int
+    statuses: Sequence[Status], node_name: str, hardware_id: str, stamp_ns: int
 ) -> DiagnosticArray:
-    """Statuses as /diagnostics has them: each is called 'node: what it is about'."""
+    """Statuses as /diagnostics has them, each named 'node: status'."""
     message = DiagnosticArray()
     set_stamp(message.header.stamp, stamp_ns)
     for status in statuses:
@@ -222,7 +226,7 @@ def diagnostics_msg(
         message.status.append(
             DiagnosticStatus(
                 level=bytes([status.level]),
-                name=f"{who}: {status.name}",
+                name=f"{node_name}: {status.name}",
                 message=status.message,
                 hardware_id=hardware_id,
                 values=values,
@@ -232,7 +236,7 @@ def diagnostics_msg(
 
 
 def outcome_msg(outcome: Outcome | None, ticks: int) -> DiagnosticStatus:
-    """How a run stands: None is running; ticks counts those published."""
+    """How a run ended, None: it is running; ticks counts those published."""
     return DiagnosticStatus(
         name="run",
         message=outcome.value if outcome else "running",

@@ -41,9 +41,9 @@ SENSOR_QOS = QoSProfile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Topic:
-    """One row of the graph's table; every_tick topics carry one message per tick.
+    """A topic of the graph; those with every_tick carry one message per tick.
 
-    least_qos is what other people's writers may offer, where that is less than qos.
+    least_qos is what foreign writers may offer, where that is less than qos.
     """
 
     name: str
@@ -68,7 +68,7 @@ ODOM = Topic(
     every_tick=True,
 )
 GROUND_TRUTH = Topic(
-    # where the robot is, while its odometry errs
+    # the true pose, where odometry is noisy
     name="ground_truth",
     type=Odometry,
     writers=(WORLD_SIM,),
@@ -117,7 +117,7 @@ GOAL_STEP = Topic(
     name="goal_step",
     type=PoseStamped,
     writers=(PLANNER,),
-    readers=(WORLD_SIM,),  # its stamp says which tick the cmd_vel after it answers
+    readers=(WORLD_SIM,),  # its stamp is that of the cmd_vel sent after it
     qos=TICK_QOS,
     every_tick=True,
 )
@@ -188,23 +188,23 @@ else:
 
 
 def expected_readers(topic: Topic, nodes: set[str]) -> set[str]:
-    """Which of the named nodes read a topic; the recorder reads every one."""
+    """Which of the named nodes read a topic; the recorder reads all topics."""
     return nodes.intersection((*topic.readers, RECORDER))
 
 
-def reading_qos(topic: Topic, *, from_anyone: bool = True) -> list[QoSProfile]:
-    """What readers ask for; where others write too, what they may offer as well.
+def reading_qos(topic: Topic, *, foreign_writers: bool = True) -> list[QoSProfile]:
+    """The QoS that readers request; with foreign writers also the least that these may offer.
 
-    A message may then come twice: see runtime.Once.
+    A message may then be received twice: see polled_subscriptions.DuplicateFilter.
     """
-    if topic.least_qos is None or not from_anyone:
+    if topic.least_qos is None or not foreign_writers:
         return [topic.qos]
     return [topic.qos, topic.least_qos]
 
 
-def recording_qos(topic: Topic, *, from_anyone: bool = True) -> list[QoSProfile]:
-    """What a reader asks for that must not lose a message."""
-    profiles = reading_qos(topic, from_anyone=from_anyone)
+def recording_qos(topic: Topic, *, foreign_writers: bool = True) -> list[QoSProfile]:
+    """The QoS of a reader that must not lose a message."""
+    profiles = reading_qos(topic, foreign_writers=foreign_writers)
     return [
         QoSProfile(
             history=HistoryPolicy.KEEP_LAST,

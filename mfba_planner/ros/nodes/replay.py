@@ -11,35 +11,36 @@ from std_srvs.srv import Trigger
 
 from ..replaying.bag_player import Phase, Player
 from ..replaying.replay_arguments import ReplaySettings, parse, split_ros_args
-from ..runtime.node_runtime import SPIN_S, GraphNode, spin_node
+from ..runtime.graph_node import SPIN_S, GraphNode
+from ..runtime.spin_node import spin_node
 
-FINE_S = 0.0015  # an executor wakes up late: so long before a message is due it is left
+FINE_S = 0.0015  # an executor wakes up late: it is left this long before a message is due
 
 
 class Replay(GraphNode):
-    """The services around a Player."""
+    """A Player with the services ~/pause, ~/resume and ~/step."""
 
     def __init__(self, settings: ReplaySettings, **kwargs: Any) -> None:
         """Raise ConfigError or BagError for what cannot be played."""
-        # It has no parameters of its own, and each service costs at every turn of the executor.
+        # It has no parameters of its own, and the executor waits for each service at every spin.
         super().__init__("replay", start_parameter_services=False, **kwargs)
         self.player = Player(self, settings)
-        self._served_s = 0.0
+        self._spun_s = 0.0
         self.create_service(Trigger, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/resume", self._on_resume)
         self.create_service(Trigger, "~/step", self._on_step)
 
-    def turn(self, executor: Executor) -> None:
-        """Publish what is due, then serve until shortly before the next is."""
+    def spin_once(self, executor: Executor) -> None:
+        """Publish what is due, then spin until shortly before the next message is due."""
         wait_s = self.advance()
-        if 0.0 < wait_s < FINE_S and time.monotonic() - self._served_s < SPIN_S:
+        if 0.0 < wait_s < FINE_S and time.monotonic() - self._spun_s < SPIN_S:
             time.sleep(wait_s)
             return
         executor.spin_once(timeout_sec=max(0.0, wait_s - FINE_S))
-        self._served_s = time.monotonic()
+        self._spun_s = time.monotonic()
 
     def advance(self) -> float:
-        """Publish what is due; return the seconds (SPIN_S at most) until there is more to do."""
+        """Publish what is due; return the seconds until the next is due, at most SPIN_S."""
         wait_s = self.player.advance()
         self.finished = self.player.phase is Phase.OVER
         return min(wait_s, SPIN_S)
@@ -65,5 +66,5 @@ class Replay(GraphNode):
 
 def main(args: list[str]) -> int:
     """Entry point."""
-    ours, for_ros = split_ros_args(args)
-    return spin_node(lambda: Replay(parse(ours)), for_ros)
+    own, for_ros = split_ros_args(args)
+    return spin_node(lambda: Replay(parse(own)), for_ros)

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a bag is published again."""
+"""Replays a bag: command line, topic selection, schedule, flow control."""
 
 from .. import require_ros  # noqa: F401

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What replay does between two turns of its executor: publish what is due."""
+"""Player: publishes a bag's messages when they are due, called between two executor spins."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from ...recording.bag_reader import BagReader
 from ...recording.replay_schedule import UNKNOWN_DEPTH, Due, Schedule, begin_ns, due_messages
 from ..interface import topics
 from ..interface.to_messages import clock_msg
-from ..runtime.node_runtime import SPIN_S, GraphNode
+from ..runtime.graph_node import SPIN_S, GraphNode
 from .flow_control import FlowControl, all_acknowledged, windowed
 from .reader_readiness import Readiness
 from .replay_arguments import ReplaySettings
 from .topic_selection import awaited, choose
 
-BURST = 50  # messages that may follow each other before services and signals are looked at
-POLL_S = 0.002  # between two looks at what others have to do
+BURST = 50  # messages published before services and signals are served
+POLL_S = 0.002  # between two checks of what the readers have read
 LOOP_GAP_NS = 100_000_000  # between the last message and the first of the next round
-END_S = 5.0  # longest wait for acknowledgements; Fast DDS may ask for them after 3 s only
+END_S = 5.0  # longest wait for acknowledgements; Fast DDS may request them after 3 s only
 
 
 class Phase(Enum):
-    """Where in its life a player is."""
+    """The phases of a replay."""
 
     WAITING = auto()
     PLAYING = auto()
@@ -67,15 +67,15 @@ class Player:
             )
             for topic in found
         }
-        self._awaited = Readiness(self._node, self._publishers, wanted, s.inputs_of)
+        self._readiness = Readiness(self._node, self._publishers, wanted, s.inputs_of)
         self._latched = {t.recorded: t.qos.depth or UNKNOWN_DEPTH for t in found if t.latched}
         self._flow = FlowControl(self._node, self._publishers, s.wait_timeout, lossless=fast)
         self._clock = self._node.advertise(topics.CLOCK) if s.clock else None
         self._clock_due_ns = 0
         self._clock_period_ns = round(1e9 / s.clock) if s.clock else 0
         self._schedule = Schedule(None if fast else s.rate, self._start_ns, paused=s.start_paused)
-        self._since_ns = time.monotonic_ns()  # when the present phase began
-        self._began_ns = self._played_ns = 0
+        self._since_ns = time.monotonic_ns()  # start of the present phase
+        self._started_ns = self._played_ns = 0
         self._rewind()
         for line in [*self._bag.problems, *left_out]:
             self._node.get_logger().warning(line)
@@ -93,9 +93,9 @@ class Player:
         self._bag.close()
 
     def advance(self) -> float:
-        """Publish what is due; return the seconds until there is more to do.
+        """Publish what is due; return the seconds until the next message is due.
 
-        Raises GraphError when others are missing or hang, BagError when the bag is damaged.
+        Raises GraphError when readers are missing or hang, BagError when the bag is damaged.
         """
         now = time.monotonic_ns()
         wait_s = SPIN_S
@@ -105,19 +105,19 @@ class Player:
             wait_s = self._play(now)
         elif self.phase is Phase.ENDING:
             wait_s = self._end(now)
-        return min(wait_s, self._tell_time(time.monotonic_ns()))
+        return min(wait_s, self._publish_clock_if_due(time.monotonic_ns()))
 
     def pause(self) -> None:
-        """Let time stand still."""
+        """Stop the replay's time."""
         if not self._schedule.paused:
             self._schedule.pause(time.monotonic_ns())
 
     def resume(self) -> None:
-        """Go on."""
+        """End a pause."""
         self._schedule.resume(time.monotonic_ns())
 
     def step(self) -> tuple[bool, str]:
-        """Publish exactly one message while paused: whether it was, and what or why not."""
+        """Publish one message while paused; return success, and what was published or why not."""
         due = self._next
         if not self._schedule.paused:
             return False, "refused: pause first"
@@ -126,7 +126,7 @@ class Player:
         self._publish(due)
         return True, f"{due.topic} at {(due.time_ns - self._start_ns) / 1e9:.6f} s"
 
-    def _begin(self, phase: Phase, now: int) -> None:
+    def _enter(self, phase: Phase, now: int) -> None:
         self.phase, self._since_ns = phase, now
 
     def _rewind(self) -> None:
@@ -134,15 +134,17 @@ class Player:
             self._bag, self._publishers.keys(), self._latched, self.settings.start_offset
         )
         self._next = next(self._messages, None)
-        self._told_ns = -1
+        self._clock_ns = -1
         self._last_ns = self._start_ns
 
     def _wait(self, now: int) -> float:
-        """Until those are there who must not miss the first message."""
-        missing = self._awaited.missing()
-        if not missing and (self._awaited.nobody or self._flow.knows_readers(now * 1e-9)):
-            self._begin(Phase.PLAYING, now)
-            self._began_ns = now
+        """Wait until all required subscribers and nodes are there."""
+        missing = self._readiness.missing()
+        if not missing and (
+            self._readiness.waits_for_nothing or self._flow.knows_readers(now * 1e-9)
+        ):
+            self._enter(Phase.PLAYING, now)
+            self._started_ns = now
             self._schedule.start(now)
             return 0.0
         timeout_s = self.settings.wait_timeout
@@ -156,16 +158,16 @@ class Player:
         for _ in range(BURST):
             due = self._next
             if due is None:
-                self._begin(Phase.ENDING, now)
+                self._enter(Phase.ENDING, now)
                 return 0.0
             wait_ns = self._schedule.wait_ns(due.time_ns, now)
             if wait_ns is None:
                 return SPIN_S
             if wait_ns > 0:
                 return wait_ns * 1e-9
-            # Time goes on only where everything of the past has been read.
-            alone = self._clock is not None and due.time_ns > self._told_ns
-            allowed = self._flow.allows(due.topic, alone=alone)
+            # Time advances only where everything earlier has been read.
+            after_all = self._clock is not None and due.time_ns > self._clock_ns
+            allowed = self._flow.allows(due.topic, after_all=after_all)
             if not allowed and not self._flow.settle(now * 1e-9):
                 return POLL_S
             self._publish(due)
@@ -174,8 +176,8 @@ class Player:
 
     def _publish(self, due: Due) -> None:
         self._schedule.step_to(due.time_ns)
-        if self._schedule.by_steps and due.time_ns > self._told_ns:
-            self._tell(due.time_ns)
+        if self._schedule.by_steps and due.time_ns > self._clock_ns:
+            self._publish_clock(due.time_ns)
         self._publishers[due.topic].publish(due.data)
         self._last_ns = due.time_ns
         self.counts[due.topic] += 1
@@ -186,8 +188,8 @@ class Player:
             self._rewind()
 
     def _end(self, now: int) -> float:
-        """Until everything has arrived; then say what was played."""
-        self._played_ns = self._played_ns or now - self._began_ns
+        """Wait until everything has arrived; then log what was played."""
+        self._played_ns = self._played_ns or now - self._started_ns
         if not self._flow.settle(now * 1e-9):
             return POLL_S
         late = [t for t, p in self._publishers.items() if not all_acknowledged(p)]
@@ -199,21 +201,21 @@ class Player:
         counts = ", ".join(f"{topic} {count}" for topic, count in sorted(self.counts.items()))
         seconds = self._played_ns * 1e-9
         logger.info(f"played {self.counts.total()} messages in {seconds:.3f} s: {counts}")
-        self._begin(Phase.OVER, now)
+        self._enter(Phase.OVER, now)
         return 0.0
 
-    def _tell_time(self, now: int) -> float:
-        """Publish /clock if it is due; seconds until the next. It never overtakes a message."""
+    def _publish_clock_if_due(self, now: int) -> float:
+        """Publish /clock if due; return seconds until the next. It never overtakes a message."""
         if self._clock is None:
             return SPIN_S
         if now >= self._clock_due_ns:
             self._clock_due_ns = max(self._clock_due_ns, now) + self._clock_period_ns
             limit_ns = self._next.time_ns if self._next else self._last_ns
             time_ns = min(limit_ns, self._schedule.time_ns(now))
-            self._tell(max(self._start_ns, time_ns))
+            self._publish_clock(max(self._start_ns, time_ns))
         return (self._clock_due_ns - now) * 1e-9
 
-    def _tell(self, time_ns: int) -> None:
+    def _publish_clock(self, time_ns: int) -> None:
         if self._clock is not None:
-            self._told_ns = time_ns
+            self._clock_ns = time_ns
             self._clock.publish(clock_msg(time_ns))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What must be there before the first message is played."""
+"""The subscribers and nodes that replay waits for before the first message."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 
 
 class Readiness:
-    """Subscribers on our topics, and nodes of the graph that are ready for their own part."""
+    """Whether the played topics have subscribers, and whether nodes of the graph are ready."""
 
     def __init__(
         self,
@@ -21,32 +21,34 @@ class Readiness:
         subscribers: Mapping[str, int] | None,
         nodes: tuple[str, ...],
     ) -> None:
-        """Take the subscribers wanted per topic ({}: one on any, None: wait for nothing)."""
+        """subscribers: how many each topic needs; {}: any topic one, None: wait for nothing."""
         self._publishers = publishers
-        self._wanted = subscribers
-        self._nodes = {} if subscribers is None else {name: _Ready(node, name) for name in nodes}
+        self._required = subscribers
+        self._nodes = (
+            {} if subscribers is None else {name: _ReadyCall(node, name) for name in nodes}
+        )
 
     @property
-    def nobody(self) -> bool:
-        """Whether nothing is waited for."""
-        return self._wanted is None
+    def waits_for_nothing(self) -> bool:
+        """Whether no subscriber and no node is required."""
+        return self._required is None
 
     def missing(self) -> str:
         """What is missing, empty when nothing is."""
-        if self._wanted is None:
+        if self._required is None:
             return ""
         found = {topic: p.get_subscription_count() for topic, p in self._publishers.items()}
-        absent = [topic for topic, count in self._wanted.items() if found[topic] < count]
-        if not self._wanted and not any(found.values()):
+        absent = [topic for topic, count in self._required.items() if found[topic] < count]
+        if not self._required and not any(found.values()):
             absent = list(found)
         if absent:
             return f"too few subscribers on {', '.join(absent)}"
-        reasons = ((name, ready.missing()) for name, ready in self._nodes.items())
+        reasons = ((name, client.missing()) for name, client in self._nodes.items())
         return next((f"{name} is not ready ({reason})" for name, reason in reasons if reason), "")
 
 
-class _Ready:
-    """Asks a node's ~/ready until it says yes."""
+class _ReadyCall:
+    """Calls a node's ~/ready until it succeeds."""
 
     def __init__(self, node: Node, name: str) -> None:
         self._client = node.create_client(Trigger, f"{name}/ready")
@@ -58,7 +60,7 @@ class _Ready:
                 return "it does not run"
             self._future = self._client.call_async(Trigger.Request())
         if not self._future.done():
-            return "it does not answer"
+            return "it does not respond"
         response = self._future.result()
         if not response.success:
             self._future = None

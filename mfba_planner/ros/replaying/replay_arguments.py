@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What replay can be told on its command line."""
+"""The command line of replay."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ CLOCK_HZ = 40.0  # as `ros2 bag play --clock`
 _EPILOG = """\
 ~/pause, ~/resume and ~/step (one message) are std_srvs/Trigger services.
 
-As fast as possible, at most 5 messages of a topic are under way before all nodes that listen
-have acknowledged them and answered a call of their parameter service, which an executor serves
-only after the messages. So nothing is lost by a reader whose history holds 10 (the default),
+With --as-fast-as-possible at most 5 messages of a topic are sent before all subscribed nodes
+have acknowledged them and responded to a call of their parameter service, which an executor
+serves only after the messages. So a reader whose history holds 10 (the default) loses nothing,
 however slow it is; but what was recorded best effort is offered best effort. With --clock time
-moves on only when everything of the past has been read.
+advances only when everything earlier has been read.
 
-What is latched is read before anything that follows is published, at any rate where the readers
-answer within 0.1 s.
+A latched message is read before any later one is published; at a fixed rate only where the
+readers respond within 0.1 s.
 
-With --loop the stamps go back at each new start: give --clock, and use_sim_time to the readers,
+With --loop the stamps go back at each restart: give --clock, and use_sim_time to the readers,
 so that they notice. With --clock the bag's own /clock is not played.
 
 --ros-args -r FROM:=TO and the like may follow.
@@ -38,27 +38,27 @@ class ReplaySettings:
 
     bag: str
     rate: float = option(1.0, "bag seconds per second", minimum=0.001, maximum=1_000_000.0)
-    loop: bool = option(False, "begin again at the end, until stopped")
+    loop: bool = option(False, "restart at the end, until stopped")
     start_offset: float = option(
-        0.0, "skip so much; latched topics are sent again", unit="s", minimum=0.0
+        0.0, "skip this much; latched messages are still sent", unit="s", minimum=0.0
     )
     clock: float = option(
         0.0,
-        f"publish /clock so many times a second ({CLOCK_HZ:g} without a number); 0: not at all",
+        f"rate of /clock ({CLOCK_HZ:g} without a number); 0: not at all",
         unit="Hz",
         minimum=0.0,
         maximum=1000.0,
     )
     start_paused: bool = option(False, "wait for ~/resume or ~/step")
-    as_fast_as_possible: bool = option(False, "as fast as the readers can, losing nothing")
+    as_fast_as_possible: bool = option(False, "as fast as the readers can read, losing nothing")
     wait_timeout: float = option(
-        10.0, "longest wait for subscribers, and for their answers", unit="s", minimum=0.0
+        10.0, "longest wait for subscribers, and for their responses", unit="s", minimum=0.0
     )
     topics: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     inputs_of: tuple[str, ...] = ()
     remap: tuple[tuple[str, str], ...] = ()
-    # None: wait for nobody; (): see the help; otherwise one number, or topics
+    # None: wait for no subscriber; (): see the help; otherwise one number, or topics
     wait_for_subscribers: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -72,24 +72,24 @@ class ReplaySettings:
 
 
 def split_ros_args(args: list[str]) -> tuple[list[str], list[str]]:
-    """Ours, and those from --ros-args to -- or the end.
+    """Replay's own arguments, and those from --ros-args to -- or the end.
 
-    rcl must not see ours: it would take FROM:=TO for a rule of ROS 2's early days.
+    rcl must not get replay's own: it would read FROM:=TO as a deprecated remap rule.
     """
-    parts: tuple[list[str], list[str]] = ([], [])
+    own_and_ros: tuple[list[str], list[str]] = ([], [])
     is_ros = False
     for arg in args:
         starts, ends = arg == "--ros-args", is_ros and arg == "--"
         is_ros = (is_ros or starts) and not ends
-        parts[is_ros or ends].append(arg)
-    return parts
+        own_and_ros[is_ros or ends].append(arg)
+    return own_and_ros
 
 
 def parse(args: list[str]) -> ReplaySettings:
     """Settings from a command line without ROS arguments. Raises ConfigError."""
     parser = Parser(
         prog="replay",
-        description="Play a bag: a directory or a .mcap file, ours or rosbag2's.",
+        description="Play a bag: a directory or a .mcap file of this package or of rosbag2.",
         epilog=_EPILOG,
     )
     parser.add_argument("bag", metavar="BAG", help="bag directory or .mcap file")
@@ -98,17 +98,24 @@ def parse(args: list[str]) -> ReplaySettings:
         if isinstance(default, bool):
             parser.add_argument(flag, action="store_true", help=spec.doc)
             continue
-        may: dict[str, Any] = {"nargs": "?", "const": CLOCK_HZ} if name == "clock" else {}
-        shown = f"{spec.doc} (default {default:g})"
+        optional_value: dict[str, Any] = (
+            {"nargs": "?", "const": CLOCK_HZ} if name == "clock" else {}
+        )
+        help_text = f"{spec.doc} (default {default:g})"
         parser.add_argument(
-            flag, type=float, default=default, metavar=spec.unit.upper() or "R", help=shown, **may
+            flag,
+            type=float,
+            default=default,
+            metavar=spec.unit.upper() or "R",
+            help=help_text,
+            **optional_value,
         )
     _add_lists(parser)
-    given: dict[str, Any] = vars(parser.parse(args))
-    given["remap"] = [_rule(text) for text in given["remap"]]
-    for name, value in given.items():
-        given[name] = tuple(value) if isinstance(value, list) else value
-    return ReplaySettings(**given)
+    values: dict[str, Any] = vars(parser.parse(args))
+    values["remap"] = [_rule(text) for text in values["remap"]]
+    for name, value in values.items():
+        values[name] = tuple(value) if isinstance(value, list) else value
+    return ReplaySettings(**values)
 
 
 def _add_lists(parser: Parser) -> None:
@@ -123,9 +130,9 @@ def _add_lists(parser: Parser) -> None:
         "--wait-for-subscribers",
         nargs="*",
         metavar="N|TOPIC",
-        help="begin when each played topic has N subscribers, or each of these has one; without "
-        "a value when any has one, or with --inputs-of each and the nodes' ~/ready says yes "
-        "(the default when as fast as possible)",
+        help="start when each played topic has N subscribers, or each of these has one; without "
+        "a value: when any has one, or with --inputs-of when each has one and the nodes' ~/ready "
+        "succeeds (the default with --as-fast-as-possible)",
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which topics of a bag are played: under which name, with which installed type and QoS."""
+"""Selects a bag's topics for replay: name, installed message type and QoS of each."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Resolve = Callable[[str], str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlayedTopic:
-    """One topic of the bag and the publisher it gets."""
+    """One topic of the bag and its publisher's name, type and QoS."""
 
     recorded: str
     name: str
@@ -33,14 +33,14 @@ class PlayedTopic:
 
     @property
     def latched(self) -> bool:
-        """Whether a late subscriber gets the newest messages too."""
+        """Whether late subscribers get the newest messages too."""
         return bool(self.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def choose(
     recorded: Mapping[str, BagTopic], settings: ReplaySettings, resolve: Resolve
 ) -> tuple[list[PlayedTopic], list[str]]:
-    """What is played, and a line for each topic left out because of its type.
+    """The topics to play, and a line for each that is left out because of its type.
 
     Raises ConfigError for names that are not in the bag, and when nothing is left.
     """
@@ -51,7 +51,7 @@ def choose(
     for name in _selected(recorded, settings, resolve):
         topic = recorded[name]
         try:
-            kind = _installed(topic)
+            message_type = _installed(topic)
         except InputError as error:
             left_out.append(f"left out {name} ({topic.message_count} messages): {error}")
             continue
@@ -59,7 +59,7 @@ def choose(
             PlayedTopic(
                 recorded=name,
                 name=new_names.get(name, name),
-                type=kind,
+                type=message_type,
                 qos=qos.profile(offer(topic.qos)),
                 message_count=topic.message_count,
             )
@@ -87,7 +87,7 @@ def _selected(
 
 
 def _inputs(nodes: tuple[str, ...]) -> Iterator[str]:
-    """What the nodes read, without what one of them writes itself."""
+    """The topics that the nodes read, except those that one of them writes."""
     readers = {name for topic in topics.GRAPH for name in topic.readers}
     chosen = set(known(nodes, readers, "--inputs-of"))
     for topic in topics.GRAPH:
@@ -96,8 +96,8 @@ def _inputs(nodes: tuple[str, ...]) -> Iterator[str]:
 
 
 def _installed(topic: BagTopic) -> Any:
-    """The message class. Raises InputError where it is missing, or not what was recorded."""
-    # First of all: what a file names is only imported where it is a message type.
+    """The message class; InputError where it is not installed or differs from the recorded one."""
+    # Checked first: a module that a file names is imported only if it is a message type.
     installed = definition_of(topic.type_name).type_hash
     if topic.type_hash.startswith("RIHS01_") and topic.type_hash != installed:
         raise InputError(f"{topic.type_name} was another type when it was recorded")
@@ -115,7 +115,7 @@ def awaited(
 ) -> dict[str, int] | None:
     """Subscribers that each topic must have before the first message; {}: any topic has one.
 
-    None: nobody is waited for. Raises ConfigError for a topic that is not played.
+    None: wait for no subscriber. Raises ConfigError for a topic that is not played.
     """
     given = settings.wait_for_subscribers
     names = [topic.recorded for topic in played]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a robot has been sent: one goal or several in a row. No ROS here."""
+"""The planner's goals: one, or several to visit one after another. No ROS here."""
 
 from __future__ import annotations
 
@@ -7,53 +7,58 @@ from ...core.geometry import Point, distance
 
 
 class GoalQueue:
-    """The goals still to be reached, in order; number counts what was ordered so far."""
+    """The goals to visit, first to last; goal_id counts the requests so far."""
 
     def __init__(self) -> None:
-        """Start with nothing to do."""
+        """Start without a goal."""
         self._points: tuple[Point, ...] = ()
-        self._leg = 0
-        self.number = 0
+        self._index = 0
+        self.goal_id = 0
 
     @property
     def goal(self) -> Point | None:
-        """Where to go now; None: nowhere."""
-        return self._points[self._leg] if self._points else None
+        """The present goal, None without any."""
+        return self._points[self._index] if self._points else None
 
     @property
-    def leg(self) -> str:
-        """Which of how many goals this is, "" without any: '2 of 3'."""
-        return f"{self._leg + 1} of {len(self._points)}" if self._points else ""
+    def goal_index(self) -> str:
+        """Which of how many goals the present one is, "" without any: '2 of 3'."""
+        return f"{self._index + 1} of {len(self._points)}" if self._points else ""
 
-    def order(self, points: tuple[Point, ...], *, over: bool) -> bool:
-        """Go to these instead; False, and nothing changes, where that is being done already.
+    @property
+    def fields(self) -> dict[str, str]:
+        """What planner/decision reports of the goals."""
+        return {"goal_id": str(self.goal_id), "goal_index": self.goal_index}
 
-        over: the present ones are reached, or were given up; then the same may be ordered anew.
+    def set_goals(self, points: tuple[Point, ...], *, finished: bool) -> bool:
+        """Replace the goals; False, and nothing changes, for the same goals again.
+
+        finished: the present goals are reached or given up; then the same ones count as new.
         """
-        if points == self._points and not over:
+        if points == self._points and not finished:
             return False
-        self._points, self._leg = points, 0
-        self.number += 1
+        self._points, self._index = points, 0
+        self.goal_id += 1
         return True
 
-    def pass_by(self, position: Point, tolerance_m: float) -> int:
-        """Count how many goals but the last are reached from here, and go on to the next."""
-        passed = 0
-        while self._leg + 1 < len(self._points):
-            if distance(position, self._points[self._leg]) > tolerance_m:
+    def advance(self, position: Point, tolerance_m: float) -> int:
+        """Skip goals that are reached at this position, never the last; return how many."""
+        reached = 0
+        while self._index + 1 < len(self._points):
+            if distance(position, self._points[self._index]) > tolerance_m:
                 break
-            self._leg += 1
-            passed += 1
-        return passed
+            self._index += 1
+            reached += 1
+        return reached
 
-    def begin_anew(self) -> None:
-        """Count the same goals as ordered again: whoever drives there has forgotten all."""
-        self.number += 1
+    def renew(self) -> None:
+        """Count the same goals as requested again: the planner was reset."""
+        self.goal_id += 1
 
     def cancel(self) -> Point | None:
-        """Go nowhere; return where the robot was on its way to, None: nowhere before either."""
+        """Drop all goals; return the present one, None if there was none."""
         goal = self.goal
         if goal is not None:
-            self._points, self._leg = (), 0
-            self.number += 1
+            self._points, self._index = (), 0
+            self.goal_id += 1
         return goal

@@ -8,22 +8,22 @@ from typing import Any
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
-from .node_runtime import GraphNode
+from .graph_node import GraphNode
 
 
 class ManagedNode(GraphNode, LifecycleNodeMixin):
-    """Subclasses say what set_up, start, halt and tear_down mean; begin() is called once.
+    """Subclasses implement configure, activate, deactivate and clean_up.
 
-    Its services are those of any managed node (ros2 lifecycle get|set); a node that nobody can
-    call, start_parameter_services=False, offers none.
+    The services are those of any managed node (ros2 lifecycle get|set); a node without
+    parameter services (start_parameter_services=False) has none of them either.
     """
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         """Pass rclpy's keyword arguments on; the node is unconfigured then."""
         GraphNode.__init__(self, name, **kwargs)
-        attended = kwargs.get("start_parameter_services", True)
-        LifecycleNodeMixin.__init__(self, enable_communication_interface=attended)
-        self._trouble: Exception | None = None
+        services = kwargs.get("start_parameter_services", True)
+        LifecycleNodeMixin.__init__(self, enable_communication_interface=services)
+        self._transition_error: Exception | None = None
 
     @property
     def state(self) -> str:
@@ -33,27 +33,27 @@ class ManagedNode(GraphNode, LifecycleNodeMixin):
 
     @property
     def is_active(self) -> bool:
-        """Whether it does what it is for."""
+        """Whether the node is in the state active."""
         return self.state == "active"
 
-    def begin(self, autostart: bool) -> None:
-        """Configure and activate at once, or wait to be told; what goes wrong is raised."""
+    def enter_life_cycle(self, autostart: bool) -> None:
+        """With autostart configure and activate now, and raise what fails; called once."""
         if autostart:
             self.trigger_configure()
             self.trigger_activate()
-            if self._trouble is not None:
-                raise self._trouble
+            if self._transition_error is not None:
+                raise self._transition_error
 
-    def set_up(self) -> None:
+    def configure(self) -> None:
         """Unconfigured to inactive."""
 
-    def start(self) -> None:
+    def activate(self) -> None:
         """Inactive to active."""
 
-    def halt(self) -> None:
+    def deactivate(self) -> None:
         """Active to inactive."""
 
-    def tear_down(self) -> None:
+    def clean_up(self) -> None:
         """Inactive to unconfigured."""
 
     def missing(self) -> str:
@@ -61,35 +61,35 @@ class ManagedNode(GraphNode, LifecycleNodeMixin):
         return super().missing() if self.is_active else f"{self.state}, not active"
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Rclpy's name of set_up."""
-        return self._done(self.set_up)
+        """Rclpy's callback for configure."""
+        return self._run(self.configure)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Rclpy's name of start."""
-        return self._done(self.start)
+        """Rclpy's callback for activate."""
+        return self._run(self.activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Rclpy's name of halt."""
-        return self._done(self.halt)
+        """Rclpy's callback for deactivate."""
+        return self._run(self.deactivate)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Rclpy's name of tear_down."""
-        return self._done(self.tear_down)
+        """Rclpy's callback for clean_up."""
+        return self._run(self.clean_up)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """From wherever it is: all that leads down; the process ends with it."""
+        """From any state: deactivate and clean up where needed; the process ends with it."""
         if state.label == "active":
-            self._done(self.halt)
+            self._run(self.deactivate)
         self.finished = True
-        return self._done(self.tear_down) if state.label != "unconfigured" else _SUCCESS
+        return self._run(self.clean_up) if state.label != "unconfigured" else _SUCCESS
 
-    def _done(self, step: Callable[[], None]) -> TransitionCallbackReturn:
-        """Rclpy swallows what is raised in a transition: log it, and keep it for begin."""
+    def _run(self, transition: Callable[[], None]) -> TransitionCallbackReturn:
+        """Log and keep what a transition raises: rclpy itself would drop it."""
         try:
-            step()
+            transition()
         except Exception as error:
-            self._trouble = error
-            self.get_logger().error(f"{step.__name__}: {error}")
+            self._transition_error = error
+            self.get_logger().error(f"{transition.__name__}: {error}")
             return TransitionCallbackReturn.ERROR
         return _SUCCESS
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All parameters of other nodes, asked for over their parameter services."""
+"""Reads all parameters of other nodes through their parameter services."""
 
 from __future__ import annotations
 
@@ -12,57 +12,59 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
 from ..interface import parameters
-from .node_runtime import GraphNode
+from .graph_node import GraphNode
 
 PERIOD_S = 0.05
-ASK_AGAIN_S = 1.0  # an answer can get lost while a server still looks for its client
+RETRY_S = 1.0  # a response can get lost while a server has not discovered its client yet
 
-Found = dict[str, dict[str, Any]]
+NodeParameters = dict[str, dict[str, Any]]  # by node, by parameter
 
 
 class ParameterClient:
-    """Asks every wanted node until it answers; done(found) when all have answered."""
+    """Requests every node's parameters until it responds; then calls on_done(values) once."""
 
-    def __init__(self, node: GraphNode, wanted: set[str], done: Callable[[Found], None]) -> None:
-        """Begin to ask, while the node spins."""
+    def __init__(
+        self, node: GraphNode, nodes: set[str], on_done: Callable[[NodeParameters], None]
+    ) -> None:
+        """Start to send requests while the node spins."""
         self._node = node
-        self._done = done
-        self._askers: dict[str, AsyncParameterClient] = {}
-        self._asked_at: dict[str, float] = {}
-        self.wanted = wanted
-        self.found: Found = {}
-        if wanted:
-            self._timer = node.every(PERIOD_S, self._ask)
+        self._on_done = on_done
+        self._clients: dict[str, AsyncParameterClient] = {}
+        self._requested_s: dict[str, float] = {}
+        self._nodes = nodes
+        self.values: NodeParameters = {}
+        if nodes:
+            self._timer = node.create_wall_timer(PERIOD_S, self._request)
 
     @property
-    def absent(self) -> list[str]:
-        """Nodes that have not answered yet."""
-        return sorted(self.wanted - self.found.keys())
+    def pending(self) -> list[str]:
+        """Nodes whose parameters are not read yet."""
+        return sorted(self._nodes - self.values.keys())
 
-    def _ask(self) -> None:
+    def _request(self) -> None:
         now = time.monotonic()
-        for name in self.absent:
-            asker = self._askers.get(name) or AsyncParameterClient(self._node, name)
-            self._askers[name] = asker
-            waited = now - self._asked_at.get(name, float("-inf"))
-            if waited >= ASK_AGAIN_S and asker.services_are_ready():
-                self._asked_at[name] = now
-                asker.list_parameters(callback=partial(self._on_listed, name))
-        if not self.absent:
+        for name in self.pending:
+            client = self._clients.get(name) or AsyncParameterClient(self._node, name)
+            self._clients[name] = client
+            waited = now - self._requested_s.get(name, float("-inf"))
+            if waited >= RETRY_S and client.services_are_ready():
+                self._requested_s[name] = now
+                client.list_parameters(callback=partial(self._on_names, name))
+        if not self.pending:
             self._node.destroy_timer(self._timer)
-            self._let_go()
-            self._done(self.found)
+            self._destroy_clients()
+            self._on_done(self.values)
 
-    def _let_go(self) -> None:
-        """Destroy the clients, six per node: each is one more thing to wait for at every turn."""
+    def _destroy_clients(self) -> None:
+        """There are six per node, and an executor waits for each of them at every spin."""
         for client in list(self._node.clients):
             self._node.destroy_client(client)
-        self._askers.clear()
+        self._clients.clear()
 
-    def _on_listed(self, name: str, future: Any) -> None:
-        listed = list(future.result().result.names)
-        self._askers[name].get_parameters(listed, callback=partial(self._on_values, name, listed))
+    def _on_names(self, node: str, future: Any) -> None:
+        names = list(future.result().result.names)
+        self._clients[node].get_parameters(names, callback=partial(self._on_values, node, names))
 
-    def _on_values(self, name: str, listed: list[str], future: Any) -> None:
+    def _on_values(self, node: str, names: list[str], future: Any) -> None:
         values = map(parameter_value_to_python, future.result().values)
-        self.found[name] = {key: parameters.plain(value) for key, value in zip(listed, values)}
+        self.values[node] = {name: parameters.plain(value) for name, value in zip(names, values)}

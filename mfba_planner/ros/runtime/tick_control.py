@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When the simulated world may tick: pauses, answers in lockstep, repetitions. No ROS here."""
+"""When the simulated world may tick: pauses, lockstep, repeated ticks. No ROS here."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..node_parameters import WorldSimSettings
 
 
 class TickControl:
-    """Lockstep: a tick stays open until its answer comes; otherwise the wall timer drives."""
+    """Lockstep: a tick is open until all its commands are received. Real time: none is open."""
 
     def __init__(self, settings: WorldSimSettings) -> None:
         """Start before tick 0."""
@@ -18,36 +18,36 @@ class TickControl:
         self._published_s = 0.0
         self._repetitions = 0
 
-    def published(self, now_s: float) -> None:
-        """A new tick went out; now_s is of any steady clock."""
+    def open_tick(self, now_s: float) -> None:
+        """A new tick was published; now_s is of any steady clock."""
         self.is_open = self.settings.lockstep
         self._published_s = now_s
         self._repetitions = 0
 
-    def answered(self) -> bool:
-        """The answer to the open tick came, or a reset has swept it away; may_move_on() then."""
+    def close_tick(self) -> bool:
+        """The open tick's commands were received, or ~/reset ended it; return may_advance()."""
         self.is_open = False
-        return self.may_move_on()
+        return self.may_advance()
 
     def resume(self) -> bool:
-        """Go on from a pause; whether the world may move on that could not before."""
+        """End a pause; return whether the world may advance that could not before."""
         was_paused, self.paused = self.paused, False
-        return was_paused and self.may_move_on()
+        return was_paused and self.may_advance()
 
-    def may_move_on(self) -> bool:
-        """Lockstep: the tick is answered and nobody holds the world."""
+    def may_advance(self) -> bool:
+        """Lockstep: whether no tick is open and the world is not paused."""
         return self.settings.lockstep and not self.is_open and not self.paused
 
-    def cannot_step(self) -> str:
-        """Why a single step cannot be taken now; empty when it can."""
+    def step_refusal(self) -> str:
+        """Why ~/step must be refused now; empty when it need not."""
         if not self.paused:
             return "refused: not paused; pause first"
         if self.is_open:
-            return "refused: the planner has not answered the present tick yet"
+            return "refused: the present tick has no command yet"
         return ""
 
     def must_repeat(self, now_s: float, tick: int) -> bool:
-        """Whether to publish an unanswered tick again; GraphError when that was done enough."""
+        """Whether to publish the open tick again; GraphError after answer_retries repetitions."""
         timeout_s = self.settings.answer_timeout_s
         if not self.is_open or now_s - self._published_s < timeout_s:
             return False

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The planner's odom, sectors and scan: converted, then paired into the inputs of one decision."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from ...core.errors import InputError
+from ...core.types import Observation, Scan
+from ...perception.scan_to_sectors import aligned
+from ...planning.planner_params import PlannerParams
+from ...recording.from_messages import laser_scan, robot_pose, sector_ranges, stamp_ns
+from ..interface import topics
+from ..node_parameters import PlannerSettings
+from ..runtime.graph_node import GraphNode
+from ..runtime.planner_inputs import Inputs, LockstepInputs, NewestInputs
+from ..runtime.refused_inputs import RefusedInputs
+from ..runtime.stamp_pairing import StampPairs
+from .planner_diagnostics import PlannerDiagnostics
+
+
+class InputSubscriptions:
+    """Calls on_inputs for each pair of odom and sectors; a refused message is its error text.
+
+    Where the planner tracks obstacles, sectors wait for the scan of their stamp.
+    """
+
+    def __init__(
+        self,
+        node: GraphNode,
+        settings: PlannerSettings,
+        params: PlannerParams,
+        refused_inputs: RefusedInputs,
+        diagnostics: PlannerDiagnostics,
+        on_inputs: Callable[[Inputs], None],
+    ) -> None:
+        """params.tracks_scan is read once: whether scan is subscribed to."""
+        self._node, self._settings = node, settings
+        self._tracks_scan = params.tracks_scan
+        self._refused_inputs, self._diagnostics = refused_inputs, diagnostics
+        self._on_inputs = on_inputs
+        self.range_max_m = 0.0  # of the newest sectors
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was received, as when time was set back."""
+        lockstep = self._settings.lockstep
+        self._pairs: LockstepInputs | NewestInputs = (
+            LockstepInputs() if lockstep else NewestInputs()
+        )
+        self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True)
+        self._scan: Scan | None = None
+
+    def subscribe(self) -> None:
+        """Subscribe to odom and sectors, and to scan where it is needed."""
+        lockstep = self._settings.lockstep
+        self._node.subscribe(topics.ODOM, self._on_odom, foreign_writers=not lockstep)
+        self._node.subscribe(topics.SECTORS, self._on_sectors)
+        if self._tracks_scan:
+            self._node.subscribe(topics.SCAN, self._on_scan)
+
+    def stale(self, timeout_s: float) -> Inputs | None:
+        """In real time the newest inputs if one is older than timeout_s."""
+        return self._pairs.stale(time.monotonic(), timeout_s)
+
+    def add_scan(self, observation: Observation) -> Observation:
+        """Return the observation with the scan that its sectors were computed from."""
+        if self._scan is None or observation.refused:
+            return observation
+        yaw = observation.pose.yaw + self._settings.scan_yaw
+        return replace(observation, scan=aligned(self._scan, yaw))
+
+    def _on_odom(self, message: Any) -> None:
+        self._receive("odom", message, robot_pose, self._pairs.add_odom)
+
+    def _on_sectors(self, message: Any) -> None:
+        if self._tracks_scan:
+            self._pair_scan(message, self._scan_pairs.add_a)
+        else:
+            self._receive_sectors(message)
+
+    def _on_scan(self, message: Any) -> None:
+        self._pair_scan(message, self._scan_pairs.add_b)
+
+    def _pair_scan(self, message: Any, add: Any) -> None:
+        try:
+            pair = add(stamp_ns(message.header.stamp), message)
+        except InputError as error:
+            self._refused_inputs.add(error, "scan")
+            return
+        if pair is not None:
+            sectors, scan = pair
+            self._scan = laser_scan(scan)
+            self._receive_sectors(sectors)
+
+    def _receive_sectors(self, message: Any) -> None:
+        self.range_max_m = message.range_max
+        self._receive("sectors", message, sector_ranges, self._pairs.add_sectors)
+
+    def _receive(self, name: str, message: Any, convert: Any, add: Any) -> None:
+        """Convert one message and pair it; a complete pair goes to on_inputs."""
+        stamp, now_s = stamp_ns(message.header.stamp), time.monotonic()
+        value, fault = self._convert(name, message, convert)
+        try:
+            inputs = add(stamp, value, now_s)
+        except InputError as error:
+            self._refused_inputs.add(error, name)
+            return
+        self._diagnostics.input_received(name, stamp, now_s, fault)
+        if inputs is not None:
+            self._on_inputs(inputs)
+
+    def _convert(self, name: str, message: Any, convert: Any) -> tuple[Any, str]:
+        """The value and "", or the error text twice: as the value and as the fault."""
+        try:
+            return convert(message, self._settings.odom_frame), ""
+        except InputError as error:
+            self._refused_inputs.add(error, name)
+            return str(error), str(error)

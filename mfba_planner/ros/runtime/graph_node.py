@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""GraphNode, the base class of all nodes: publishers and subscriptions by topic, and ~/ready."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.executors import Executor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
+from std_srvs.srv import Trigger
+
+from ..interface import parameters
+from ..interface.topics import Topic, expected_readers, reading_qos
+from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
+
+SPIN_S = 0.1  # longest time until a signal is noticed
+
+
+class GraphNode(Node):
+    """A node of the graph: publishers made from topics.py, and the service ~/ready."""
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        """Pass rclpy's keyword arguments on (context, parameter_overrides, ...)."""
+        super().__init__(name, **kwargs)
+        self.finished = False
+        self._advertised: list[tuple[Topic, Publisher]] = []
+        self._subscribed: list[Subscription] = []
+        self._peers: set[str] = set()
+        self._jump_handles: list[JumpHandle] = []
+
+    def advertise(self, topic: Topic, message_type: Any = None) -> Publisher:
+        """Create the publisher of a topic of topics.py.
+
+        Without rclpy's QoS events: the executor would wait for each of them at every spin, and
+        a subscription with the wrong QoS is warned on its own side.
+        """
+        publisher = self.create_publisher(
+            message_type or topic.type,
+            topic.name,
+            topic.qos,
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )
+        self._advertised.append((topic, publisher))
+        return publisher
+
+    def subscribe(
+        self,
+        topic: Topic,
+        callback: Callable[..., None],
+        message_type: Any = None,
+        *,
+        foreign_writers: bool = True,
+    ) -> None:
+        """Subscribe to a topic of topics.py; twice where foreign writers may offer less QoS."""
+        profiles = reading_qos(topic, foreign_writers=foreign_writers)
+        self.create_subscriptions(message_type or topic.type, topic.name, callback, profiles)
+
+    def create_subscriptions(
+        self,
+        message_type: Any,
+        name: str,
+        callback: Callable[..., None],
+        profiles: list[QoSProfile],
+    ) -> None:
+        """Subscribe with each QoS profile; a message that fits more than one is delivered once.
+
+        With one profile, a callback of two arguments gets rclpy's MessageInfo as well.
+        """
+        several = len(profiles) > 1
+        # With several, a publisher that does not fit one profile fits another: no warning then.
+        events = SubscriptionEventCallbacks(use_default_callbacks=not several)
+        call: Any = _without_duplicates(callback) if several else callback
+        for qos in profiles:
+            self._subscribed.append(
+                self.create_subscription(message_type, name, call, qos, event_callbacks=events)
+            )
+
+    def subscribe_polled(
+        self,
+        polled: PolledSubscriptions,
+        message_type: Any,
+        name: str,
+        deliver: Deliver,
+        profiles: list[QoSProfile],
+    ) -> None:
+        """Subscribe with each QoS profile to serialized messages, which no executor waits for."""
+        no_events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        subscriptions = [
+            self.create_subscription(
+                message_type,
+                name,
+                lambda _: None,
+                qos,
+                callback_group=polled.group,
+                event_callbacks=no_events,
+                raw=True,
+            )
+            for qos in profiles
+        ]
+        polled.add(subscriptions, deliver)
+
+    def unsubscribe(self, keep: Collection[Topic] = ()) -> None:
+        """Destroy what advertise and subscribe created, except the publishers of these topics."""
+        while self._subscribed:
+            self.destroy_subscription(self._subscribed.pop())
+        for topic, publisher in self._advertised:
+            if topic not in keep:
+                self.destroy_publisher(publisher)
+        self._advertised = [(topic, made) for topic, made in self._advertised if topic in keep]
+
+    def create_wall_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
+        """Call back every period_s of real time, whatever the node's clock does."""
+        return self.create_timer(period_s, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def on_time_set_back(self, callback: Callable[[], None]) -> None:
+        """Call back whenever the node's clock (with use_sim_time: /clock) is set back."""
+        threshold = JumpThreshold(
+            min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
+        )
+        # rclpy itself does not keep the handle alive.
+        self._jump_handles.append(
+            self.get_clock().create_jump_callback(threshold, post_callback=lambda _: callback())
+        )
+
+    def advertise_ready(self, peers: set[str]) -> None:
+        """Advertise ~/ready: true once every peer's subscription to our topics is matched.
+
+        Called last in a constructor: parameters that were given but not declared are logged.
+        """
+        parameters.warn_of_unknown(self)
+        self._peers = peers
+        self.create_service(Trigger, "~/ready", self._on_ready)
+
+    def missing(self) -> str:
+        """What is missing before a first message would reach all peers; empty: nothing."""
+        for topic, publisher in self._advertised:
+            expected = expected_readers(topic, self._peers - {self.get_name()})
+            if not expected:
+                continue
+            known = self.get_subscriptions_info_by_topic(publisher.topic_name)
+            found = [info.node_name for info in known if info.node_name in expected]
+            absent = expected.difference(found)
+            if absent or publisher.get_subscription_count() < len(found):
+                return f"{topic.name} waits for {', '.join(sorted(absent or expected))}"
+        return ""
+
+    def _on_ready(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.message = self.missing()
+        response.success = not response.message
+        return response
+
+    def drain(self, executor: Executor) -> None:
+        """Receive what was sent already; called once after a signal, before close."""
+
+    def spin_once(self, executor: Executor) -> None:
+        """One iteration of the process's loop, SPIN_S long at most."""
+        executor.spin_once(timeout_sec=SPIN_S)
+
+    def close(self) -> None:
+        """Release what must not be lost; called once, before the node is destroyed."""
+
+    def destroy_node(self) -> None:
+        """Unregister the clock callbacks, then destroy the node."""
+        while self._jump_handles:
+            self._jump_handles.pop().unregister()
+        super().destroy_node()
+
+
+def _without_duplicates(callback: Callable[[Any], None]) -> Callable[[Any, Any], None]:
+    """Call back once per message, though two subscriptions deliver it."""
+    duplicates = DuplicateFilter()
+
+    def call(message: Any, info: Any) -> None:
+        if duplicates.is_new(info):
+            callback(message)
+
+    return call

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a node process runs: init, spin, and a clean end on SIGINT and SIGTERM."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+
+import rclpy
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from .graph_node import GraphNode
+
+
+class StopFlag:
+    """Set by SIGINT and SIGTERM. Nothing is raised, so no write is interrupted."""
+
+    def __init__(self) -> None:
+        """Install both signal handlers (main thread only)."""
+        self.is_set = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, *_: object) -> None:
+        self.is_set = True
+
+
+def make_executor(context: rclpy.Context | None = None) -> Executor:
+    """The executor all nodes use; MultiThreadedExecutor is far slower and drops messages."""
+    return SingleThreadedExecutor(context=context)
+
+
+def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
+    """Run one node until a signal or its own end; return 0. Its MfbaErrors pass through."""
+    stop = StopFlag()
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    node: GraphNode | None = None
+    executor = make_executor()
+    try:
+        node = make_node()
+        executor.add_node(node)
+        while not stop.is_set and not node.finished:
+            node.spin_once(executor)
+        node.drain(executor)
+        return 0
+    finally:
+        try:
+            if node is not None:
+                node.close()
+        finally:
+            # Left to the garbage collector, the executor may print that its handle is invalid.
+            executor.shutdown()
+            if node is not None:
+                node.destroy_node()
+            rclpy.try_shutdown()
