@@ -13,7 +13,7 @@ from launched_programs import Program, complete
 from waiting import wait_until
 
 from mfba_planner import cli
-from mfba_planner.cli.sweep import command
+from mfba_planner.cli.sweep import command_line
 from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
 from mfba_planner.evaluation.sweep import chunks as parts
@@ -171,27 +171,27 @@ def test_the_command_of_a_report_makes_the_same_order() -> None:
         suite="dense", planners=("paper", "ba"), worlds=3, first=4, seeds=2, oracle=False,
         setting=setting,
     )  # fmt: skip
-    words = command(order).split()
+    words = command_line(order).split()
     assert words[:2] == ["mfba", "sweep"]
-    from mfba_planner.cli.sweep import _order, _parser
+    from mfba_planner.cli.sweep import _parser, _sweep_spec
 
-    assert _order(_parser().parse(words[2:])) == order
+    assert _sweep_spec(_parser().parse(words[2:])) == order
 
 
 def test_predictive_has_its_own_step_and_swarm_unless_others_are_given() -> None:
-    from mfba_planner.cli.sweep import _order, _parser
+    from mfba_planner.cli.sweep import _parser, _sweep_spec
 
     told = ["random-3", "--planner", "paper", "--planner", "predictive", "--worlds", "1"]
-    order = _order(_parser().parse(told))
+    order = _sweep_spec(_parser().parse(told))
     usual = PlannerParams(speed_mps=SPEED_MPS)
     assert order.setting_of("paper").params == usual
     assert order.setting_of("predictive").params == preset(usual)
-    assert command(order) == "mfba sweep " + " ".join(told)
+    assert command_line(order) == "mfba sweep " + " ".join(told)
     told += ["--set", "planner.step_length_m=0.3"]
-    order = _order(_parser().parse(told))
+    order = _sweep_spec(_parser().parse(told))
     assert order.setting_of("paper").params == usual
     assert order.setting_of("predictive").params == replace(preset(usual), step_length_m=0.3)
-    assert command(order) == "mfba sweep " + " ".join(told)
+    assert command_line(order) == "mfba sweep " + " ".join(told)
 
 
 def interrupted(out: Path, tmp_path: Path, send: signal.Signals, *, group: bool) -> Program:

@@ -16,7 +16,12 @@ from ros_graph import Graph
 
 from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.core.options import flatten
-from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, REPLAY_ARGUMENTS, replayed, robot
+from mfba_planner.launcher.robot_launch import (
+    PLANNER_ARGUMENTS,
+    REPLAY_ARGUMENTS,
+    replay_nodes,
+    robot,
+)
 from mfba_planner.launcher.simulate_launch import ARGUMENTS, launch_parameters
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
@@ -208,16 +213,16 @@ def test_remaps_and_files_reach_the_nodes_of_a_robot(tmp_path: Path) -> None:
 
 def test_a_replay_is_told_what_its_command_line_understands() -> None:
     given = by_default(REPLAY_ARGUMENTS) | {"bag": "runs/mine", "rate": "2.5", "loop": "true"}
-    (replay,) = replayed(given)
+    (replay,) = replay_nodes(given)
     settings = parse(list(replay.arguments))
     assert (settings.bag, settings.rate, settings.loop) == ("runs/mine", 2.5, True)
     assert settings.inputs_of == ()
-    planner, replay = replayed(given | {"planner": "true"})
+    planner, replay = replay_nodes(given | {"planner": "true"})
     assert planner.parameters == {"lockstep": True}
     settings = parse(list(replay.arguments))
     assert (settings.inputs_of, settings.wait_for_subscribers) == (("planner",), ())
     with pytest.raises(InputError, match=r"^bag:= is empty; give a bag"):
-        replayed(by_default(REPLAY_ARGUMENTS))
+        replay_nodes(by_default(REPLAY_ARGUMENTS))
 
 
 @pytest.mark.parametrize("namespace", ["", "robot1"])

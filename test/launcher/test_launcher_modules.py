@@ -271,11 +271,11 @@ class Lines:
 def test_child_says_everything_and_how_it_ended() -> None:
     lines = Lines()
     child = NodeProcess("talker", [], lines)
-    assert child.ended_within(10.0)
+    assert child.wait_for_exit(10.0)
     assert lines.all == [("talker", "one"), ("talker", "two")]
-    assert child.how_it_ended() == "exit code 3"
+    assert child.describe_exit() == "exit code 3"
     garbled = NodeProcess("garbled", [], lines)
-    assert garbled.ended_within(10.0)
+    assert garbled.wait_for_exit(10.0)
     assert lines.all[-1] == ("garbled", "\ufffd\ufffd ok")
 
 
@@ -289,7 +289,7 @@ def test_crew_ends_even_those_who_do_not_listen(monkeypatch: pytest.MonkeyPatch)
     wait_until(lambda: len(lines.all) == 2, timeout_s=10.0)
     with pytest.raises(RuntimeError, match="inside"), node_processes:
         raise RuntimeError("inside")
-    assert [child.how_it_ended() for child in children] == [
+    assert [child.describe_exit() for child in children] == [
         "killed by SIGKILL",
         "killed by SIGTERM",
     ]
@@ -304,7 +304,7 @@ def test_crew_does_not_wait_for_the_deaf_when_in_a_hurry() -> None:
     children = [*node_processes.children]
     hurry.set()
     node_processes.stop()
-    assert children[0].how_it_ended() == "killed by SIGKILL"
+    assert children[0].describe_exit() == "killed by SIGKILL"
 
 
 @pytest.mark.usefixtures("programs")
@@ -318,7 +318,7 @@ def test_crew_tells_of_a_death_and_of_a_bad_end() -> None:
 def _one_process(name: str, check: bool) -> None:
     with NodeProcesses(Lines(), lambda: False) as node_processes:
         node_processes.start({name: {}}, {})
-        wait_until(lambda: not node_processes.has(name), timeout_s=10.0)
+        wait_until(lambda: not node_processes.is_running(name), timeout_s=10.0)
         if check:
             node_processes.check()
 
