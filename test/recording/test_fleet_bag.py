@@ -272,7 +272,7 @@ def test_a_robot_that_is_not_there_costs_one_line(
 
 
 def test_other_recordings_have_no_robots_to_name(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"--robot: .* is not a recording of ours"):
+    with pytest.raises(ConfigError, match=r"--robot: .* was not recorded by mfba"):
         cli.main(["verify", str(FOREIGN), "--robot", "a"])
 
 
