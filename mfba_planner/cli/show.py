@@ -70,9 +70,8 @@ def _failure_text(row: Row) -> str:
 def _show_run(swept: ReadSweep | None, argument: str, out: Path | None, *, bag: bool) -> int:
     run, row = _find_run(swept, argument)
     setting = swept.order.setting_of(run.planner) if swept else _default_setting(run)
-    SweepSpec(
-        suite=run.suite, planners=(run.planner,), worlds=1, setting=setting
-    )  # raises for a bad run
+    # Raises ConfigError for a bad run.
+    SweepSpec(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)
     directory = refuse_existing(out or new_run_directory(stem="show"))
     with _time_limit(setting.patience_s):
         played = run_one(run, setting)

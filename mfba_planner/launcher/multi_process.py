@@ -54,7 +54,7 @@ def run_multi_process(run: Run) -> None:
 
 
 class _MultiProcessDriver:
-    """Waits until all nodes are ready, resumes the world and waits for the end of the run."""
+    """Waits until all nodes are ready, resumes the world, waits for the end of the run."""
 
     def __init__(
         self, run: Run, monitor: Monitor, node_processes: NodeProcesses, nodes: Sequence[str]

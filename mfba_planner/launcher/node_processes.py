@@ -18,7 +18,7 @@ from .node_process import NodeProcess
 
 RECORDER_GRACE_S = 20.0  # it first writes what it has received
 GRACE_S = 10.0  # enough on an overloaded machine; a killed node counts as a failure
-MORE_EACH_S = 1.0  # all end at once, and DDS informs each of each
+MORE_EACH_S = 1.0  # all end at once, and DDS notifies each node of the others' end
 
 
 class NodeProcesses:
