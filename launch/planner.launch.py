@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from launch.launch_description import LaunchDescription
 
-from mfba_planner.launcher.launch_actions import describe
-from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, robot
+from mfba_planner.launcher.launch_actions import make_description
+from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, robot_nodes
 
 
 def generate_launch_description() -> LaunchDescription:
-    """What `ros2 launch` asks for."""
-    return describe(PLANNER_ARGUMENTS, robot)
+    """Called by `ros2 launch`."""
+    return make_description(PLANNER_ARGUMENTS, robot_nodes)

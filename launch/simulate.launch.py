@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`ros2 launch mfba_planner simulate.launch.py`: the graph, for watching with ROS tools.
+"""`ros2 launch mfba_planner simulate.launch.py`: simulated world and nodes, for ROS tools.
 
-It runs until Ctrl-C. `mfba run` is the one to use for results: it ends at the goal, and judges.
+It runs until Ctrl-C. For results use `mfba run`: it ends at the goal and evaluates the run.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from collections.abc import Mapping
 
 from launch.launch_description import LaunchDescription
 
-from mfba_planner.launcher.launch_actions import describe
-from mfba_planner.launcher.robot_launch import Start
+from mfba_planner.launcher.launch_actions import make_description
+from mfba_planner.launcher.robot_launch import NodeStart
 from mfba_planner.launcher.simulate_launch import ARGUMENTS, launch_parameters
 
 
 def generate_launch_description() -> LaunchDescription:
-    """What `ros2 launch` asks for."""
-    return describe(ARGUMENTS, _starts)
+    """Called by `ros2 launch`."""
+    return make_description(ARGUMENTS, _node_starts)
 
 
-def _starts(given: Mapping[str, str]) -> list[Start]:
+def _node_starts(given: Mapping[str, str]) -> list[NodeStart]:
     files = (given["params_file"],) if given["params_file"] else ()
     return [
-        Start(name=name, parameters=parameters, files=files)
+        NodeStart(name=name, parameters=parameters, files=files)
         for name, parameters in launch_parameters(given).items()
     ]

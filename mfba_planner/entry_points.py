@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The doors: one function per program, and the one place where errors become exit codes."""
+"""Entry points: one function per program, and how errors become exit codes."""
 
 import errno
 import gc
@@ -12,7 +12,7 @@ from types import FrameType
 
 from mfba_planner.core.errors import MfbaError
 
-_HERE = "mfba_planner"
+_PACKAGE = "mfba_planner"
 _ROS_ARGS = "after --ros-args give -p NAME:=VALUE, -r FROM:=TO or --params-file FILE"
 
 _SIGINT_CODE = 128 + signal.SIGINT
@@ -49,12 +49,12 @@ def recorder() -> int:
 
 
 def replay() -> int:
-    """Run the node that plays a bag."""
+    """Run the node that replays a bag."""
     return _node("replay")
 
 
 def launcher() -> int:
-    """Run every node as a process of its own, for one episode."""
+    """Run one episode with every node as a process of its own."""
     return _command("launcher", "mfba_planner.launcher")
 
 
@@ -66,26 +66,26 @@ def mfba() -> int:
 def run_and_return_exit_code(
     run: Callable[[], int], program: str, interrupted: int = _SIGINT_CODE
 ) -> int:
-    """Return run's exit code; an error the user can mend becomes one line on stderr and 1.
+    """Return run's exit code; an error the user can fix becomes one line on stderr and 1.
 
-    Ctrl-C gives `interrupted`, a reader that went away gives 141; a bug keeps its traceback.
+    Ctrl-C gives `interrupted`, a closed pipe on stdout gives 141; a bug keeps its traceback.
     """
     try:
         code = run()
     except (KeyboardInterrupt, Exception) as error:
-        code = _judge(error, program, interrupted)
+        code = _exit_code_of(error, program, interrupted)
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as error:
-        # Python flushes once more at exit: let that go nowhere instead of failing again.
+        # Python flushes again at exit: send that to /dev/null, or it fails again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = code or _judge(error, program, interrupted)
+        code = code or _exit_code_of(error, program, interrupted)
     return code
 
 
-def _judge(error: BaseException, program: str, interrupted: int) -> int:
-    """Return the exit code for an error, said in one line; raise it again when it is a bug."""
+def _exit_code_of(error: BaseException, program: str, interrupted: int) -> int:
+    """Print an error in one line and return its exit code; raise it again when it is a bug."""
     if isinstance(error, KeyboardInterrupt):
         return interrupted
     if isinstance(error, BrokenPipeError):
@@ -98,7 +98,7 @@ def _judge(error: BaseException, program: str, interrupted: int) -> int:
 
 
 def _node(name: str) -> int:
-    """Run a node, which ends with 0 on SIGINT and SIGTERM; its runtime takes both over."""
+    """Run a node, which ends with 0 on SIGINT and SIGTERM; its runtime handles both."""
     _start(on_sigint=0, on_sigterm=0)
     code = run_and_return_exit_code(
         lambda: int(import_module(f"mfba_planner.ros.nodes.{name}").main(sys.argv[1:])),
@@ -106,13 +106,13 @@ def _node(name: str) -> int:
         interrupted=0,
     )
     for signum in (signal.SIGINT, signal.SIGTERM):
-        # A late one must not spoil the exit code while the interpreter winds down.
+        # A late signal must not change the exit code while the interpreter ends.
         signal.signal(signum, signal.SIG_IGN)
     return code
 
 
 def _command(name: str, module: str) -> int:
-    """Run a command; once it is loaded both signals unwind it, so that `finally` is reached."""
+    """Run a command; once it is loaded, both signals raise, so that `finally` is reached."""
     _start(on_sigint=_SIGINT_CODE, on_sigterm=_SIGTERM_CODE)
 
     def run() -> int:
@@ -122,7 +122,7 @@ def _command(name: str, module: str) -> int:
         return int(main(sys.argv[1:]))
 
     code = run_and_return_exit_code(run, name)
-    # The process ends: a last search for garbage would cost each command 0.02 s for nothing.
+    # The process ends: this saves the last garbage collection, 0.02 s per command.
     gc.freeze()
     return code
 
@@ -132,27 +132,27 @@ def _unwind(_signum: int, _frame: FrameType | None) -> None:
 
 
 def _start(on_sigint: int, on_sigterm: int) -> None:
-    """Set the scene before the heavy imports, and leave at once if told to during them."""
-    # Our matrices are small: numpy's pool of threads would cost each start 0.06 s for nothing.
+    """Set environment and signal handlers before the heavy imports; a signal exits at once."""
+    # Our matrices are small: starting numpy's thread pool would cost 0.06 s per start.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Logs are what a node prints; stderr is for what went wrong.
+    # Node logs go to stdout; stderr is for errors.
     os.environ.setdefault("RCUTILS_LOGGING_USE_STDOUT", "1")
     if "HOME" not in os.environ:
         # rclpy writes its logs below the home directory and fails without one.
         os.environ.setdefault("ROS_LOG_DIR", f"/tmp/ros_log_{os.getuid()}")
-    # Nothing is open yet, and an exception could end up inside an import's except clause.
+    # No file is open yet, and an exception could be caught by an import's except clause.
     signal.signal(signal.SIGINT, lambda *_: os._exit(on_sigint))
     signal.signal(signal.SIGTERM, lambda *_: os._exit(on_sigterm))
 
 
 def _one_line(error: BaseException) -> str | None:
-    """Value, reason and remedy of an error that the user can mend; None for a bug."""
+    """Value, reason and remedy of an error that the user can fix; None for a bug."""
     if isinstance(error, MfbaError):
         return str(error)
     if isinstance(error, OSError) and error.errno in _REMEDIES:
         name = error.filename or "output"
         return f"{name}: {error.strerror}; {_REMEDIES[error.errno]}"
-    if isinstance(error, ImportError) and not (error.name or _HERE).startswith(_HERE):
+    if isinstance(error, ImportError) and not (error.name or _PACKAGE).startswith(_PACKAGE):
         return f"{error}; pip install what setup.py and requirements-ros.txt name"
     if type(error).__module__.startswith("rclpy."):
         return _explain_rclpy(type(error).__name__, str(error))
@@ -160,7 +160,7 @@ def _one_line(error: BaseException) -> str | None:
 
 
 def _explain_rclpy(kind: str, text: str) -> str | None:
-    """What rclpy.init refuses: its arguments and its environment."""
+    """One line for what rclpy.init refuses (arguments, environment); None for a bug."""
     if kind == "UnknownROSArgsError":
         return f"{text}: unknown ROS arguments; {_ROS_ARGS}"
     if not text.startswith("failed to initialize"):

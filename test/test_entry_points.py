@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The doors: what a user sees of errors, signals and closed pipes, and what imports cost."""
+"""Entry points: errors, signals and closed pipes as a user gets them, and import cost."""
 
 import errno
 import os
@@ -39,7 +39,7 @@ def raiser(error: BaseException) -> Callable[[], int]:
 
 
 def rclpy_init(*args: str) -> Callable[[], int]:
-    """What a node does first, with a user's arguments."""
+    """The first call of a node, with a user's arguments."""
 
     def run() -> int:
         from rclpy.context import Context
@@ -50,7 +50,7 @@ def rclpy_init(*args: str) -> Callable[[], int]:
     return run
 
 
-def test_a_program_that_ends_well_keeps_its_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_program_without_error_keeps_its_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_and_return_exit_code(lambda: 0, "mfba") == 0
     assert run_and_return_exit_code(lambda: 3, "mfba") == 3
     assert capsys.readouterr() == ("", "")
@@ -81,13 +81,13 @@ def test_a_program_that_ends_well_keeps_its_exit_code(capsys: pytest.CaptureFixt
         ),
     ],
 )
-def test_what_a_user_can_mend_becomes_one_line(
+def test_an_error_the_user_can_fix_becomes_one_line(
     run: Callable[[], int], line: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert run_and_return_exit_code(run, "mfba") == 1
-    said = [text for text in capfd.readouterr().err.splitlines() if "[rcl]" not in text]
-    assert len(said) == 1
-    assert said[0].startswith(f"mfba: {line}")
+    lines = [text for text in capfd.readouterr().err.splitlines() if "[rcl]" not in text]
+    assert len(lines) == 1
+    assert lines[0].startswith(f"mfba: {line}")
 
 
 @pytest.mark.parametrize(
@@ -113,17 +113,23 @@ def test_ctrl_c_is_quiet(
     assert capsys.readouterr() == ("", "")
 
 
-def test_loading_the_doors_loads_nothing_heavy() -> None:
+def test_importing_entry_points_imports_nothing_heavy() -> None:
     heavy = "{'numpy', 'rclpy', 'matplotlib', 'yaml', 'pydantic', 'rich', 'argparse'}"
     code, out, err = outcome(start(f"print(sorted({heavy} & set(sys.modules)))"))
     assert (code, out, err) == (0, "[]\n", "")
 
 
+def print_and_exit(size: int) -> str:
+    """A program that prints so many characters and exits."""
+    run = f"lambda: int(bool(print('x' * {size})))"
+    return f"sys.exit(entry_points.run_and_return_exit_code({run}, 'mfba'))"
+
+
 @pytest.mark.parametrize("size", [1, 100_000])
-def test_a_reader_that_left_is_no_error(size: int) -> None:
+def test_a_closed_pipe_on_stdout_is_no_error(size: int) -> None:
     reader, writer = os.pipe()
     os.close(reader)
-    code = f"sys.exit(entry_points.guarded_main(lambda: int(bool(print('x' * {size}))), 'mfba'))"
+    code = print_and_exit(size)
     try:
         assert outcome(start(code, stdout=writer)) == (141, None, "")
     finally:
@@ -131,8 +137,8 @@ def test_a_reader_that_left_is_no_error(size: int) -> None:
 
 
 @pytest.mark.parametrize("size", [1, 100_000])
-def test_a_full_disk_behind_stdout_is_one_line(size: int) -> None:
-    code = f"sys.exit(entry_points.guarded_main(lambda: int(bool(print('x' * {size}))), 'mfba'))"
+def test_a_full_disk_on_stdout_is_one_line(size: int) -> None:
+    code = print_and_exit(size)
     with open("/dev/full", "w", encoding="utf-8") as full:
         status, _, err = outcome(start(code, stdout=full))
     assert (status, err) == (
@@ -146,12 +152,12 @@ def slow(name):
     print("importing", flush=True)
     sys.stdin.read()
 entry_points.import_module = slow
-sys.exit(entry_points.{door}())
+sys.exit(entry_points.{program}())
 """
 
 
 @pytest.mark.parametrize(
-    ("door", "signum", "code"),
+    ("program", "signum", "code"),
     [
         ("planner", signal.SIGINT, 0),
         ("planner", signal.SIGTERM, 0),
@@ -159,8 +165,8 @@ sys.exit(entry_points.{door}())
         ("mfba", signal.SIGTERM, 143),
     ],
 )
-def test_a_signal_during_the_imports_is_quiet(door: str, signum: int, code: int) -> None:
-    process = start(SLOW_IMPORT.format(door=door), stdin=subprocess.PIPE)
+def test_a_signal_during_the_imports_is_quiet(program: str, signum: int, code: int) -> None:
+    process = start(SLOW_IMPORT.format(program=program), stdin=subprocess.PIPE)
     assert process.stdout is not None
     assert process.stdout.readline() == "importing\n"
     process.send_signal(signum)
@@ -204,9 +210,9 @@ def test_a_signal_unwinds_a_running_command(signum: int, code: int) -> None:
         ("sys.modules['rclpy'] = None", "planner: rclpy: import of rclpy halted"),
     ],
 )
-def test_a_node_without_ros_says_so_in_one_line(before: str, line: str) -> None:
+def test_a_node_without_ros_fails_in_one_line(before: str, line: str) -> None:
     code, out, err = outcome(start(f"{before}; sys.exit(entry_points.planner())"))
     assert (code, out) == (1, "")
     assert err.startswith(line)
     assert len(err.splitlines()) == 1
-    assert "; " in err  # a remedy follows
+    assert "; " in err  # followed by a remedy

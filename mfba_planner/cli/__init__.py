@@ -9,32 +9,32 @@ from .. import __version__
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
 
-# Each is a module here with main(args) -> exit code.
+# Each is a module of this package with main(args) -> exit code.
 COMMANDS = {
-    "run": "run an episode in ROS 2, record it and judge it",
-    "sim": "the same decisions without ROS: one seed or many",
+    "run": "run an episode in ROS 2, record it and evaluate it",
+    "sim": "simulate without ROS, with the same decisions: one seed or many",
     "replay": "publish a bag's messages again (ROS 2)",
-    "info": "what a bag holds, and how its run went",
-    "digest": "the decision digest of a bag or a result",
-    "verify": "decide again on what a bag recorded, and compare bit for bit",
-    "diff": "where the decisions of two bags first differ",
-    "export": "a bag's ticks and decisions as one tidy table, CSV or Parquet",
-    "recover": "make an ordinary bag of one that was killed or truncated",
-    "picture": "draw the run that a bag holds",
-    "view": "runs in Rerun's viewer",
-    "report": "runs as one page for a browser, to play and scrub",
-    "figures": "the paper's figures again, as SVG and PNG",
-    "sensitivity": "what hangs on what the paper does not say",
-    "scenarios": "list the worlds that are shipped",
-    "options": "list what --set can change",
-    "sweep": "planners in worlds without number: success, gap to the optimum, side by side",
-    "show": "explain a run of a sweep: picture, words, bag",
-    "tables": "the paper's tables again, ours beside the printed, with verdicts",
+    "info": "contents of a bag, and the result of its run",
+    "digest": "decision digest of a bag or a result",
+    "verify": "recompute the decisions of a bag, and compare bit for bit",
+    "diff": "first difference between the decisions of two bags",
+    "export": "write a bag's ticks and decisions as one table, CSV or Parquet",
+    "recover": "copy the intact messages of a broken bag into a new one",
+    "picture": "draw the run of a bag as PNG",
+    "view": "show runs in Rerun's viewer",
+    "report": "write runs as one HTML page, with playback",
+    "figures": "reproduce the paper's figures, as SVG and PNG",
+    "sensitivity": "vary what the paper leaves open, and compare the results",
+    "scenarios": "list the shipped scenarios",
+    "options": "list the options of --set",
+    "sweep": "run planners in many generated worlds: success, gap to the optimum",
+    "show": "explain one run of a sweep: pictures, text, bag",
+    "tables": "reproduce the paper's tables: our value, printed value, verdict",
 }
 
 
 def main(args: list[str]) -> int:
-    """Do what args say; return the exit code. MfbaErrors pass through."""
+    """Run the command in args; return the exit code. MfbaErrors pass through."""
     first = args[0] if args else "--help"
     if first in ("-h", "--help"):
         print(_usage())
@@ -59,6 +59,6 @@ def _usage() -> str:
             "",
             *lines,
             "",
-            "`mfba COMMAND --help` tells more; `mfba --version` the version.",
+            "`mfba COMMAND --help`: arguments of a command; `mfba --version`: the version.",
         ]
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba diff`: where the decisions of two bags first differ; needs no ROS."""
+"""`mfba diff`: first difference between the decisions of two bags; needs no ROS."""
 
 from __future__ import annotations
 
@@ -20,49 +20,54 @@ from ..verification.compare_decisions import first_divergence, side_by_side
 
 
 def main(args: list[str]) -> int:
-    """Compare two bags; 0 when all decisions are equal, 1 when not, as diff does.
+    """Compare two bags; return 0 when all decisions are equal, else 1, like diff.
 
-    Decisions that one bag has and cannot show, and the other has not, are not equal.
+    Decisions left out of one bag only count as a difference.
     """
-    parser = Parser(prog="mfba diff", description="Say where the decisions of two bags differ.")
+    parser = Parser(prog="mfba diff", description="Print where the decisions of two bags differ.")
     for name in ("left", "right"):
         parser.add_bag(name)
     parser.add_robots()
-    given = parser.parse(args)
-    bags = [bag_in(path) for path in (given.left, given.right)]
-    one, other = (read_recording(bag, given.robots) for bag in bags)
-    if one.episodes.keys() != other.episodes.keys():
+    parsed = parser.parse(args)
+    bags = [bag_in(path) for path in (parsed.left, parsed.right)]
+    left_recording, right_recording = (read_recording(bag, parsed.robots) for bag in bags)
+    if left_recording.episodes.keys() != right_recording.episodes.keys():
         raise BagError(
-            f"{given.right}: holds other robots than {given.left}; name one that both have with "
+            f"{parsed.right}: holds other robots than {parsed.left}; name one that both have with "
             "--robot"
         )
-    tell(bags[0], one.missed)
-    tell(bags[1], other.missed)
-    differ = [_compare(given, robot, one, other) for robot in one.episodes]
+    tell(bags[0], left_recording.missed)
+    tell(bags[1], right_recording.missed)
+    differ = [
+        _compare(parsed, robot, left_recording, right_recording)
+        for robot in left_recording.episodes
+    ]
     return int(any(differ))
 
 
-def _compare(given: argparse.Namespace, robot: str, one: Recording, other: Recording) -> bool:
-    """Print how two runs of a robot differ; whether they do."""
-    left, right = one.episodes[robot], other.episodes[robot]
-    found = first_divergence(left.ticks, right.ticks)
-    if found is None:
-        alike = one.missed.get(robot) == other.missed.get(robot)
-        said = f"{len(left.ticks)} decisions, digest {digest(left.ticks)}"
-        how = "identical" if alike else "identical but for what is left out"
-        print(of_robot(robot, f"{how}, {said}"))
-        return not alike
+def _compare(
+    parsed: argparse.Namespace, robot: str, left_recording: Recording, right_recording: Recording
+) -> bool:
+    """Print how two runs of a robot differ; return whether they do."""
+    left, right = left_recording.episodes[robot], right_recording.episodes[robot]
+    divergence = first_divergence(left.ticks, right.ticks)
+    if divergence is None:
+        same_omissions = left_recording.missed.get(robot) == right_recording.missed.get(robot)
+        text = f"{len(left.ticks)} decisions, digest {digest(left.ticks)}"
+        verdict = "identical" if same_omissions else "identical but for what is left out"
+        print(of_robot(robot, f"{verdict}, {text}"))
+        return not same_omissions
     for name, a, b in _settings(left, right):
         print(of_robot(robot, f"{name}: {a} against {b}"))
-    names = (str(given.left), str(given.right))
+    names = (str(parsed.left), str(parsed.right))
     print(comparison_text((names[0], evaluate(left)), (names[1], evaluate(right))))
-    print(of_robot(robot, f"first difference at tick {found.tick}:"))
-    print("\n".join(side_by_side(found, *names)))
+    print(of_robot(robot, f"first difference at tick {divergence.tick}:"))
+    print("\n".join(side_by_side(divergence, *names)))
     return True
 
 
 def _settings(left: Episode, right: Episode) -> list[tuple[str, object, object]]:
-    """What was set differently."""
+    """(name, left, right) of each parameter, seed or scenario that differs."""
     rows: list[tuple[str, object, object]] = []
     for group in ("planner", "sensor"):
         a, b = (flatten(getattr(episode, group)) for episode in (left, right))

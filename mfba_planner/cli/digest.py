@@ -15,20 +15,20 @@ from ..report.result_json import read_result
 
 
 def main(args: list[str]) -> int:
-    """Print one line per file: digest and name, as sha256sum does."""
+    """Print one line per file: digest and name, like sha256sum."""
     parser = Parser(
         prog="mfba digest",
         description="Print the decision digest of bags or results: equal digests mean equal "
-        "decisions, bit for bit. Of a fleet's bag there is one for each robot. "
-        "docs/determinism.md describes it.",
+        "decisions, bit for bit. A fleet's bag has one for each robot. "
+        "See docs/determinism.md.",
     )
     parser.add_argument(
         "paths", type=Path, nargs="+", metavar="BAG|RESULT", help="bag, run directory or result"
     )
     parser.add_robots()
-    found = parser.parse(args)
-    for path in found.paths:
-        for robot, digest in _digests(path, found.robots).items():
+    parsed = parser.parse(args)
+    for path in parsed.paths:
+        for robot, digest in _digests(path, parsed.robots).items():
             print(f"{digest}  {path} {robot}".rstrip())
     return 0
 
@@ -39,6 +39,6 @@ def _digests(path: Path, robots: list[str]) -> dict[str, str]:
         return {NO_NAMESPACE: str(read_result(path)["digest"])}
     bag = bag_in(path)
     runs = summaries(bag, robots)
-    # Not among the lines that others read.
+    # To stderr, so that stdout has digest lines only.
     tell(bag, {name: run.missed for name, run in runs.items()}, sys.stderr)
     return {name: run.digest for name, run in runs.items()}

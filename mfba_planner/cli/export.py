@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba export`: a bag's ticks and decisions as CSV or Parquet; needs no ROS."""
+"""`mfba export`: write a bag's ticks and decisions as CSV or Parquet; needs no ROS."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..recording.omitted_decisions import tell
 from ..recording.robot_topics import chosen
 from ..recording.tick_table import COLUMNS, Row, read_rows
 
-BATCH = 5000  # rows that are held at a time
+BATCH = 5000  # rows in memory at a time
 
 
 def main(args: list[str]) -> int:
@@ -28,28 +28,28 @@ def main(args: list[str]) -> int:
     parser = Parser(
         prog="mfba export",
         description="Write a bag's ticks and decisions as one table, a row per decision; "
-        "of a fleet's bag with the robot's name.",
+        "for a fleet's bag with the robot's name.",
         epilog="columns:\n" + "\n".join([*lines, "  range_1 ...  range of each sector, m"]),
     )
     parser.add_bag()
     parser.add_argument("table", type=Path, metavar="FILE", help="a .csv or .parquet to create")
     parser.add_robots()
-    found = parser.parse(args)
+    parsed = parser.parse(args)
     writers = {".csv": _write_csv, ".parquet": _write_parquet}
-    write = writers.get(found.table.suffix)
+    write = writers.get(parsed.table.suffix)
     if write is None:
-        raise ConfigError(f"{found.table}: unknown kind of table; give a name in .csv or .parquet")
+        raise ConfigError(f"{parsed.table}: unknown table format; give a name in .csv or .parquet")
     missed: dict[str, str] = {}
-    with BagReader(bag_in(found.bag)) as reader:
-        robots = chosen(reader.path, robots_with_decisions(reader), found.robots)
+    with BagReader(bag_in(parsed.bag)) as reader:
+        robots = chosen(reader.path, robots_with_decisions(reader), parsed.robots)
         rows = read_rows(reader, robots, missed)
         first = next(rows, None)
         if first is None:
-            raise BagError(f"{found.bag}: holds no decision to export; give another bag")
-        with new_file(found.table) as file:
+            raise BagError(f"{parsed.bag}: holds no decision to export; give another bag")
+        with new_file(parsed.table) as file:
             count = write(file, list(first), chain([first], rows))
     tell(reader.path, missed)
-    print(f"wrote {found.table}: {count} rows")
+    print(f"wrote {parsed.table}: {count} rows")
     return 0
 
 

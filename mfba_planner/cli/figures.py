@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba figures`: the paper's figures again, as SVG and PNG; needs no ROS."""
+"""`mfba figures`: reproduce the paper's figures, as SVG and PNG; needs no ROS."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..core.options import did_you_mean
 from ..core.outputs import new_run_directory, refuse_existing, write_new
 from ..report.figures.paper_figures import FIGURES, FORMATS, render
 
-_DESCRIPTION = "Draw the paper's figures again; the same version draws the same bytes."
+_DESCRIPTION = "Reproduce the paper's figures; the same version writes the same bytes."
 
 
 def main(args: list[str]) -> int:
@@ -30,10 +30,10 @@ def main(args: list[str]) -> int:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="directory to create (default: runs/figures-NNN)"
     )
-    found = parser.parse(args)
-    names = _known("figure", found.only, FIGURES)
-    forms = _known("format", found.format.split(","), FORMATS)
-    out = new_run_directory(stem="figures") if found.out is None else refuse_existing(found.out)
+    parsed = parser.parse(args)
+    names = _known("figure", parsed.only, FIGURES)
+    forms = _known("format", parsed.format.split(","), FORMATS)
+    out = new_run_directory(stem="figures") if parsed.out is None else refuse_existing(parsed.out)
     files = {
         f"{name}.{form}": data for name in names for form, data in render(name, forms).items()
     }
@@ -45,7 +45,7 @@ def main(args: list[str]) -> int:
 
 
 def _known(kind: str, given: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
-    """What was given without repetition; ConfigError for a name that is not known."""
+    """The given names without repetition; ConfigError for an unknown name."""
     wanted = tuple(dict.fromkeys(given))
     for name in wanted:
         if name not in known:

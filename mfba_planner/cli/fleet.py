@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba sim` of a scenario with several robots: a row for each of them, or for each seed."""
+"""Helper of `mfba sim`, not a command: scenarios with several robots."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SEED_ROW = "{:>8}  {:>4} of {:<4}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"
 
 
 def simulate(config: RunConfig, seeds: int, out: Path | None) -> int:
-    """Print what came of every robot; 0 when all reached their goals and nobody touched."""
+    """Print a row per robot, or per seed; 0 when all reach their goals without collision."""
     if out is not None:
         raise ConfigError(
             f"--out {out}: holds one robot's run, {config.scenario.name!r} has "
@@ -31,14 +31,16 @@ def simulate(config: RunConfig, seeds: int, out: Path | None) -> int:
             raise MfbaError(why)
         return 0
     print(_SEED_HEAD)
-    whole = 0
+    full_successes = 0
     for seed in range(config.seed, config.seed + seeds):
         results = _results(config, seed)
-        whole += all(r.success for r in results)
+        full_successes += all(r.success for r in results)
         print(_seed_row(seed, results), flush=True)
-    print(f"{whole} of {seeds} seeds with all robots at the goal without collision")
-    if whole < seeds:
-        raise MfbaError(f"{seeds - whole} of {seeds} seeds failed; look at one with --seed")
+    print(f"{full_successes} of {seeds} seeds with all robots at the goal without collision")
+    if full_successes < seeds:
+        raise MfbaError(
+            f"{seeds - full_successes} of {seeds} seeds failed; look at one with --seed"
+        )
     return 0
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba info`: what a bag holds, and how its run went; needs no ROS."""
+"""`mfba info`: contents of a bag, and the result of its run; needs no ROS."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ from ..report.fleet_table import fleet_text
 
 def main(args: list[str]) -> int:
     """Describe a bag."""
-    parser = Parser(prog="mfba info", description="Say what a bag holds, and how its run went.")
+    parser = Parser(
+        prog="mfba info", description="Print the contents of a bag, and the result of its run."
+    )
     parser.add_bag()
     bag = bag_in(parser.parse(args).bag)
     info = describe(bag)
@@ -29,15 +31,15 @@ def main(args: list[str]) -> int:
             print(f"Run:         {error}")
         else:
             print()
-            _show(runs)
+            _print_runs(runs)
             tell(bag, {robot: run.missed for robot, run in runs.items()})
     return 0
 
 
-def _show(runs: dict[str, Summary]) -> None:
+def _print_runs(runs: dict[str, Summary]) -> None:
     if NO_NAMESPACE in runs:
-        alone = runs[NO_NAMESPACE]
-        show(alone.episode, alone.result)
+        run = runs[NO_NAMESPACE]
+        show(run.episode, run.result)
     else:
         print(fleet_text(list(runs), [run.result for run in runs.values()]), end="")
     for robot, run in runs.items():

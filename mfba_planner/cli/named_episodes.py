@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Named runs from bags and results, for commands that show some of them; needs no ROS.
+"""Helper of `mfba report` and `mfba view`, not a command: reads runs and names them.
 
-A bag is read. Of a result (`mfba sim --out`) the run is made again, and must take the decisions
-that the result's digest stands for.
+A bag is read. A result (`mfba sim --out`) is simulated again, and must have the digest that the
+result names. Needs no ROS.
 """
 
 from __future__ import annotations
@@ -33,42 +33,42 @@ _RESULT = "result.json"
 
 
 def add_paths(parser: Parser) -> None:
-    """The argument `paths`: one run or more; and which robots of a fleet's."""
+    """Add the arguments `paths` (one run or more) and --robot."""
     parser.add_argument(
         "paths", type=Path, nargs="+", metavar="BAG|RESULT", help="run or bag directory, or file"
     )
     parser.add_robots()
 
 
-class Named(NamedTuple):
-    """Runs by name; roster names all robots of the fleet, where the runs are of one only."""
+class NamedEpisodes(NamedTuple):
+    """(name, run) pairs; fleet_names has all robots' names if the runs are one fleet's."""
 
     runs: list[tuple[str, Episode]]
-    roster: tuple[str, ...] = ()
+    fleet_names: tuple[str, ...] = ()
 
 
-def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> Named:
-    """Read or make the runs, and say what is left out of them; raises BagError, InputError."""
-    recordings = [_runs(path, robots) for path in paths]
+def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> NamedEpisodes:
+    """Read or simulate the runs; print what is left out. Raises BagError, InputError."""
+    recordings = [_recording(path, robots) for path in paths]
     first = recordings[0]
     if len(paths) == 1 and NO_NAMESPACE not in first.episodes:
-        return Named(list(first.episodes.items()), first.scenario.robot_names)
+        return NamedEpisodes(list(first.episodes.items()), first.scenario.robot_names)
     runs = []
     for path, recording in zip(paths, recordings):
         for robot, episode in recording.episodes.items():
             runs.append((".".join(filter(None, (_name(path), robot))), episode))
-    return Named(runs)
+    return NamedEpisodes(runs)
 
 
 def _name(path: Path) -> str:
-    """What a run is called on the page: the last part of its path that tells it from others."""
+    """A run's name on the page: its directory or file, without `bag` or `result.json`."""
     path = path.absolute()
     if path.name in ("bag", _RESULT):
         return path.parent.name
     return path.name if path.is_dir() else path.stem
 
 
-def _runs(path: Path, robots: Sequence[str]) -> Recording:
+def _recording(path: Path, robots: Sequence[str]) -> Recording:
     bag = bag_in(path)
     if bag == path and not any(path.glob("*.mcap")) and (path / _RESULT).is_file():
         path = path / _RESULT
@@ -77,34 +77,36 @@ def _runs(path: Path, robots: Sequence[str]) -> Recording:
         tell(bag, recording.missed)
         return recording
     chosen(path, [NO_NAMESPACE], robots)
-    episode = _again(path)
+    episode = _simulate_result(path)
     return Recording(episode.scenario, episode.seed, {NO_NAMESPACE: episode}, {})
 
 
-def _again(path: Path) -> Episode:
-    """The run of a result, made again; InputError unless it decides as the result says."""
+def _simulate_result(path: Path) -> Episode:
+    """Simulate the run of a result; InputError unless its digest is the result's."""
     data = read_result(path)
-    told = data["parameters"]
+    parameters = data["parameters"]
     try:
         episode = simulate(
-            _world(data),
-            planner=override(PlannerParams(), told["planner"]),
-            sensor=override(SensorParams(), told["sensor"]),
+            _scenario_of(data),
+            planner=override(PlannerParams(), parameters["planner"]),
+            sensor=override(SensorParams(), parameters["sensor"]),
             seed=data["seed"],
         )
     except (ConfigError, InputError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: its run cannot be made again ({error}); give its bag") from None
-    made = digest(episode.ticks)
-    if made != data["digest"]:
         raise InputError(
-            f"{path}: made again, its run decides otherwise (digest {made[:12]}, not "
-            f"{data['digest'][:12]}); give its bag"
+            f"{path}: its run cannot be simulated again ({error}); give its bag"
+        ) from None
+    simulated_digest = digest(episode.ticks)
+    if simulated_digest != data["digest"]:
+        raise InputError(
+            f"{path}: simulated again, its run has other decisions (digest "
+            f"{simulated_digest[:12]}, not {data['digest'][:12]}); give its bag"
         )
     return episode
 
 
-def _world(data: dict[str, Any]) -> Scenario:
-    """The world of a result; the older ones only name it."""
+def _scenario_of(data: dict[str, Any]) -> Scenario:
+    """The scenario of a result; older results only have its name."""
     if "world" in data:
         return load_scenario(json.dumps(data["world"]))
     if data["scenario"] not in scenario_names():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba options`: what --set can change; needs no ROS."""
+"""`mfba options`: list the options of --set; needs no ROS."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from ..planning.planner_params import PlannerParams
 def main(args: list[str]) -> int:
     """List the options."""
     Parser(
-        prog="mfba options", description="List what `mfba run` and `mfba sim` --set can change."
+        prog="mfba options",
+        description="List the options of --set, for `mfba run` and `mfba sim`.",
     ).parse(args)
     rows = [
         (name, _value(default), _meaning(default, spec)) for name, default, spec in option_rows()
@@ -24,10 +25,10 @@ def main(args: list[str]) -> int:
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
     for name, default, meaning in rows:
         print(f"{name:<{widths[0]}}  {default:<{widths[1]}}  {meaning}")
-    usual = params_for_method(None, PlannerParams(), algorithm_1=False)
-    changes = set(flatten(usual).items()) - set(flatten(PlannerParams()).items())
-    own = ", ".join(f"planner.{name}={value}" for name, value in sorted(changes))
-    print(f"Unless --planner says otherwise: {own}")
+    default_params = params_for_method(None, PlannerParams(), algorithm_1=False)
+    changes = set(flatten(default_params).items()) - set(flatten(PlannerParams()).items())
+    defaults = ", ".join(f"planner.{name}={value}" for name, value in sorted(changes))
+    print(f"Defaults without --planner: {defaults}")
     return 0
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba picture`: the run that a bag holds, as PNG; needs no ROS."""
+"""`mfba picture`: draw the run of a bag as PNG; needs no ROS."""
 
 from __future__ import annotations
 
@@ -13,25 +13,23 @@ from ..recording.read_episode import read_recording
 
 def main(args: list[str]) -> int:
     """Draw a bag's run."""
-    parser = Parser(
-        prog="mfba picture", description="Draw the run that a bag holds, as `mfba run` does."
-    )
+    parser = Parser(prog="mfba picture", description="Draw the run of a bag, as `mfba run` does.")
     parser.add_bag()
     parser.add_argument("png", type=Path, metavar="PNG", help="file to create")
     parser.add_robots()
-    found = parser.parse(args)
-    bag = bag_in(found.bag)
-    scenario, seed, runs, missed = read_recording(bag, found.robots)
+    parsed = parser.parse(args)
+    bag = bag_in(parsed.bag)
+    scenario, seed, runs, missed = read_recording(bag, parsed.robots)
     tell(bag, missed)
-    # What draws takes its time: only where there is something to draw.
+    # The drawing modules take long to import: only after the bag has been read.
     if len(runs) == 1:
         from ..report.run_figure import draw_run
 
         (episode,) = runs.values()
-        draw_run(episode, found.png)
+        draw_run(episode, parsed.png)
     else:
         from ..report.fleet_figure import draw_fleet
 
-        draw_fleet(scenario, seed, runs, found.png)
-    print(f"wrote {found.png}")
+        draw_fleet(scenario, seed, runs, parsed.png)
+    print(f"wrote {parsed.png}")
     return 0

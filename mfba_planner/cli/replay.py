@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba replay`: the node of that name."""
+"""`mfba replay`: publish a bag's messages again; starts the node `replay`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from importlib import import_module
 
 
 def main(args: list[str]) -> int:
-    """Play a bag."""
+    """Replay a bag."""
     code: int = import_module("mfba_planner.ros.nodes.replay").main(args)
     return code

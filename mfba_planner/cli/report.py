@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba report`: runs as one page for a browser, to play and scrub; needs no ROS."""
+"""`mfba report`: write runs as one HTML page, with playback; needs no ROS."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from ..core.argument_parser import Parser
 from ..core.outputs import refuse_existing
 from .named_episodes import add_paths, named_episodes
 
-_DESCRIPTION = """Write runs as one HTML file that needs nothing else: no network, no ROS.
+_DESCRIPTION = """Write runs as one HTML file; it needs no network and no ROS.
 
-A bag is read. Of a result (`mfba sim --out`) the run is made again, and must take the decisions
-that the result's digest stands for. A fleet's bag is one scene, seen with the eyes of
-the robot that is chosen in it; with --robot NAME, and with other runs, they stand side by side."""
+A bag is read. A result (`mfba sim --out`) is simulated again, and must have the digest that the
+result names. A fleet's bag becomes one scene; the page shows the sensor of the robot selected in
+it. With --robot NAME, or with other runs, the runs are shown side by side."""
 
 
 def main(args: list[str]) -> int:
@@ -27,12 +27,12 @@ def main(args: list[str]) -> int:
         default=Path("report.html"),
         help="file to create (default: report.html)",
     )
-    found = parser.parse(args)
+    parsed = parser.parse(args)
     from ..report.html.page import check_size, write_page
 
-    check_size(len(found.paths))
-    refuse_existing(found.out)
-    named = named_episodes(found.paths, found.robots)
-    write_page(named.runs, found.out, named.roster)
-    print(f"wrote {found.out}")
+    check_size(len(parsed.paths))
+    refuse_existing(parsed.out)
+    named = named_episodes(parsed.paths, parsed.robots)
+    write_page(named.runs, parsed.out, named.fleet_names)
+    print(f"wrote {parsed.out}")
     return 0

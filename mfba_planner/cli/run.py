@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba run`: the launcher."""
+"""`mfba run`: run an episode in ROS 2; calls the launcher."""
 
 from __future__ import annotations
 

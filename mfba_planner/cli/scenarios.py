@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba scenarios`: the worlds that are shipped; needs no ROS."""
+"""`mfba scenarios`: list the shipped scenarios; needs no ROS."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..scenarios.scenario_files import load_scenario
 
 def main(args: list[str]) -> int:
     """List the scenarios."""
-    Parser(prog="mfba scenarios", description="List the worlds that are shipped.").parse(args)
+    Parser(prog="mfba scenarios", description="List the shipped scenarios.").parse(args)
     names = scenario_names()
     width = max(map(len, names), default=0)
     for name in names:

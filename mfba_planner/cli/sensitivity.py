@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba sensitivity`: what hangs on what the paper does not say; needs no ROS."""
+"""`mfba sensitivity`: vary what the paper leaves open, compare results; needs no ROS."""
 
 from __future__ import annotations
 
@@ -12,36 +12,35 @@ from ..paper import sensitivity
 from ..paper.study.run import open_store
 from ..report.figures.paper_figures import FORMATS
 from ..scenarios.scenario_files import load_scenario
-from .study_progress import add_arguments, check, run_watched
+from .study_progress import add_arguments, check, run_with_progress
 
-_DESCRIPTION = """Change what section 6.2 leaves open, one thing at a time, and see what becomes of
-the printed path lengths and of whom the robot meets: a table, CSV, Markdown and a heat-map.
+_DESCRIPTION = """Vary what section 6.2 leaves open, one parameter at a time, and compare path
+lengths and encountered obstacles with the printed ones: a table, CSV, Markdown and a heat map.
 
-The finished parts of the runs are kept too, so that an interrupted command goes on where it was
-when called again with --out."""
+Finished chunks of the runs are stored too: an interrupted command continues with --out DIR."""
 
 
 def main(args: list[str]) -> int:
-    """Run the study and show it."""
+    """Run the study and print its table."""
     parser = Parser(prog="mfba sensitivity", description=_DESCRIPTION)
     add_arguments(parser)
-    found = parser.parse(args)
-    check(found)
-    directory = found.out or new_run_directory(stem="sensitivity")
+    parsed = parser.parse(args)
+    check(parsed)
+    directory = parsed.out or new_run_directory(stem="sensitivity")
     scenarios = {case: load_scenario(case) for case in sensitivity.CASES}
-    chunks = sensitivity.plan(scenarios, found.quick, found.seed)
-    facts = {"study": "sensitivity", "seed": found.seed, "quick": found.quick}
+    chunks = sensitivity.plan(scenarios, parsed.quick, parsed.seed)
+    facts = {"study": "sensitivity", "seed": parsed.seed, "quick": parsed.quick}
     store = open_store(directory, chunks, facts)
-    rows = sensitivity.rows(run_watched(chunks, found.workers, store), found.quick)
-    seeds = sensitivity.QUICK_SEEDS if found.quick else sensitivity.SEEDS
+    rows = sensitivity.rows(run_with_progress(chunks, parsed.workers, store), parsed.quick)
+    seeds = sensitivity.QUICK_SEEDS if parsed.quick else sensitivity.SEEDS
     names = _write(directory, rows)
-    _show(rows, f"Readings of section 6.2, {seeds} seeds from {found.seed} on")
+    _print_table(rows, f"Readings of section 6.2, {seeds} seeds from {parsed.seed} on")
     print(f"wrote {directory}: {', '.join(names)}")
     return 0
 
 
 def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
-    """CSV, Markdown and heat-map; what is there already must be the same."""
+    """Write CSV, Markdown and heat map; existing files must have the same content."""
     from ..report import style
     from ..report.figure_sheet import to_bytes
     from ..report.figures.sensitivity import draw
@@ -59,7 +58,7 @@ def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
     return list(files)
 
 
-def _show(rows: Sequence[sensitivity.Row], title: str) -> None:
+def _print_table(rows: Sequence[sensitivity.Row], title: str) -> None:
     from rich.console import Console
 
     from ..report.sensitivity_table import to_table

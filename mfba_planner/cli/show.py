@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba show`: any run of a sweep again, as a picture, in words and as a bag."""
+"""`mfba show`: explain a run of a sweep with text, pictures and a bag; list failed runs."""
 
 from __future__ import annotations
 
@@ -21,104 +21,107 @@ from ..evaluation.sweep.read_sweep import ReadSweep, read_sweep
 from ..evaluation.sweep.single_run import PlayedRun, run_one
 from ..evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, own_preset, read_run
 
-_DESCRIPTION = """Make a run of a sweep again and tell what became of it, and why.
+_DESCRIPTION = """Repeat a run of a sweep and explain its outcome.
 
 RUN is SUITE/WORLD/PLANNER/SEED or, with a directory of `mfba sweep`, also the number of a row of
-its table (from 0); without RUN the runs that failed are listed. Without a directory the run is
-made as `mfba sweep` makes it when nothing else is said."""
+its table (from 0); without RUN the failed runs are listed. Without a directory the run has the
+default settings of `mfba sweep`."""
 LISTED = 20
 
 
 def main(args: list[str]) -> int:
-    """Show a run, or list those that failed."""
+    """Explain a run, or list the failed runs."""
     parser = Parser(prog="mfba show", description=_DESCRIPTION)
     parser.add_argument("what", nargs="+", metavar="DIR | RUN", help="directory, run, or both")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="directory to create (default: below runs/)"
     )
-    parser.add_argument("--no-bag", action="store_true", help="write no bag, which takes rclpy")
-    found = parser.parse(args)
-    words = list(found.what)
-    swept = read_sweep(Path(words.pop(0))) if _is_directory(words[0]) else None
-    if len(words) > 1:
-        raise InputError(f"{words[1]}: one argument too many; give a directory and one run")
-    if swept is not None and not words:
+    parser.add_argument("--no-bag", action="store_true", help="write no bag (a bag needs rclpy)")
+    parsed = parser.parse(args)
+    arguments = list(parsed.what)
+    swept = read_sweep(Path(arguments.pop(0))) if _is_directory(arguments[0]) else None
+    if len(arguments) > 1:
+        raise InputError(f"{arguments[1]}: one argument too many; give a directory and one run")
+    if swept is not None and not arguments:
         return _list_failures(swept)
-    return _show(swept, words[0], found.out, bag=not found.no_bag)
+    return _show_run(swept, arguments[0], parsed.out, bag=not parsed.no_bag)
 
 
-def _is_directory(word: str) -> bool:
-    return Path(word).is_dir() or (word.count("/") != 3 and not word.isdecimal())
+def _is_directory(argument: str) -> bool:
+    return Path(argument).is_dir() or (argument.count("/") != 3 and not argument.isdecimal())
 
 
 def _list_failures(swept: ReadSweep) -> int:
     failed = [(k, row) for k, row in enumerate(swept.rows) if not row["success"]]
     print(f"{len(failed)} of {len(swept.rows)} runs without success")
     for k, row in failed[:LISTED]:
-        print(f"{k:>7}  {Run(*(row[n] for n in Run._fields))}  {_why(row)}")
+        print(f"{k:>7}  {Run(*(row[n] for n in Run._fields))}  {_failure_text(row)}")
     if len(failed) > LISTED:
         print(f"{'...':>7}  and {len(failed) - LISTED} more")
     return 0
 
 
-def _why(row: Row) -> str:
+def _failure_text(row: Row) -> str:
     if row["failure"]:
         return str(row["failure"])
     return f"{row['outcome']}, {row['collisions']} collisions"
 
 
-def _show(swept: ReadSweep | None, word: str, out: Path | None, *, bag: bool) -> int:
-    run, row = _chosen(swept, word)
-    setting = swept.order.setting_of(run.planner) if swept else _usual(run)
-    SweepSpec(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)  # or it raises
+def _show_run(swept: ReadSweep | None, argument: str, out: Path | None, *, bag: bool) -> int:
+    run, row = _find_run(swept, argument)
+    setting = swept.order.setting_of(run.planner) if swept else _default_setting(run)
+    # Raises ConfigError for a bad run.
+    SweepSpec(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)
     directory = refuse_existing(out or new_run_directory(stem="show"))
-    with _patience(setting.patience_s):
+    with _time_limit(setting.patience_s):
         played = run_one(run, setting)
-    lines = [str(run), *explain(played), *_oracle(played, setting)]
+    lines = [str(run), *explain(played), *_oracle_lines(played, setting)]
     if swept is not None and swept.code_changed:
-        lines.append("note: the code has changed since the sweep; its run may have gone otherwise")
-    if row is not None and not _same(row, made_row(run, played)):
-        lines.append("note: the sweep's run went otherwise; see the row of its table")
+        lines.append("note: the code has changed since the sweep; its result may differ")
+    if row is not None and not _is_same(row, made_row(run, played)):
+        lines.append("note: the sweep's run had another result; see the row of its table")
     print("\n".join(lines))
     names = _write(directory, run, played, lines, bag=bag)
     print(f"wrote {directory}: {', '.join(names)}")
     return 0
 
 
-def _usual(run: Run) -> Setting:
-    plain = Setting()
-    return replace(plain, params=own_preset(run.planner, plain.params))
+def _default_setting(run: Run) -> Setting:
+    default = Setting()
+    return replace(default, params=own_preset(run.planner, default.params))
 
 
-def _chosen(swept: ReadSweep | None, word: str) -> tuple[Run, Row | None]:
-    """The run, and its row where there is one."""
+def _find_run(swept: ReadSweep | None, argument: str) -> tuple[Run, Row | None]:
+    """The run, and its row of the table, if any."""
     if swept is None:
-        return read_run(word), None
-    if word.isdecimal():
-        if int(word) >= len(swept.rows):
-            raise InputError(f"{word}: the table has {len(swept.rows)} rows; give 0 or more")
-        row = swept.rows[int(word)]
+        return read_run(argument), None
+    if argument.isdecimal():
+        if int(argument) >= len(swept.rows):
+            raise InputError(f"{argument}: the table has {len(swept.rows)} rows; give 0 or more")
+        row = swept.rows[int(argument)]
         return Run(*(row[name] for name in Run._fields)), row
-    run = read_run(word)
+    run = read_run(argument)
     for row in swept.rows:
         if run == tuple(row[name] for name in Run._fields):
             return run, row
-    raise InputError(f"{word}: not a run of this sweep; give one of its table, or no directory")
+    raise InputError(
+        f"{argument}: not a run of this sweep; give one of its table, or no directory"
+    )
 
 
-def _same(row: Row, made: Row) -> bool:
+def _is_same(row: Row, made: Row) -> bool:
     return all(repr(row.get(name)) == repr(value) for name, value in made.items())
 
 
 @contextmanager
-def _patience(patience_s: float) -> Iterator[None]:
-    """A planner that hangs is interrupted; one that hangs in machine code takes a Ctrl-C."""
+def _time_limit(limit_s: float) -> Iterator[None]:
+    """Interrupt a planner that hangs; one that hangs in native code needs Ctrl-C."""
 
     def interrupt(*_: Any) -> None:
-        raise HungError(f"hung: no end after {patience_s:g} s of wall time")
+        raise HungError(f"hung: no end after {limit_s:g} s of wall time")
 
     before = signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, patience_s)
+    signal.setitimer(signal.ITIMER_REAL, limit_s)
     try:
         yield
     finally:
@@ -126,10 +129,10 @@ def _patience(patience_s: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def _oracle(played: PlayedRun, setting: Setting) -> Iterator[str]:
+def _oracle_lines(played: PlayedRun, setting: Setting) -> Iterator[str]:
     solution = solve(played.episode.scenario, setting.params.speed_mps)
-    way = f", {solution.length_m:.3f} m" if solution.waypoints else ""
-    yield f"oracle: {solution.certificate.value} at {solution.speed_mps:g} m/s{way}"
+    length = f", {solution.length_m:.3f} m" if solution.waypoints else ""
+    yield f"oracle: {solution.certificate.value} at {solution.speed_mps:g} m/s{length}"
 
 
 def _write(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba sim`: episodes by the core driver, one seed or many; needs no ROS."""
+"""`mfba sim`: simulate episodes without ROS (core driver), one seed or many."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..launcher.run_result import show, why_no_success
 from ..scenarios.run_config import Driver, RunConfig
 from ..simulation.simulate import simulate
 
-_DESCRIPTION = "Simulate episodes without ROS: the decisions of `mfba run`, but no bag."
+_DESCRIPTION = "Simulate episodes without ROS: same decisions as `mfba run`, no bag."
 _HEAD = "    seed  outcome       length     time  clearance  collisions"
 _ROW = "{:>8}  {:<12}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"
 
@@ -26,32 +26,36 @@ def main(args: list[str]) -> int:
     parser = Parser(prog="mfba sim", description=_DESCRIPTION)
     add_world_arguments(parser)
     parser.add_argument(
-        "--seeds", type=int, default=1, metavar="N", help="N seeds from --seed on (default: 1)"
+        "--seeds",
+        type=int,
+        default=1,
+        metavar="N",
+        help="number of seeds, from --seed on (default: 1)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="directory to create for result.json and run.png"
     )
-    found = parser.parse(args)
-    _check(found)
-    config = read_config(found, driver=Driver.CORE)
+    parsed = parser.parse(args)
+    _check(parsed)
+    config = read_config(parsed, driver=Driver.CORE)
     if config.scenario.robots:
         from . import fleet
 
-        return fleet.simulate(config, found.seeds, found.out)
-    if found.out is not None:
+        return fleet.simulate(config, parsed.seeds, parsed.out)
+    if parsed.out is not None:
         from ..launcher.execute_run import execute
 
-        return execute(RunRequest(config=config, out=found.out, node_args={}))
-    if found.seeds == 1:
+        return execute(RunRequest(config=config, out=parsed.out, node_args={}))
+    if parsed.seeds == 1:
         return _one(config)
-    return _many([replace(config, seed=config.seed + k) for k in range(found.seeds)])
+    return _many([replace(config, seed=config.seed + k) for k in range(parsed.seeds)])
 
 
-def _check(found: argparse.Namespace) -> None:
-    if found.seeds < 1:
-        raise ConfigError(f"--seeds={found.seeds}: out of range; give at least 1")
-    if found.out is not None and found.seeds > 1:
-        raise ConfigError(f"--out {found.out}: holds one run; leave out --seeds")
+def _check(parsed: argparse.Namespace) -> None:
+    if parsed.seeds < 1:
+        raise ConfigError(f"--seeds={parsed.seeds}: out of range; give at least 1")
+    if parsed.out is not None and parsed.seeds > 1:
+        raise ConfigError(f"--out {parsed.out}: holds one run; leave out --seeds")
 
 
 def _one(config: RunConfig) -> int:
@@ -91,7 +95,7 @@ def _row(seed: int, r: Result) -> str:
 
 
 def _summary(good: list[Result], total: int) -> str:
-    """How many reached the goal without collision, and the spread of their lengths."""
+    """The number of successes, and the range of their path lengths."""
     text = f"{len(good)} of {total} at the goal without collision"
     if good:
         lengths = [result.length_m for result in good]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A study at the command line: its arguments, and a progress bar where somebody watches."""
+"""Helper of sweep, tables and sensitivity, not a command: arguments and progress bar."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ from ..paper.study.run import Sample, run_plan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Size, workers, first seed, output."""
-    parser.add_argument("--quick", action="store_true", help="few runs: seconds, wide intervals")
+    """Add --quick, --seed, --workers and --out."""
+    parser.add_argument(
+        "--quick", action="store_true", help="few runs: takes seconds, gives wide intervals"
+    )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="first seed of every sample (default: 0)"
     )
@@ -28,38 +30,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_work_arguments(parser: argparse.ArgumentParser) -> None:
-    """Workers and output."""
+    """Add --workers and --out."""
     parser.add_argument(
-        "--workers", type=int, default=_cores(), metavar="N",
+        "--workers", type=int, default=_available_cores(), metavar="N",
         help="processes (default: one per core); the results do not depend on it",
     )  # fmt: skip
     parser.add_argument(
         "--out", type=Path, metavar="DIR",
-        help="directory to create, or to go on in (default: a new one below runs/)",
+        help="directory to create, or to continue in (default: a new one below runs/)",
     )  # fmt: skip
 
 
-def check(found: argparse.Namespace) -> None:
-    """Raise ConfigError for numbers that cannot be."""
-    if not 0 <= found.seed < 2**62:
-        raise ConfigError(f"--seed={found.seed}: out of range; give a whole number from 0 up")
-    check_workers(found.workers)
+def check(parsed: argparse.Namespace) -> None:
+    """Raise ConfigError for a seed or a number of workers out of range."""
+    if not 0 <= parsed.seed < 2**62:
+        raise ConfigError(f"--seed={parsed.seed}: out of range; give a whole number from 0 up")
+    check_workers(parsed.workers)
 
 
-def run_watched(chunks: Sequence[SampleChunk], workers: int, store: Store) -> dict[str, Sample]:
-    """Run the plan under a progress bar."""
+def run_with_progress(
+    chunks: Sequence[SampleChunk], workers: int, store: Store
+) -> dict[str, Sample]:
+    """Run the plan with a progress bar."""
     with progress(chunks, store.directory) as done:
-        return run_plan(chunks, workers=workers, store=store, done=done, say=say)
+        return run_plan(chunks, workers=workers, store=store, done=done, say=print_status)
 
 
-def say(line: str) -> None:
-    """A word to whoever watches."""
+def print_status(line: str) -> None:
+    """Print a line on stderr."""
     print(line, file=sys.stderr, flush=True)
 
 
 @contextmanager
 def progress(chunks: Sequence[Chunk], directory: Path) -> Iterator[Callable[[Chunk], None]]:
-    """A progress bar, where somebody watches; tells how to go on after an interrupt."""
+    """A progress bar on a terminal; after an interrupt it prints how to continue."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -72,13 +76,13 @@ def progress(chunks: Sequence[Chunk], directory: Path) -> Iterator[Callable[[Chu
             task = bar.add_task("running", total=sum(chunk.cost for chunk in chunks))
             yield lambda chunk: bar.advance(task, chunk.cost)
     except (KeyboardInterrupt, SystemExit):
-        say(f"interrupted; go on with --out {directory}")
+        print_status(f"interrupted; continue with --out {directory}")
         raise
 
 
-def _cores() -> int:
-    """Cores that this process may use."""
+def _available_cores() -> int:
+    """Number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not everywhere
+    except AttributeError:  # not on every system
         return os.cpu_count() or 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba sweep`: a suite of worlds x planners x seeds -> one table and a report; needs no ROS."""
+"""`mfba sweep`: run planners in a suite of worlds; writes a table, a report; needs no ROS."""
 
 from __future__ import annotations
 
@@ -28,28 +28,33 @@ from ..planning.planner_factory import DEFAULT_METHOD
 from ..planning.planner_params import PlannerParams
 from ..planning.planner_registry import PLANNERS
 from ..simulation.planner_observations import NAMES as PERCEPTIONS
-from .study_progress import add_work_arguments, progress, say
+from .study_progress import add_work_arguments, print_status, progress
 
-_DESCRIPTION = """Run planners in the worlds of a suite and tell how good they are.
+_DESCRIPTION = """Run planners in the worlds of a suite and compare them.
 
-Everything goes into a directory: the table (a row per run), timings.csv (what the clock said; all
-else is the same whoever computes it), report.md, and the finished parts of the runs, so that an
-interrupted command goes on where it was when called again with --out. `mfba show` explains a run.
+Writes a directory: the table (a row per run), timings.csv (computing times; all other files are
+the same on every machine), report.md, and the finished chunks of the runs: an interrupted command
+continues with --out DIR. `mfba show` explains a run.
 """
 
 
 def main(args: list[str]) -> int:
-    """Make the sweep."""
-    found = _parser().parse(args)
-    check_workers(found.workers)
-    order = _order(found)
-    directory = found.out or new_run_directory(stem="sweep")
-    store = open_store(directory, order)
-    with _executor(found.scheduler) as executor, progress(chunks_of(order), directory) as done:
+    """Run the sweep."""
+    parsed = _parser().parse(args)
+    check_workers(parsed.workers)
+    spec = _sweep_spec(parsed)
+    directory = parsed.out or new_run_directory(stem="sweep")
+    store = open_store(directory, spec)
+    with _executor(parsed.scheduler) as executor, progress(chunks_of(spec), directory) as done:
         swept = sweep(
-            order, workers=found.workers, executor=executor, store=store, done=done, say=say
+            spec,
+            workers=parsed.workers,
+            executor=executor,
+            store=store,
+            done=done,
+            say=print_status,
         )
-    names = [f"table.{found.format}", "timings.csv"]
+    names = [f"table.{parsed.format}", "timings.csv"]
     write(directory / names[0], swept.rows, COLUMNS)
     write(directory / names[1], swept.timings, TIMINGS)
     _report(swept, directory)
@@ -72,32 +77,38 @@ def _parser() -> Parser:
         f"(default: {DEFAULT_METHOD.value})",
     )  # fmt: skip
     for name, default, what in (
-        ("--worlds", 100, "how many worlds"),
-        ("--first", 0, "first of them"),
+        ("--worlds", 100, "number of worlds"),
+        ("--first", 0, "number of the first world"),
         ("--seeds", 1, "seeds per world and planner"),
         ("--suite-seed", 0, "seed of all worlds"),
-        ("--latency", 0, "age of what is perceived, ticks"),
+        ("--latency", 0, "latency of the perception, ticks"),
     ):
         parser.add_argument(
             name, type=int, default=default, metavar="N", help=f"{what} (default: {default})"
         )
     parser.add_argument(
         "--perception", choices=PERCEPTIONS, default="known",
-        help="sectors: the paper's bits alone; known: circles within SR with velocities; "
+        help="sectors: the paper's bits only; known: circles within SR with velocities; "
         "scan-N: N beams (default: known)",
     )  # fmt: skip
     parser.add_argument(
-        "--noise", type=float, default=0.0, metavar="M", help="its standard deviation, m"
+        "--noise",
+        type=float,
+        default=0.0,
+        metavar="M",
+        help="standard deviation of ranges (of centres when known), m",
     )
     parser.add_argument(
-        "--no-oracle", action="store_true", help="leave out the optimum, gap, SPL and BARN score"
+        "--no-oracle", action="store_true", help="leave out optimum, gap, SPL and BARN score"
     )
     parser.add_argument(
         "--patience", type=float, default=PATIENCE_S, metavar="S",
-        help="wall time after which a run counts as hanging (default: 60)",
+        help="wall time, s, after which a run counts as hung (default: 60)",
     )  # fmt: skip
     add_set_argument(parser)
-    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table")
+    parser.add_argument(
+        "--format", choices=("csv", "parquet"), default="csv", help="format of the table"
+    )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="tcp://HOST:PORT of a dask.distributed scheduler"
     )
@@ -105,34 +116,32 @@ def _parser() -> Parser:
     return parser
 
 
-def _order(found: argparse.Namespace) -> SweepSpec:
-    usual, planners = (
-        PlannerParams(speed_mps=SPEED_MPS),
-        tuple(found.planners or [DEFAULT_METHOD.value]),
-    )
-    params, sensor = with_settings(usual, SensorParams(), found.settings)
-    # What was said on the command line holds for all, whatever a planner is made for.
+def _sweep_spec(parsed: argparse.Namespace) -> SweepSpec:
+    default = PlannerParams(speed_mps=SPEED_MPS)
+    planners = tuple(parsed.planners or [DEFAULT_METHOD.value])
+    params, sensor = with_settings(default, SensorParams(), parsed.settings)
+    # --set overrides every planner's own preset.
     own = {
-        name: with_settings(own_preset(name, usual), sensor, found.settings)[0]
+        name: with_settings(own_preset(name, default), sensor, parsed.settings)[0]
         for name in planners
     }
     return SweepSpec(
-        suite=found.suite,
+        suite=parsed.suite,
         planners=planners,
-        worlds=found.worlds,
-        first=found.first,
-        seeds=found.seeds,
-        oracle=not found.no_oracle,
+        worlds=parsed.worlds,
+        first=parsed.first,
+        seeds=parsed.seeds,
+        oracle=not parsed.no_oracle,
         setting=Setting(
             params=params,
             sensor=sensor,
-            perception=found.perception,
-            noise_m=found.noise,
-            latency_ticks=found.latency,
-            suite_seed=found.suite_seed,
-            patience_s=found.patience,
+            perception=parsed.perception,
+            noise_m=parsed.noise,
+            latency_ticks=parsed.latency,
+            suite_seed=parsed.suite_seed,
+            patience_s=parsed.patience,
         ),
-        own={name: one for name, one in own.items() if one != params},
+        own={name: preset for name, preset in own.items() if preset != params},
     )
 
 
@@ -145,39 +154,43 @@ def _executor(scheduler: str | None) -> Iterator[Executor | None]:
         yield executor
 
 
-def command(order: SweepSpec) -> str:
-    """The command that makes this sweep, however it was typed."""
-    one, plain = order.setting, Setting()
-    words = ["mfba", "sweep", order.suite]
-    for planner in order.planners:
-        words += ["--planner", planner]
-    words += ["--worlds", str(order.worlds)]
-    for name, value, default in (
-        ("--first", order.first, 0),
-        ("--seeds", order.seeds, 1),
-        ("--suite-seed", one.suite_seed, 0),
-        ("--perception", one.perception, plain.perception),
-        ("--noise", one.noise_m, 0.0),
-        ("--latency", one.latency_ticks, 0),
-        ("--patience", one.patience_s, PATIENCE_S),
+def command_line(spec: SweepSpec) -> str:
+    """The shortest `mfba sweep` command line for this sweep."""
+    setting, default = spec.setting, Setting()
+    arguments = ["mfba", "sweep", spec.suite]
+    for planner in spec.planners:
+        arguments += ["--planner", planner]
+    arguments += ["--worlds", str(spec.worlds)]
+    for name, value, unset in (
+        ("--first", spec.first, 0),
+        ("--seeds", spec.seeds, 1),
+        ("--suite-seed", setting.suite_seed, 0),
+        ("--perception", setting.perception, default.perception),
+        ("--noise", setting.noise_m, 0.0),
+        ("--latency", setting.latency_ticks, 0),
+        ("--patience", setting.patience_s, PATIENCE_S),
     ):
-        if value != default:
-            words += [name, str(value)]
-    words += [] if order.oracle else ["--no-oracle"]
-    said = {f"sensor.{name}": value for name, value in _changed(one.sensor, plain.sensor)}
-    for planner in order.planners:
-        params = order.setting_of(planner).params
-        for name, value in _changed(params, own_preset(planner, plain.params)):
-            said[f"planner.{name}"] = value
-    for name, value in said.items():
-        words += ["--set", f"{name}={value}"]
-    return shlex.join(words)
+        if value != unset:
+            arguments += [name, str(value)]
+    arguments += [] if spec.oracle else ["--no-oracle"]
+    changes = {
+        f"sensor.{name}": value for name, value in _non_default(setting.sensor, default.sensor)
+    }
+    for planner in spec.planners:
+        params = spec.setting_of(planner).params
+        for name, value in _non_default(params, own_preset(planner, default.params)):
+            changes[f"planner.{name}"] = value
+    for name, value in changes.items():
+        arguments += ["--set", f"{name}={value}"]
+    return shlex.join(arguments)
 
 
-def _changed(one: Any, plain: Any) -> Iterator[tuple[str, Scalar]]:
-    """Options that are not the usual ones."""
-    usual = flatten(plain)
-    yield from ((name, value) for name, value in flatten(one).items() if value != usual[name])
+def _non_default(params: Any, default: Any) -> Iterator[tuple[str, Scalar]]:
+    """(name, value) of the options that differ from the default."""
+    defaults = flatten(default)
+    yield from (
+        (name, value) for name, value in flatten(params).items() if value != defaults[name]
+    )
 
 
 def _report(swept: Swept, directory: Path) -> None:
@@ -187,11 +200,11 @@ def _report(swept: Swept, directory: Path) -> None:
     from ..report.sweep_tables import tables, to_markdown
     from ..report.terminal_output import print_encodable
 
-    order = swept.order
-    found, pairs = standings(swept.rows, swept.timings), comparisons(swept.rows)
-    title = f"{order.suite}: {order.worlds} worlds from {order.first} on, {order.seeds} seeds each"
-    facts = [f"`{command(order)}`", f"sorted hash of the table `{swept.hash}`"]
-    write_same(directory / "report.md", to_markdown(found, pairs, title, facts).encode())
+    spec = swept.order
+    ranking, pairs = standings(swept.rows, swept.timings), comparisons(swept.rows)
+    title = f"{spec.suite}: {spec.worlds} worlds from {spec.first} on, {spec.seeds} seeds each"
+    facts = [f"`{command_line(spec)}`", f"sorted hash of the table `{swept.hash}`"]
+    write_same(directory / "report.md", to_markdown(ranking, pairs, title, facts).encode())
     console = Console()
-    for table in tables(found, pairs, title):
+    for table in tables(ranking, pairs, title):
         print_encodable(console, lambda encodable, table=table: encodable.print(table))  # type: ignore[misc]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba tables`: the paper's tables again, ours beside the printed; needs no ROS."""
+"""`mfba tables`: reproduce the paper's tables beside the printed values; needs no ROS."""
 
 from __future__ import annotations
 
@@ -19,45 +19,48 @@ from ..report.figures.paper_figures import FIGURES, render
 from ..report.tables import data, html, markdown
 from ..report.tables.text import Origin
 from ..scenarios.scenario_files import load_scenario
-from .study_progress import add_arguments, check, run_watched
+from .study_progress import add_arguments, check, run_with_progress
 
-_DESCRIPTION = """Run what Tables 1 to 7 need and hold each printed number against ours.
+_DESCRIPTION = """Reproduce Tables 1 to 7 and compare each printed number with ours.
 
-Everything goes into a directory: Markdown, CSV, JSON, one HTML page, and the finished parts of
-the runs, so that an interrupted command goes on where it was when called again with --out."""
+Writes a directory: Markdown, CSV, JSON, one HTML page, and the finished chunks of the runs: an
+interrupted command continues with --out DIR."""
 
 
 def main(args: list[str]) -> int:
-    """Make the tables."""
+    """Compute and write the tables."""
     parser = Parser(prog="mfba tables", description=_DESCRIPTION)
     parser.add_argument(
-        "tables", nargs="*", metavar="TABLE", help=f"which: {', '.join(SECTIONS)} (default: all)"
+        "tables", nargs="*", metavar="TABLE", help=f"one of {', '.join(SECTIONS)} (default: all)"
     )
     add_arguments(parser)
     parser.add_argument(
-        "--update", type=Path, metavar="PAGE", help="fill the generated blocks of this page too"
+        "--update",
+        type=Path,
+        metavar="PAGE",
+        help="also fill the generated blocks of this Markdown page",
     )
-    found = parser.parse(args)
-    sections = check_sections(found.tables)
-    check(found)
-    page = None if found.update is None else _page(found.update, sections)
-    directory = found.out or new_run_directory(stem="tables")
-    words = ["mfba", "tables", *found.tables, *(["--quick"] if found.quick else [])]
+    parsed = parser.parse(args)
+    sections = check_sections(parsed.tables)
+    check(parsed)
+    page = None if parsed.update is None else _read_page(parsed.update, sections)
+    directory = parsed.out or new_run_directory(stem="tables")
+    arguments = ["mfba", "tables", *parsed.tables, *(["--quick"] if parsed.quick else [])]
     origin = Origin(
-        command=shlex.join(words + (["--seed", str(found.seed)] if found.seed else [])),
-        seed=found.seed,
-        quick=found.quick,
+        command=shlex.join(arguments + (["--seed", str(parsed.seed)] if parsed.seed else [])),
+        seed=parsed.seed,
+        quick=parsed.quick,
     )
-    made = _make(sections, found.quick, found.seed, found.workers, directory)
-    _write(directory, made, origin)
+    computed = _compute_tables(sections, parsed.quick, parsed.seed, parsed.workers, directory)
+    _write_forms(directory, computed, origin)
     if page is not None:
-        _update(found.update, markdown.fill(page, markdown.blocks(made, origin)))
-    _show(made, origin)
+        _replace_page(parsed.update, markdown.fill(page, markdown.blocks(computed, origin)))
+    _print_table(computed, origin)
     print(f"wrote {directory}: tables.html, tables.md, tables.csv, tables.json")
     return 0
 
 
-def _make(
+def _compute_tables(
     sections: Sequence[str], quick: bool, seed: int, workers: int, directory: Path
 ) -> list[Section]:
     scenarios = {name: load_scenario(name) for name in ("case1", "case2")}
@@ -65,14 +68,14 @@ def _make(
     store = open_store(
         directory, chunks, {"sections": list(sections), "seed": seed, "quick": quick}
     )
-    samples = run_watched(chunks, workers, store)
+    samples = run_with_progress(chunks, workers, store)
     return build(sections, scenarios, samples, seed)
 
 
-def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None:
-    """Every form; what is there already must be the same. Figures go with the whole set."""
-    whole = len(sections) == len(SECTIONS)
-    pictures = _pictures(origin.quick) if whole else []
+def _write_forms(directory: Path, sections: Sequence[Section], origin: Origin) -> None:
+    """Write each format; existing files must be the same. All tables: HTML with figures."""
+    has_all = len(sections) == len(SECTIONS)
+    pictures = _figures(origin.quick) if has_all else []
     forms = {
         "tables.md": markdown.page(sections, origin),
         "tables.csv": data.to_csv(sections),
@@ -83,8 +86,8 @@ def _write(directory: Path, sections: Sequence[Section], origin: Origin) -> None
         write_same(directory / name, content.encode())
 
 
-def _pictures(quick: bool) -> list[html.Picture]:
-    """What `mfba figures` draws; the quick form does without the one that takes longest."""
+def _figures(quick: bool) -> list[html.Picture]:
+    """The figures of `mfba figures`; --quick leaves out the slowest one."""
     return [
         html.Picture(title=f"{name}: {what}", svg=render(name, ("svg",))["svg"].decode())
         for name, what in FIGURES.items()
@@ -92,8 +95,8 @@ def _pictures(quick: bool) -> list[html.Picture]:
     ]
 
 
-def _page(path: Path, sections: Sequence[str]) -> str:
-    """A page that has a place for every block; seen to before the minutes of running."""
+def _read_page(path: Path, sections: Sequence[str]) -> str:
+    """The page's text; raises, before the long runs, if it lacks the marks of a block."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -105,8 +108,8 @@ def _page(path: Path, sections: Sequence[str]) -> str:
     return text
 
 
-def _update(path: Path, content: str) -> None:
-    """Replace a page, whole."""
+def _replace_page(path: Path, content: str) -> None:
+    """Replace the page atomically."""
     new = path.with_name(f"{path.name}.new")
     try:
         write_new(new, content.encode())
@@ -119,7 +122,7 @@ def _update(path: Path, content: str) -> None:
         new.unlink(missing_ok=True)
 
 
-def _show(sections: Sequence[Section], origin: Origin) -> None:
+def _print_table(sections: Sequence[Section], origin: Origin) -> None:
     from rich.console import Console
 
     from ..report.tables.terminal import show

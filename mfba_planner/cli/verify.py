@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba verify`: whether a bag's decisions are what the planner decides; needs no ROS."""
+"""`mfba verify`: recompute a bag's decisions and compare bit for bit; needs no ROS."""
 
 from __future__ import annotations
 
@@ -21,148 +21,150 @@ from ..verification.compare_decisions import Divergence, first_divergence, side_
 from ..verification.redecide import is_foreign
 from ..verification.verify_bag import Report, verify_each
 from . import verify_foreign
-from .verify_foreign import show_remarks
+from .verify_foreign import print_remarks
 
 
 def main(args: list[str]) -> int:
-    """Check a bag; 0 when all is identical."""
+    """Verify a bag; return 0 when all decisions are identical."""
     parser = Parser(
         prog="mfba verify",
-        description="Decide again, without ROS, on the odometry and sectors a bag recorded, and "
-        "compare with the recorded decisions bit for bit. Nothing is written into the bag.",
+        description="Recompute the decisions, without ROS, from recorded odometry and sectors, "
+        "and compare them bit for bit with the recorded ones. The bag is not changed.",
     )
     parser.add_bag()
     parser.add_robots()
-    parser.add_argument(
-        "--closed-loop", action="store_true", help="simulate the world again as well"
-    )
+    parser.add_argument("--closed-loop", action="store_true", help="also simulate the world again")
     add_set_argument(parser)
     parser.add_argument(
-        "--picture", type=Path, metavar="PNG", help="with --set: both trails, a file to create"
+        "--picture", type=Path, metavar="PNG", help="with --set: file to create, with both trails"
     )
     verify_foreign.add_arguments(parser)
-    found = parser.parse(args)
-    bag = bag_in(found.bag)
+    parsed = parser.parse(args)
+    bag = bag_in(parsed.bag)
     with BagReader(bag) as reader:
         if is_foreign(reader):
-            return verify_foreign.report(bag, found)
-    verify_foreign.refuse_arguments(bag, found)
-    if found.picture and not found.settings:
+            return verify_foreign.report(bag, parsed)
+    verify_foreign.refuse_arguments(bag, parsed)
+    if parsed.picture and not parsed.settings:
         raise ConfigError("--picture: there is one trail only; give --set NAME=VALUE as well")
-    reports = verify_each(bag, found.robots)
+    reports = verify_each(bag, parsed.robots)
     for robot, report in reports.items():
-        _show(robot, report)
-    wrong = [
+        _print_report(robot, report)
+    failures = [
         _verdict(robot, report) for robot, report in reports.items() if not report.is_identical
     ]
-    if wrong:
-        more = f" (and {len(wrong) - 1} more robots)" if wrong[1:] else ""
-        raise BagError(f"{bag}: {wrong[0]}{more}; see above")
-    if found.picture and len(reports) > 1:
+    if failures:
+        more = f" (and {len(failures) - 1} more robots)" if failures[1:] else ""
+        raise BagError(f"{bag}: {failures[0]}{more}; see above")
+    if parsed.picture and len(reports) > 1:
         raise ConfigError("--picture: it is of one robot's trails; give --robot NAME as well")
-    if found.closed_loop or found.settings:
-        for robot, recorded, again in _again(bag, reports, found.settings):
-            if found.settings:
-                _what_if(robot, recorded, again, found)
+    if parsed.closed_loop or parsed.settings:
+        for robot, recorded, simulated in _simulate_again(bag, reports, parsed.settings):
+            if parsed.settings:
+                _compare_what_if(robot, recorded, simulated, parsed)
             else:
-                _closed_loop(bag, robot, recorded, again)
+                _compare_closed_loop(bag, robot, recorded, simulated)
     return 0
 
 
-def _show(robot: str, report: Report) -> None:
-    show_remarks(report, robot)
+def _print_report(robot: str, report: Report) -> None:
+    print_remarks(report, robot)
     if report.divergence:
-        _show_divergence(report.divergence, "recorded", "decided again", robot)
+        _print_divergence(report.divergence, "recorded", "recomputed", robot)
     elif not report.faults:
-        said = f"identical, {len(report.recorded)} decisions, digest {report.digest}"
-        print(of_robot(robot, said))
+        text = f"identical, {len(report.recorded)} decisions, digest {report.digest}"
+        print(of_robot(robot, text))
 
 
-def _show_divergence(found: Divergence, left: str, right: str, robot: str = NO_NAMESPACE) -> None:
-    decision = found.left or found.right
+def _print_divergence(
+    divergence: Divergence, left: str, right: str, robot: str = NO_NAMESPACE
+) -> None:
+    decision = divergence.left or divergence.right
     assert decision is not None
-    said = f"first difference at tick {found.tick}, stamp {decision.stamp_ns} ns:"
-    print(of_robot(robot, said))
-    print("\n".join(side_by_side(found, left, right)))
+    text = f"first difference at tick {divergence.tick}, stamp {decision.stamp_ns} ns:"
+    print(of_robot(robot, text))
+    print("\n".join(side_by_side(divergence, left, right)))
 
 
 def _verdict(robot: str, report: Report) -> str:
-    wrong = []
+    failures = []
     if report.divergence:
-        wrong.append(f"tick {report.divergence.tick} is not what the planner decides")
+        failures.append(f"tick {report.divergence.tick} is not what the planner decides")
     if report.faults:
-        wrong.append(f"{len(report.faults)} faults, the first: {report.faults[0]}")
-    return of_robot(robot, f"not identical: {'; '.join(wrong)}")
+        failures.append(f"{len(report.faults)} faults, the first: {report.faults[0]}")
+    return of_robot(robot, f"not identical: {'; '.join(failures)}")
 
 
-def _again(
+def _simulate_again(
     bag: Path, reports: dict[str, Report], settings: list[str]
 ) -> Iterator[tuple[str, Episode, Episode]]:
-    """Yield (robot, recorded, simulated again, which is cut short where the recording was)."""
+    """Yield (robot, recorded, simulated again); the simulation ends where the recording does."""
     if NO_NAMESPACE not in reports:
-        yield from _fleet_again(bag, reports, settings)
+        yield from _simulate_fleet_again(bag, reports, settings)
         return
     report = reports[NO_NAMESPACE]
     recorded = report.setup.episode(report.recorded)
     planner, sensor = with_settings(recorded.planner, recorded.sensor, settings)
-    again = simulate(
+    simulated = simulate(
         recorded.scenario,
         planner=planner,
         sensor=sensor,
         seed=recorded.seed,
         go_on=lambda world: bool(settings) or world.stamp_ns < recorded.ticks[-1].stamp_ns,
     )
-    yield NO_NAMESPACE, recorded, replace(again, driver="core")
+    yield NO_NAMESPACE, recorded, replace(simulated, driver="core")
 
 
-def _fleet_again(
+def _simulate_fleet_again(
     bag: Path, reports: dict[str, Report], settings: list[str]
 ) -> Iterator[tuple[str, Episode, Episode]]:
-    """All robots at once, since they shared a world; yields those that were asked for."""
+    """Simulate all robots, since they share a world; yield the requested ones."""
     scenario, seed, episodes, _ = read_recording(bag)
     first = next(iter(episodes.values()))
     planner, sensor = with_settings(first.planner, first.sensor, settings)
     last_ns = max(episode.ticks[-1].stamp_ns for episode in episodes.values())
-    made = simulate_fleet(
+    fleet = simulate_fleet(
         scenario,
         planner=planner,
         sensor=sensor,
         seed=seed,
-        go_on=lambda fleet: bool(settings) or stamp_of(fleet.tick, fleet.tick_ns) < last_ns,
+        go_on=lambda world: bool(settings) or stamp_of(world.tick, world.tick_ns) < last_ns,
     )
-    for (robot, recorded), again in zip(episodes.items(), made):
+    for (robot, recorded), simulated in zip(episodes.items(), fleet):
         if recorded.outcome is Outcome.INTERRUPTED and not settings:
-            again = replace(again, ticks=again.ticks[: len(recorded.ticks)])
+            simulated = replace(simulated, ticks=simulated.ticks[: len(recorded.ticks)])
         if robot in reports:
-            yield robot, recorded, replace(again, driver="core")
+            yield robot, recorded, replace(simulated, driver="core")
 
 
-def _closed_loop(bag: Path, robot: str, recorded: Episode, again: Episode) -> None:
-    found = first_divergence(recorded.ticks, again.ticks)
-    if found:
-        _show_divergence(found, "recorded", "simulated again", robot)
-        said = of_robot(robot, f"tick {found.tick} is not what the simulated world leads to")
+def _compare_closed_loop(bag: Path, robot: str, recorded: Episode, simulated: Episode) -> None:
+    divergence = first_divergence(recorded.ticks, simulated.ticks)
+    if divergence:
+        _print_divergence(divergence, "recorded", "simulated again", robot)
+        text = of_robot(robot, f"tick {divergence.tick} differs from the simulated world")
         raise BagError(
-            f"{bag}: {said}; see above "
-            "(a robot that was put elsewhere, or a world that was not simulated, cannot be)"
+            f"{bag}: {text}; see above "
+            "(expected if the robot was moved or the recorded world was not simulated)"
         )
-    print(of_robot(robot, f"closed loop: identical, {len(again.ticks)} ticks"))
+    print(of_robot(robot, f"closed loop: identical, {len(simulated.ticks)} ticks"))
 
 
-def _what_if(robot: str, recorded: Episode, again: Episode, given: argparse.Namespace) -> None:
+def _compare_what_if(
+    robot: str, recorded: Episode, simulated: Episode, parsed: argparse.Namespace
+) -> None:
     from ..evaluation.metrics import evaluate
     from ..report.result_table import comparison_text
 
-    change = " ".join(given.settings)
+    change = " ".join(parsed.settings)
     print(f"\n{of_robot(robot, f'what if {change}')}")
-    print(comparison_text(("recorded", evaluate(recorded)), ("what if", evaluate(again))))
-    found = first_divergence(recorded.ticks, again.ticks)
-    if found:
-        _show_divergence(found, "recorded", "what if", robot)
+    print(comparison_text(("recorded", evaluate(recorded)), ("what if", evaluate(simulated))))
+    divergence = first_divergence(recorded.ticks, simulated.ticks)
+    if divergence:
+        _print_divergence(divergence, "recorded", "what if", robot)
     else:
         print("no decision differs")
-    if given.picture:
+    if parsed.picture:
         from ..report.run_figure import draw_what_if
 
-        draw_what_if(recorded, again, change, given.picture)
-        print(f"wrote {given.picture}")
+        draw_what_if(recorded, simulated, change, parsed.picture)
+        print(f"wrote {parsed.picture}")

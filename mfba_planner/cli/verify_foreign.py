@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba verify` of a recording that is not ours: decisions from scratch."""
+"""Helper of `mfba verify`, not a command: recordings of other programs (LaserScan, Odometry)."""
 
 from __future__ import annotations
 
@@ -17,55 +17,60 @@ from ..recording.robot_topics import NO_NAMESPACE, of_robot
 from ..verification.redecide import Redecided, Robot, redecide_recording
 from ..verification.verify_bag import Report
 
-SHOWN = 10  # faults; more of them say nothing new
-_OURS = {"closed_loop": "--closed-loop", "picture": "--picture", "robots": "--robot"}
-_OWN = ("goal", "seed", "robot_radius", "scan_yaw", "scan", "odom")
+SHOWN = 10  # faults printed at most
+_NEEDS_OWN_BAG = {"closed_loop": "--closed-loop", "picture": "--picture", "robots": "--robot"}
+_FOREIGN_ONLY = ("goal", "seed", "robot_radius", "scan_yaw", "scan", "odom")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What such a recording does not say."""
+    """Add the arguments for what such a recording does not contain."""
     group = parser.add_argument_group(
-        "a recording of a LaserScan and Odometry that is not ours",
-        "There is nothing to compare with: decisions from scratch, and their digest.",
+        "a recording of a LaserScan and Odometry, not made by mfba",
+        "It has no decisions to compare with: prints the computed decisions' digest.",
     )
     group.add_argument(
-        "--goal", type=float, nargs=2, metavar=("X", "Y"), help="in metres (default: recorded)"
+        "--goal", type=float, nargs=2, metavar=("X", "Y"), help="goal, m (default: as recorded)"
     )
-    group.add_argument("--seed", type=int, help="of all randomness (default: 0)")
-    group.add_argument("--robot-radius", type=float, metavar="M", help="added to every return")
+    group.add_argument("--seed", type=int, help="seed of all randomness (default: 0)")
+    group.add_argument(
+        "--robot-radius",
+        type=float,
+        metavar="M",
+        help="radius of the robot, m, added to every lidar return",
+    )
     group.add_argument(
         "--scan-yaw",
         type=float,
         metavar="RAD",
-        help="of the scan's frame in the robot's (default: as /tf_static has it)",
+        help="yaw of the scan's frame in the robot's, rad (default: from /tf_static)",
     )
-    group.add_argument("--scan", metavar="TOPIC", help="where there are several")
-    group.add_argument("--odom", metavar="TOPIC", help="where there are several")
+    group.add_argument("--scan", metavar="TOPIC", help="scan topic, if there are several")
+    group.add_argument("--odom", metavar="TOPIC", help="odometry topic, if there are several")
 
 
-def refuse_arguments(bag: Path, found: argparse.Namespace) -> None:
-    """Raise ConfigError for one of them with a bag of ours."""
-    for name in _OWN:
-        if getattr(found, name) is not None:
+def refuse_arguments(bag: Path, parsed: argparse.Namespace) -> None:
+    """Raise ConfigError for one of these arguments with a bag of mfba."""
+    for name in _FOREIGN_ONLY:
+        if getattr(parsed, name) is not None:
             raise ConfigError(
-                f"--{name.replace('_', '-')}: {bag} says that itself; leave it out "
-                "(--set asks what if)"
+                f"--{name.replace('_', '-')}: {bag} contains that already; leave it "
+                "out (--set changes parameters)"
             )
 
 
-def report(bag: Path, found: argparse.Namespace) -> int:
-    """Decide from scratch and print what there is to say; raises BagError for faults."""
-    for name, option in _OURS.items():
-        if getattr(found, name):
+def report(bag: Path, parsed: argparse.Namespace) -> int:
+    """Compute the decisions and print modes and digest. Raises BagError for faults."""
+    for name, option in _NEEDS_OWN_BAG.items():
+        if getattr(parsed, name):
             raise ConfigError(
-                f"{option}: {bag} is not a recording of ours, so there is no world to simulate; "
+                f"{option}: {bag} was not recorded by mfba, so there is no world to simulate; "
                 "leave it out"
             )
-    result = redecide_recording(bag, _robot(found))
-    show_remarks(result)
+    result = redecide_recording(bag, _robot(parsed))
+    print_remarks(result)
     modes = Counter(decision.mode.value for decision in result.decided)
     print("modes: " + ", ".join(f"{mode} {count}" for mode, count in sorted(modes.items())))
-    print(f"from scratch, {len(result.decided)} decisions, digest {result.digest}")
+    print(f"computed: {len(result.decided)} decisions, digest {result.digest}")
     if result.faults:
         raise BagError(
             f"{bag}: {len(result.faults)} faults, the first: {result.faults[0]}; see above"
@@ -73,34 +78,34 @@ def report(bag: Path, found: argparse.Namespace) -> int:
     return 0
 
 
-def _robot(found: argparse.Namespace) -> Robot:
-    from ..ros.node_parameters import VirtualSensorSettings  # a bag of ours does without
+def _robot(parsed: argparse.Namespace) -> Robot:
+    from ..ros.node_parameters import VirtualSensorSettings  # a bag of mfba does not need it
 
-    planner, sensor = with_settings(PlannerParams(), SensorParams(), found.settings)
-    told = {"robot_radius_m": found.robot_radius, "scan_yaw": found.scan_yaw}
-    given = VirtualSensorSettings(**{k: v for k, v in told.items() if v is not None})
+    planner, sensor = with_settings(PlannerParams(), SensorParams(), parsed.settings)
+    values = {"robot_radius_m": parsed.robot_radius, "scan_yaw": parsed.scan_yaw}
+    settings = VirtualSensorSettings(**{k: v for k, v in values.items() if v is not None})
     return Robot(
-        robot_radius_m=given.robot_radius_m,
-        scan_yaw_rad=found.scan_yaw,
-        goal=_goal(found.goal),
-        scan=found.scan or "",
-        odom=found.odom or "",
+        robot_radius_m=settings.robot_radius_m,
+        scan_yaw_rad=parsed.scan_yaw,
+        goal=_goal(parsed.goal),
+        scan=parsed.scan or "",
+        odom=parsed.odom or "",
         planner=planner,
         sensor=sensor,
-        seed=found.seed or 0,
+        seed=parsed.seed or 0,
     )
 
 
-def _goal(given: list[float] | None) -> Point | None:
-    if given is None:
+def _goal(goal: list[float] | None) -> Point | None:
+    if goal is None:
         return None
-    if not all(map(math.isfinite, given)):
-        raise ConfigError(f"--goal {given[0]} {given[1]}: not finite; give metres in odom")
-    return (given[0], given[1])
+    if not all(map(math.isfinite, goal)):
+        raise ConfigError(f"--goal {goal[0]} {goal[1]}: not finite; give metres in odom")
+    return (goal[0], goal[1])
 
 
-def show_remarks(report: Report | Redecided, robot: str = NO_NAMESPACE) -> None:
-    """Notes, then faults, not too many of them."""
+def print_remarks(report: Report | Redecided, robot: str = NO_NAMESPACE) -> None:
+    """Print the notes, then at most SHOWN faults."""
     for note in report.notes:
         print(of_robot(robot, f"note: {note}"))
     for fault in report.faults[:SHOWN]:

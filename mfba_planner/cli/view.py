@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba view`: runs in Rerun's viewer; needs no ROS."""
+"""`mfba view`: show runs in Rerun's viewer, or save them for it; needs no ROS."""
 
 from __future__ import annotations
 
@@ -8,24 +8,27 @@ from pathlib import Path
 from ..core.argument_parser import Parser
 from .named_episodes import add_paths, named_episodes
 
-_DESCRIPTION = """Watch runs in Rerun's viewer (pip install 'mfba_planner[view]'): the world in
-motion, the decisions in words, clearance and speed; play and scrub on sim_time or tick."""
+_DESCRIPTION = """Show runs in Rerun's viewer (pip install 'mfba_planner[view]'): the moving world,
+decisions as text, clearance and speed, with playback on sim_time or tick."""
 
 
 def main(args: list[str]) -> int:
-    """Open the viewer, or write what it opens."""
+    """Open the viewer, or write a file for it."""
     parser = Parser(prog="mfba view", description=_DESCRIPTION)
     add_paths(parser)
     parser.add_argument(
-        "--save", type=Path, metavar="RRD", help="file to create instead, for `rerun RRD`"
+        "--save",
+        type=Path,
+        metavar="RRD",
+        help="write this file instead of opening the viewer; open it with `rerun RRD`",
     )
-    found = parser.parse(args)
-    runs, roster = named_episodes(found.paths, found.robots)
+    parsed = parser.parse(args)
+    runs, fleet_names = named_episodes(parsed.paths, parsed.robots)
     from ..report.rerun_viewer import save, show
 
-    if found.save is None:
-        show(runs, roster)
+    if parsed.save is None:
+        show(runs, fleet_names)
         return 0
-    save(runs, found.save, roster)
-    print(f"wrote {found.save}")
+    save(runs, parsed.save, fleet_names)
+    print(f"wrote {parsed.save}")
     return 0

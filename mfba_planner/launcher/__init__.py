@@ -3,7 +3,7 @@
 
 
 def main(args: list[str], prog: str = "launcher") -> int:
-    """Run what args order; return the exit code. MfbaErrors pass through."""
+    """Make the run that args describe; return the exit code. MfbaErrors pass through."""
     from .execute_run import execute
     from .run_arguments import read_request
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the user sees of a run: whole lines, prefixed by who says them, and how far it is."""
+"""Console output of a run: the nodes' lines with their names, and the progress line."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from pathlib import Path
 from threading import Lock
 from typing import IO, Any
 
-PLAIN_PERIOD_S = 2.0  # between two lines of progress where they cannot be overwritten
+PLAIN_PERIOD_S = 2.0  # between two lines of progress where a line cannot be overwritten
 LIVE_PERIOD_S = 0.1
 
 
 class RunConsole:
-    """Standard output, and a log file once there is a place for it.
+    """Standard output, and a log file after log_to.
 
-    On a terminal progress is one line that is overwritten, otherwise a line now and then.
+    On a terminal, progress is one line that is overwritten; otherwise a line every 2 s.
     """
 
     def __init__(self) -> None:
-        """Look what standard output is."""
+        """Choose the form of progress by what standard output is."""
         self._lock = Lock()
         self._log: IO[str] | None = None
         self._live: Any = None
@@ -29,8 +29,8 @@ class RunConsole:
         self._period_s = LIVE_PERIOD_S if sys.stdout.isatty() else PLAIN_PERIOD_S
 
     def log_to(self, path: Path) -> None:
-        """Write all lines of nodes into a new file too."""
-        self._log = open(path, "x", encoding="utf-8")  # noqa: SIM115  (open as long as we are)
+        """Write the nodes' lines into a new file as well."""
+        self._log = open(path, "x", encoding="utf-8")  # noqa: SIM115  (close() closes it)
 
     def close(self) -> None:
         """End the progress line and the log file."""
@@ -43,26 +43,26 @@ class RunConsole:
                     self._log.close()
                 self._log = None
 
-    def line(self, who: str, text: str) -> None:
-        """Show a node's line; from any thread, and never torn apart."""
-        line = f"[{who}] {text}"
-        with self._lock, suppress(OSError):  # a full disk or a closed pipe is no node's fault
+    def print_node_line(self, node: str, text: str) -> None:
+        """Print a node's line, whole; may be called from any thread."""
+        line = f"[{node}] {text}"
+        with self._lock, suppress(OSError):  # a full disk or a closed pipe must not end a node
             if self._log is not None:
                 self._log.write(f"{line}\n")
                 self._log.flush()
             self._print(line)
 
-    def say(self, text: str) -> None:
-        """Show a line of our own."""
+    def print_line(self, text: str) -> None:
+        """Print a line of the launcher."""
         with self._lock:
             self._print(text)
 
-    def wants_progress(self) -> bool:
-        """Whether it is time for the next progress."""
+    def is_progress_due(self) -> bool:
+        """Whether the next progress line is due."""
         return time.monotonic() - self._shown_at >= self._period_s
 
-    def progress(self, text: str) -> None:
-        """Show how far the run is."""
+    def show_progress(self, text: str) -> None:
+        """Print the progress line."""
         self._shown_at = time.monotonic()
         with self._lock:
             if self._period_s == PLAIN_PERIOD_S:
@@ -90,7 +90,7 @@ def _live_line() -> Any:
 
 
 def _plain(text: str) -> Any:
-    """Text that rich takes literally."""
+    """Text without rich's markup."""
     from rich.text import Text
 
     return Text(text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From an Order to its exit code: drive, read what was recorded, judge."""
+"""Execute a RunRequest: run a driver, read the recording, write the result, exit code."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ from .stop_request import StoppedError, StopRequest
 def execute(request: RunRequest) -> int:
     """Make the run; return 0 for the goal without collision, 128 + number for a signal.
 
-    Raises MfbaError, in one line, for any other end. A run that never began leaves nothing
-    behind; of one that failed later there is whatever could be recorded.
+    Raises MfbaError, in one line, for any other end. A run that fails before its start leaves no
+    files; one that fails later leaves what was recorded.
     """
     episode: Episode | None = None
     failure: MfbaError | StoppedError | None = None
     with StopRequest(request.timeout_s) as stop, closing(RunConsole()) as console:
         run = Run(request, RunDirectory(request.out), console, stop)
         try:
-            episode = _drive(run)
+            episode = _run_driver(run)
             failure = run.stopped
         except (MfbaError, StoppedError) as error:
             failure = error
         finally:
-            if not run.has_begun:
+            if not run.has_started:
                 run.directory.discard()
     if failure is None:
-        _conclude(run, episode)
+        _finish(run, episode)
         return 0
-    if run.has_begun:
-        with suppress(BagError):  # nothing to tell of; the failure is told below
-            _conclude(run, episode, str(failure))
+    if run.has_started:
+        with suppress(BagError):  # nothing recorded; the failure is reported below
+            _finish(run, episode, str(failure))
     return _fail(failure, run)
 
 
-def _conclude(run: Run, episode: Episode | None, failure: str = "") -> None:
-    """Leave what is left of a run; judge and show it unless it failed."""
+def _finish(run: Run, episode: Episode | None, failure: str = "") -> None:
+    """Write the results of a run; check the outcome and open the viewer unless it failed."""
     if run.request.config.scenario.robots:
         finish_fleet_run(run, failure)
         return
@@ -58,11 +58,11 @@ def _conclude(run: Run, episode: Episode | None, failure: str = "") -> None:
         from ..report.rerun_viewer import show
 
         show([(run_result.directory.name, run_result.episode)])
-    run_result.judge()
+    run_result.require_success()
 
 
-def _drive(run: Run) -> Episode | None:
-    """Let the ordered driver make the run; return the episode where there is no bag."""
+def _run_driver(run: Run) -> Episode | None:
+    """Run the requested driver; return the episode where no bag is written."""
     config = run.request.config
     if config.driver is Driver.MULTI_PROCESS:
         from .multi_process import run_multi_process
@@ -72,13 +72,13 @@ def _drive(run: Run) -> Episode | None:
     if config.driver is Driver.IN_PROCESS:
         _run_in_process(run)
         return None
-    run.begin()
+    run.start()
     episode = simulate(
         config.scenario,
         planner=config.planner,
         sensor=config.sensor,
         seed=config.seed,
-        go_on=run.go_on,
+        go_on=run.should_continue,
     )
     run.end()
     return episode
@@ -94,14 +94,14 @@ def _run_in_process(run: Run) -> None:
             run.directory.bag,
             domain_id=domain,
             timeout_s=run.request.timeout_s,
-            on_turn=run.go_on,
+            on_turn=run.should_continue,
         )
 
 
 def _fail(failure: MfbaError | StoppedError, run: Run) -> int:
-    """Say why in one line, and where to look; return the exit code unless it is 1."""
-    where = f"; what was recorded is in {run.directory.path}" if run.has_begun else ""
+    """Report the failure and the directory; return the exit code. Raises MfbaError for 1."""
+    location = f"; what was recorded is in {run.directory.path}" if run.has_started else ""
     if isinstance(failure, StoppedError) and failure.exit_code != 1:
-        print(f"{failure}{where}", file=sys.stderr)
+        print(f"{failure}{location}", file=sys.stderr)
         return failure.exit_code
-    raise MfbaError(f"{failure}{where}") from None
+    raise MfbaError(f"{failure}{location}") from None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is left of a fleet's run: a table, a result file for each robot, the picture, a verdict."""
+"""The result of a fleet's run: table, a JSON file per robot, picture, success or error."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .run import Run
 def finish_fleet_run(run: Run, failure: str = "") -> None:
     """Print the table, write NAME.json for each robot and run.png.
 
-    Raises MfbaError where the run, otherwise fine, was no success, and BagError where the bag
-    holds no decision of a robot or was not closed.
+    Raises MfbaError for a run without success, unless `failure` names another error already.
+    Raises BagError for a bag that lacks a robot's decisions or was not closed.
     """
     from ..report.fleet_figure import draw_fleet
     from ..report.result_json import result_to_dict, write_result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launcher's own ears and voice in the graph: who is ready, how far is it, is it over."""
+"""The launcher's ROS node: asks for readiness, pauses the world, follows the progress."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from ..ros.interface.topics import Topic
 from ..ros.runtime.graph_node import GraphNode
 from ..ros.runtime.polled_subscriptions import PolledSubscriptions
 
-ASK_AGAIN_S = 0.5  # an answer can get lost while client and server still find each other
+RESEND_S = 0.5  # a response can get lost during discovery
 PROGRESS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """How far a run is, by the planner's newest decision."""
+    """The progress of a run, from the planner's newest decision."""
 
     stamp_ns: int
     mode: str
@@ -39,34 +39,34 @@ class Progress:
 
 
 class Question:
-    """A service call that is asked until it is answered; never waited for."""
+    """A service call that is sent again until a response comes; it never blocks."""
 
     def __init__(self, client: Client, request: Any) -> None:
-        """Ask nothing yet."""
+        """Send nothing yet."""
         self._client = client
         self._request = request
         self._future: Any = None
-        self._asked_at = 0.0
+        self._sent_at = 0.0
 
     def answer(self) -> Any:
-        """The newest answer, once; None while there is none."""
+        """Return the response, once; None while there is none."""
         now = time.monotonic()
         if self._future is not None and self._future.done():
-            answer, self._future = self._future.result(), None
-            return answer
-        if self._future is not None and now - self._asked_at > ASK_AGAIN_S:
+            response, self._future = self._future.result(), None
+            return response
+        if self._future is not None and now - self._sent_at > RESEND_S:
             self._client.remove_pending_request(self._future)
             self._future = None
         if self._future is None and self._client.service_is_ready():
-            self._future, self._asked_at = self._client.call_async(self._request), now
+            self._future, self._sent_at = self._client.call_async(self._request), now
         return None
 
 
 class Monitor:
-    """A node beside the graph, which the graph does not wait for."""
+    """A ROS node that watches the run; no other node waits for it."""
 
     def __init__(self, domain_id: int, robots: Sequence[str] = (NO_NAMESPACE,)) -> None:
-        """Join the domain; robots are the namespaces of those that are watched."""
+        """Join the domain; robots are the namespaces to watch."""
         self._context = Context()
         self._context.init(domain_id=domain_id)
         self._node = GraphNode(
@@ -79,7 +79,7 @@ class Monitor:
         self._executor.add_node(self._node)
         self._pause = self._node.create_client(SetBool, f"{topics.WORLD_SIM}/pause")
         self._robots = robots
-        self._polled = PolledSubscriptions()  # nothing wakes us up for every message of the run
+        self._polled = PolledSubscriptions()  # no wake-up for every message of the run
         self._decisions: dict[str, bytes] = {}
         self._ticks: dict[str, int] = {}
 
@@ -93,39 +93,39 @@ class Monitor:
         self._context.destroy()
 
     def spin(self, timeout_s: float) -> None:
-        """Take in one answer that comes within timeout_s, and the newest of everything."""
+        """Handle one service response within timeout_s, and the newest message of each topic."""
         self._executor.spin_once(timeout_sec=timeout_s)
         self.take_in()
 
     def take_in(self) -> None:
-        """Take in the newest of everything, now: the run must not be waited upon."""
+        """Take the newest message of each topic, without waiting."""
         self._polled.poll()
 
     def ask_ready(self, nodes: Iterable[str]) -> dict[str, Question]:
-        """A question to ~/ready of each node."""
+        """A call of ~/ready for each node."""
         return {
             name: Question(self._node.create_client(Trigger, f"{name}/ready"), Trigger.Request())
             for name in nodes
         }
 
     def ask_pause(self, paused: bool) -> Question:
-        """The order to world_sim to stand still or to go on."""
+        """A call of world_sim/pause, to pause or to resume."""
         return Question(self._pause, SetBool.Request(data=paused))
 
     def listen(self) -> None:
-        """Begin to hear the run: only now, or readiness would count these subscriptions."""
+        """Subscribe to the run; only when all are ready, or readiness would wait for this node."""
         for robot in self._robots:
-            self._open(robot, topics.DECISION, PROGRESS_QOS, self._on_decision)
-            self._open(robot, topics.OUTCOME, topics.OUTCOME.qos, self._on_outcome)
+            self._subscribe(robot, topics.DECISION, PROGRESS_QOS, self._on_decision)
+            self._subscribe(robot, topics.OUTCOME, topics.OUTCOME.qos, self._on_outcome)
 
-    def _open(
-        self, robot: str, topic: Topic, qos: QoSProfile, deliver: Callable[[str, bytes], None]
+    def _subscribe(
+        self, robot: str, topic: Topic, qos: QoSProfile, handle: Callable[[str, bytes], None]
     ) -> None:
         self._node.subscribe_polled(
             self._polled,
             topic.type,
             below(robot, topic).name,
-            lambda letter: deliver(robot, letter.data),
+            lambda message: handle(robot, message.data),
             [qos],
         )
 
@@ -138,15 +138,15 @@ class Monitor:
             self._ticks[robot] = int(status.values[0].value)
 
     def ticks_at_end(self) -> dict[str, int] | None:
-        """How many ticks each robot had; None while one is under way."""
+        """Each robot's number of ticks; None while a robot still drives."""
         return self._ticks if len(self._ticks) == len(self._robots) else None
 
     def stamps_ns(self) -> dict[str, int]:
-        """What each robot has decided on last, by its stamp."""
+        """The stamp of each robot's last decision, ns."""
         return {robot: header_stamp_ns(data) for robot, data in self._decisions.items()}
 
     def progress(self) -> Progress | None:
-        """How far the run is, by the robot that has farthest to go; None before any decision."""
+        """The progress of the robot farthest from its goal; None before the first decision."""
         return max(
             map(_progress, self._decisions.values()), key=lambda p: p.distance_m, default=None
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The in-process driver: the whole graph on one executor, over real DDS."""
+"""The in-process driver: all nodes on one executor in this process, over real DDS."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ KINDS: dict[str, Callable[..., GraphNode]] = {
     topics.PLANNER: PlannerNode,
 }
 
-# Nobody is there to call them, and the executor waits for each service at every turn.
-_UNATTENDED = {"start_type_description_service": False}
-DRAIN_TURNS = 500  # delivery within a process is synchronous: enough for what is queued
+# No client calls it, and each service makes every spin of the executor slower.
+_NO_EXTRA_SERVICES = {"start_type_description_service": False}
+DRAIN_SPINS = 500  # delivery within a process is synchronous: this empties all queues
 
 
 def run_in_process(
@@ -48,10 +48,10 @@ def run_in_process(
     timeout_s: float = 600.0,
     on_turn: Callable[[Any], bool] = lambda _: True,
 ) -> float:
-    """Run the graph until goal or time limit; return the seconds the loop took.
+    """Run the graph until goal or time limit; return the wall time of the loop, s.
 
-    bag names the directory to record into, None for no recording. on_turn sees the World, of
-    several robots the Fleet, after every turn of the executor and ends the run by returning
+    bag names the directory to record into, None for no recording. on_turn gets the World, of
+    several robots the Fleet, after every spin of the executor and ends the run by returning
     False. Raises GraphError when the graph does not get ready or does not finish in time.
     """
     context = Context()
@@ -60,19 +60,21 @@ def run_in_process(
         stack.callback(context.destroy)
         stack.callback(context.try_shutdown)
         peers = (*NODES, topics.RECORDER) if bag else NODES
-        told = graph_parameters(config, peers)
-        wanted = list(told)
+        node_parameters = graph_parameters(config, peers)
+        recorded_nodes = list(node_parameters)
         if bag:
-            told = {topics.RECORDER: recorder_parameters(config, str(bag))} | told
+            node_parameters = {
+                topics.RECORDER: recorder_parameters(config, str(bag))
+            } | node_parameters
         executor = make_executor(context)
         stack.callback(executor.shutdown)
         nodes: dict[str, Any] = {}
-        for name, values in told.items():
-            namespace, _, which = name.rpartition("/")
-            node = KINDS[which](
+        for name, values in node_parameters.items():
+            namespace, _, program = name.rpartition("/")
+            node = KINDS[program](
                 context=context,
                 namespace=namespace,
-                parameter_overrides=_overrides(values | _UNATTENDED),
+                parameter_overrides=_overrides(values | _NO_EXTRA_SERVICES),
                 start_parameter_services=False,
             )
             stack.callback(node.destroy_node)
@@ -82,7 +84,7 @@ def run_in_process(
         world: WorldSim = nodes[topics.WORLD_SIM]
         if bag:
             recorder: Recorder = nodes[topics.RECORDER]
-            recorder.attach_parameters({name: parameters.values(nodes[name]) for name in wanted})
+            recorder.attach_parameters({name: parameters.values(nodes[name]) for name in recorded_nodes})
         _spin(
             executor,
             lambda: not _missing(nodes),
@@ -97,13 +99,12 @@ def run_in_process(
             timeout_s,
             lambda: f"tick {world.world.tick} after {timeout_s:g} s",
         )
-        took_s = time.perf_counter() - started
-        world.tick_control.paused = (
-            True  # so that the present tick is answered and no other follows
-        )
-        for _ in range(DRAIN_TURNS):
+        wall_s = time.perf_counter() - started
+        # The planner still commands the present tick; no further tick follows.
+        world.tick_control.paused = True
+        for _ in range(DRAIN_SPINS):
             executor.spin_once(timeout_sec=0.0)
-        return took_s
+        return wall_s
 
 
 def _spin(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments and nodes in the words of `launch`, which is no wheel: for launch/*.py alone."""
+"""LaunchArgument and NodeStart as actions of ROS's `launch` (not on PyPI), for launch/*.py."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from .robot_launch import Start
-from .simulate_launch import Argument
+from .robot_launch import NodeStart
+from .simulate_launch import LaunchArgument
 
 
-def describe(
-    arguments: Mapping[str, Argument], starts: Callable[[Mapping[str, str]], list[Start]]
+def make_description(
+    arguments: Mapping[str, LaunchArgument],
+    node_starts: Callable[[Mapping[str, str]], list[NodeStart]],
 ) -> LaunchDescription:
-    """Declare the arguments and start what they lead to; when one node ends, so do all."""
+    """Declare the arguments and start the nodes; when one node ends, all are shut down."""
     declared = [
         DeclareLaunchArgument(
             name,
@@ -34,28 +35,28 @@ def describe(
     def nodes(context: LaunchContext) -> list[Node]:
         given = {name: LaunchConfiguration(name).perform(context) for name in arguments}
         namespace = given.get("namespace", "")
-        return [_node(start, namespace) for start in starts(given)]
+        return [_node(start, namespace) for start in node_starts(given)]
 
     return LaunchDescription([*declared, OpaqueFunction(function=nodes)])
 
 
-def _node(start: Start, namespace: str) -> Node:
+def _node(start: NodeStart, namespace: str) -> Node:
     above, _, program = start.name.rpartition("/")
     return Node(
         package="mfba_planner",
         executable=program,
         name=program,
-        namespace="/".join(part for part in (namespace, above) if part),
+        namespace="/".join(name for name in (namespace, above) if name),
         output="screen",
-        parameters=[_literally(start.parameters), *start.files],
+        parameters=[_keep_strings(start.parameters), *start.files],
         remappings=list(start.remaps),
         arguments=list(start.arguments),
         on_exit=Shutdown(reason=f"{start.name} has ended"),
     )
 
 
-def _literally(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Keep texts texts: launch would read them as YAML."""
+def _keep_strings(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Mark strings as strings: launch would parse them as YAML."""
     return {
         name: ParameterValue(value, value_type=str) if isinstance(value, str) else value
         for name, value in parameters.items()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One node as a process of its own: started, listened to, stopped for certain."""
+"""One node as a child process: start, read its output, signal it, wait for its exit."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from threading import Thread
 
 LAST_LINES = 8
 
-# As multiprocessing does it: the child searches where the launcher does, so a checkout, a pip
-# and a colcon installation all work, from any directory.
+# As multiprocessing does: the child gets the launcher's sys.path, so a checkout, a pip and a
+# colcon installation all work, from any directory.
 _BOOT = """\
 import sys
 sys.path[:] = {path!r}
@@ -26,8 +26,8 @@ sys.exit(entry_points.{program}())
 _LOGGING = {
     "RCUTILS_CONSOLE_OUTPUT_FORMAT": "{severity}: {message}",
     "RCUTILS_COLORIZED_OUTPUT": "0",
-    "RCUTILS_LOGGING_BUFFERED_STREAM": "1",  # by lines, or the last ones die with the node
-    # While nodes still find each other answers get lost; we ask again until one comes.
+    "RCUTILS_LOGGING_BUFFERED_STREAM": "1",  # by lines, or a killed node loses its last ones
+    # Responses get lost during discovery; graph_monitor sends the request again.
     "PYTHONWARNINGS": "ignore:failed to send response:RuntimeWarning",
 }
 
@@ -36,7 +36,7 @@ class NodeProcess:
     """A running node; its output goes to sink(name, line), line by line."""
 
     def __init__(self, name: str, args: list[str], sink: Callable[[str, str], None]) -> None:
-        """Start a program of entry_points.py with args; name is its own, or NAMESPACE/its own."""
+        """Start a program of entry_points.py; name is PROGRAM or NAMESPACE/PROGRAM."""
         namespace, _, program = name.rpartition("/")
         if namespace:
             args = [*args, "-r", f"__ns:=/{namespace}"]
@@ -50,13 +50,13 @@ class NodeProcess:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             env={**_LOGGING, **os.environ},
-            # A Ctrl-C must reach the launcher only, which then ends its children in order.
+            # Ctrl-C must reach the launcher only, which then ends the nodes: the recorder first.
             start_new_session=True,
         )
-        self._listener = Thread(target=self._listen, args=(sink,), daemon=True)
-        self._listener.start()
+        self._reader = Thread(target=self._read_output, args=(sink,), daemon=True)
+        self._reader.start()
 
-    def _listen(self, sink: Callable[[str, str], None]) -> None:
+    def _read_output(self, sink: Callable[[str, str], None]) -> None:
         assert self.process.stdout is not None
         with self.process.stdout as pipe:
             for raw in pipe:
@@ -69,8 +69,8 @@ class NodeProcess:
         """Whether the process still runs."""
         return self.process.poll() is None
 
-    def how_it_ended(self) -> str:
-        """How the process ended, in words."""
+    def describe_exit(self) -> str:
+        """Exit code or signal, as text."""
         code = self.process.poll()
         if code is None:
             return "still running"
@@ -81,15 +81,15 @@ class NodeProcess:
         except ValueError:
             return f"killed by signal {-code}"
 
-    def tell(self, signum: signal.Signals) -> None:
-        """Send a signal; nothing when it has ended."""
-        self.process.send_signal(signum)  # knows about processes that have ended
+    def send_signal(self, signum: signal.Signals) -> None:
+        """Send a signal; no effect when the process has ended."""
+        self.process.send_signal(signum)
 
-    def ended_within(self, timeout_s: float) -> bool:
-        """Wait for the end, and for the last of its output."""
+    def wait_for_exit(self, timeout_s: float) -> bool:
+        """Wait for the exit and for the last output; False after timeout_s."""
         try:
             self.process.wait(max(0.0, timeout_s))
         except subprocess.TimeoutExpired:
             return False
-        self._listener.join(1.0)  # a process it started may still hold the pipe
+        self._reader.join(1.0)  # a process it started may still hold the pipe
         return True

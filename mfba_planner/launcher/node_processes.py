@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All nodes of a run: parameters handed out, deaths noticed, and nobody left behind."""
+"""All node processes of a run: parameter files, start, check that they run, stop."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ..core.errors import GraphError
 from ..scenarios.run_config import Parameters
 from .node_process import NodeProcess
 
-RECORDER_GRACE_S = 20.0  # it still writes what it has received
-GRACE_S = 10.0  # on a machine with far too much to do; a killed node counts as a failure
-MORE_EACH_S = 1.0  # they end all at once, and each hears of each
+RECORDER_GRACE_S = 20.0  # it first writes what it has received
+GRACE_S = 10.0  # enough on an overloaded machine; a killed node counts as a failure
+MORE_EACH_S = 1.0  # all end at once, and DDS notifies each node of the others' end
 
 
 class NodeProcesses:
-    """The nodes' processes, as a context: whatever happens inside, all of them end with it."""
+    """The node processes, as a context manager: all of them end with it, after errors too."""
 
-    def __init__(self, sink: Callable[[str, str], None], hurry: Callable[[], bool]) -> None:
-        """Send output to sink; hurry says that nobody wants to wait for orderly ends."""
+    def __init__(self, sink: Callable[[str, str], None], kill_at_once: Callable[[], bool]) -> None:
+        """Send output to sink; when kill_at_once() is true, stop() kills without waiting."""
         self.children: list[NodeProcess] = []
         self._sink = sink
-        self._hurry = hurry
+        self._kill_at_once = kill_at_once
         self._files = tempfile.TemporaryDirectory(prefix="mfba_")
 
     def __enter__(self) -> NodeProcesses:
@@ -39,37 +39,38 @@ class NodeProcesses:
         self.stop()
         failed = [child for child in stopped if child.process.returncode != 0]
         if failed and kind is None:
-            raise GraphError(_death_message(failed[0]))
+            raise GraphError(_exit_message(failed[0]))
 
-    def start(self, told: Parameters, more: Mapping[str, list[str]]) -> None:
-        """Start a node per entry of told, in that order; more holds further --ros-args.
+    def start(self, parameters: Parameters, extra_args: Mapping[str, list[str]]) -> None:
+        """Start a node per entry of parameters, one after the other.
 
-        NAMESPACE/planner is a planner in a namespace; what planner is told further, it is told.
+        Names are NODE or NAMESPACE/NODE. extra_args holds more --ros-args by NODE, for all
+        namespaces.
         """
-        for name, parameters in told.items():
+        for name, values in parameters.items():
             path = Path(self._files.name) / f"{name.replace('/', '.')}.yaml"
-            path.write_text(parameters_yaml(parameters), encoding="utf-8")
+            path.write_text(parameters_yaml(values), encoding="utf-8")
             args = ["--ros-args", "--disable-external-lib-logs", "--params-file", str(path)]
-            args += more.get(name.rpartition("/")[2], [])
+            args += extra_args.get(name.rpartition("/")[2], [])
             self.children.append(NodeProcess(name, args, self._sink))
 
-    def forget_parameters(self) -> None:
-        """Remove the parameter files: every node has read its own."""
+    def remove_parameter_files(self) -> None:
+        """Remove the parameter files; call it when every node has read its own."""
         self._files.cleanup()
 
-    def has(self, name: str) -> bool:
+    def is_running(self, name: str) -> bool:
         """Whether a node of that name runs."""
         return any(child.is_alive for child in self.children if child.name == name)
 
     def check(self) -> None:
-        """Raise GraphError for a node that has ended, with what it said last."""
+        """Raise GraphError for a node that has ended, with its last line of output."""
         for child in self.children:
             if not child.is_alive:
-                child.ended_within(1.0)  # now, but for its last lines
-                raise GraphError(_death_message(child))
+                child.wait_for_exit(1.0)  # it has ended: this reads its last lines
+                raise GraphError(_exit_message(child))
 
     def stop(self) -> None:
-        """End all: the recorder first, while those it hears are there, then the others."""
+        """End all: the recorder first, while its publishers still run, then the others."""
         children, self.children = self.children, []
         recorders = [child for child in children if child.name == "recorder"]
         self._end(recorders, RECORDER_GRACE_S)
@@ -79,23 +80,23 @@ class NodeProcesses:
 
     def _end(self, children: list[NodeProcess], grace_s: float) -> None:
         for child in children:
-            child.tell(SIGTERM)
+            child.send_signal(SIGTERM)
         deadline = time.monotonic() + grace_s
-        while not all(child.ended_within(0.05) for child in children):
-            if self._hurry() or time.monotonic() > deadline:
+        while not all(child.wait_for_exit(0.05) for child in children):
+            if self._kill_at_once() or time.monotonic() > deadline:
                 for child in children:
-                    child.tell(SIGKILL)
+                    child.send_signal(SIGKILL)
                 deadline += grace_s
 
 
-def parameters_yaml(parameters: Mapping[str, Any]) -> str:
-    """A --params-file for whatever name the node has; floats keep their point."""
-    content = {"/**": {"ros__parameters": dict(parameters)}}
+def parameters_yaml(values: Mapping[str, Any]) -> str:
+    """The text of a --params-file for any node name; floats keep their point."""
+    content = {"/**": {"ros__parameters": dict(values)}}
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=2**31)
 
 
-def _death_message(child: NodeProcess) -> str:
-    said = [line for line in child.last_lines if line]
-    # A node that refuses something says it in its last line.
-    last = f"; it said last: {said[-1]}" if said else " without a word"
-    return f"{child.name} ended ({child.how_it_ended()}){last}"
+def _exit_message(child: NodeProcess) -> str:
+    lines = [line for line in child.last_lines if line]
+    # A node that refuses its arguments prints the reason in its last line.
+    last = f"; last line: {lines[-1]}" if lines else " without output"
+    return f"{child.name} ended ({child.describe_exit()}){last}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What planner.launch.py and replay.launch.py offer and start; tested without launch."""
+"""Arguments and nodes of planner.launch.py and replay.launch.py; needs no `launch`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.resources import config_path
-from .simulate_launch import Argument
+from .simulate_launch import LaunchArgument
 
 TRUE_OR_FALSE = ("true", "false")
 ENABLED = {"true": True, "false": False}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
-    """How one node is started; of parameters and files, the later has the last word.
+class NodeStart:
+    """How one node is started; files override parameters, later files override earlier ones.
 
-    name is a program's, or NAMESPACE/it.
+    name is PROGRAM or NAMESPACE/PROGRAM.
     """
 
     name: str
@@ -31,21 +31,21 @@ class Start:
 
 
 PLANNER_ARGUMENTS = {
-    "params_file": Argument("", "a --params-file of both nodes; empty: config/planner.yaml"),
-    "namespace": Argument("", "namespace of both nodes and their topics"),
-    "use_sim_time": Argument("false", "time comes from /clock", TRUE_OR_FALSE),
-    "autostart": Argument("true", "activate the planner at once", TRUE_OR_FALSE),
-    "scan": Argument("scan", "topic of the lidar (sensor_msgs/LaserScan)"),
-    "odom": Argument("odom", "topic of the odometry (nav_msgs/Odometry)"),
-    "cmd_vel": Argument("cmd_vel", "topic of the velocity that is commanded"),
-    "goal_pose": Argument("goal_pose", "topic of a goal (RViz: 2D Goal Pose)"),
-    "waypoints": Argument("waypoints", "topic of goals in a row (nav_msgs/Path)"),
-    "stamped": Argument("false", "cmd_vel is a TwistStamped, as in Nav2", TRUE_OR_FALSE),
+    "params_file": LaunchArgument("", "a --params-file of both nodes; empty: config/planner.yaml"),
+    "namespace": LaunchArgument("", "namespace of both nodes and their topics"),
+    "use_sim_time": LaunchArgument("false", "time comes from /clock", TRUE_OR_FALSE),
+    "autostart": LaunchArgument("true", "activate the planner at once", TRUE_OR_FALSE),
+    "scan": LaunchArgument("scan", "topic of the lidar (sensor_msgs/LaserScan)"),
+    "odom": LaunchArgument("odom", "topic of the odometry (nav_msgs/Odometry)"),
+    "cmd_vel": LaunchArgument("cmd_vel", "topic of the velocity command"),
+    "goal_pose": LaunchArgument("goal_pose", "topic of a goal (RViz: 2D Goal Pose)"),
+    "waypoints": LaunchArgument("waypoints", "topic of a sequence of goals (nav_msgs/Path)"),
+    "stamped": LaunchArgument("false", "cmd_vel is a TwistStamped, as in Nav2", TRUE_OR_FALSE),
 }
 
 
-def robot(given: Mapping[str, str]) -> list[Start]:
-    """virtual_sensor on a lidar's scan, and planner. InputError for a file that is not there."""
+def robot_nodes(given: Mapping[str, str]) -> list[NodeStart]:
+    """virtual_sensor on a lidar's scan, and planner. InputError for a missing params_file."""
     files = (_params_file(given["params_file"]),)
     sim_time = {"use_sim_time": ENABLED[given["use_sim_time"]]}
 
@@ -53,13 +53,13 @@ def robot(given: Mapping[str, str]) -> list[Start]:
         return tuple((name, given[name]) for name in names if given[name] != name)
 
     return [
-        Start(
+        NodeStart(
             name="virtual_sensor",
             parameters={**sim_time, "source": "scan"},
             files=files,
             remaps=remaps("scan", "odom"),
         ),
-        Start(
+        NodeStart(
             name="planner",
             parameters={
                 **sim_time,
@@ -73,36 +73,36 @@ def robot(given: Mapping[str, str]) -> list[Start]:
 
 
 REPLAY_ARGUMENTS = {
-    "bag": Argument("", "bag directory or .mcap file; must be given"),
-    "rate": Argument("1.0", "bag seconds per second"),
-    "start_offset": Argument("0.0", "skip so many seconds"),
-    "loop": Argument("false", "begin again at the end", TRUE_OR_FALSE),
-    "clock": Argument("0.0", "publish /clock so many times a second; 0: not at all"),
-    "planner": Argument(
-        "false", "start a planner that decides again on the bag's odom and sectors", TRUE_OR_FALSE
+    "bag": LaunchArgument("", "bag directory or .mcap file; must be given"),
+    "rate": LaunchArgument("1.0", "bag seconds per second"),
+    "start_offset": LaunchArgument("0.0", "seconds of the bag to skip"),
+    "loop": LaunchArgument("false", "start again at the end", TRUE_OR_FALSE),
+    "clock": LaunchArgument("0.0", "rate of /clock, Hz; 0: no /clock"),
+    "planner": LaunchArgument(
+        "false", "start a planner that decides from the bag's odom and sectors", TRUE_OR_FALSE
     ),
-    "params_file": Argument("", "a --params-file of that planner; empty: its defaults"),
+    "params_file": LaunchArgument("", "a --params-file of that planner; empty: its defaults"),
 }
 
 
-def replayed(given: Mapping[str, str]) -> list[Start]:
-    """replay, and a planner before it if asked for. InputError without a bag."""
+def replay_nodes(given: Mapping[str, str]) -> list[NodeStart]:
+    """replay, and before it a planner if requested. InputError without a bag."""
     if not given["bag"]:
         raise InputError("bag:= is empty; give a bag directory or .mcap file, bag:=runs/mine/bag")
-    words = [given["bag"], "--rate", given["rate"], "--start-offset", given["start_offset"]]
-    words += ["--clock", given["clock"]] + ["--loop"] * ENABLED[given["loop"]]
+    arguments = [given["bag"], "--rate", given["rate"], "--start-offset", given["start_offset"]]
+    arguments += ["--clock", given["clock"]] + ["--loop"] * ENABLED[given["loop"]]
     if not ENABLED[given["planner"]]:
-        return [Start(name="replay", arguments=tuple(words))]
+        return [NodeStart(name="replay", arguments=tuple(arguments))]
     files = (_params_file(given["params_file"]),) if given["params_file"] else ()
-    words += ["--inputs-of", "planner", "--wait-for-subscribers"]
+    arguments += ["--inputs-of", "planner", "--wait-for-subscribers"]
     return [
-        Start(name="planner", parameters={"lockstep": True}, files=files),
-        Start(name="replay", arguments=tuple(words)),
+        NodeStart(name="planner", parameters={"lockstep": True}, files=files),
+        NodeStart(name="replay", arguments=tuple(arguments)),
     ]
 
 
 def _params_file(given: str) -> str:
     path = Path(given) if given else config_path("planner.yaml")
     if not path.is_file():
-        raise InputError(f"params_file:={given}: not there; give a YAML file")
+        raise InputError(f"params_file:={given}: does not exist; give a YAML file")
     return str(path)

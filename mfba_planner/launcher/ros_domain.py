@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A ROS domain of one's own: nobody else is in it, nobody off this machine hears."""
+"""A private ROS domain: a free domain id, locked, with discovery on this machine only."""
 
 from __future__ import annotations
 
@@ -12,23 +12,22 @@ from pathlib import Path
 
 from ..core.errors import GraphError
 
-# Domains above 101 map to ports that Linux hands out to any program. Each process starts
-# elsewhere and goes round, so that a domain rests after use.
+# Domains above 101 map to ports that Linux gives to any program. Each process starts its search
+# at another id and goes round, so that a domain is not reused at once.
 DOMAINS = range(1, 102)
-FIRST_PORT, PORTS = 7400, 250  # of domain 0, and of every domain: RTPS's port mapping
-_candidates = itertools.islice(itertools.cycle(DOMAINS), os.getpid() % len(DOMAINS), None)
+FIRST_PORT, PORTS = 7400, 250  # first port of domain 0, ports per domain: RTPS port mapping
+_next_domains = itertools.islice(itertools.cycle(DOMAINS), os.getpid() % len(DOMAINS), None)
 
 
 def claim_domain() -> tuple[int, socket.socket]:
-    """Return a ROS domain id that no other holder has, and the lock to close after use.
+    """Return a ROS domain id that is free, and the lock to close after use.
 
     The lock is an abstract socket: the system drops it even after kill -9. A domain that other
-    programs of this machine talk in, a robot's perhaps, is passed over. Raises GraphError when
-    every domain is taken.
+    ROS programs of this machine use is skipped. Raises GraphError when every domain is taken.
     """
-    strange = _inhabited()
-    for domain in itertools.islice(_candidates, len(DOMAINS)):
-        if domain in strange:
+    occupied = _occupied_domains()
+    for domain in itertools.islice(_next_domains, len(DOMAINS)):
+        if domain in occupied:
             continue
         lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
@@ -40,8 +39,8 @@ def claim_domain() -> tuple[int, socket.socket]:
     raise GraphError(f"all {len(DOMAINS)} ROS domains are taken; end other runs first")
 
 
-def _inhabited() -> set[int]:
-    """Domains whose ports are listened on in this network namespace, by whatever DDS."""
+def _occupied_domains() -> set[int]:
+    """Domains with an open port in this network namespace, of any DDS implementation."""
     found: set[int] = set()
     for table in ("udp", "udp6"):
         try:
@@ -54,30 +53,30 @@ def _inhabited() -> set[int]:
 
 
 def require_network(address: str = "127.0.0.1") -> None:
-    """Raise GraphError when not even this machine can be reached: no node would find another."""
+    """Raise GraphError when the loopback interface is down: no node would find another."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect((address, 9))
         except OSError as error:
             raise GraphError(
-                f"{address}: {error.strerror}, so the nodes cannot talk; "
+                f"{address}: {error.strerror}, so the nodes cannot communicate; "
                 "bring the loopback interface up (ip link set lo up)"
             ) from None
 
 
 @contextmanager
 def private_domain() -> Iterator[int]:
-    """Hold a domain, and keep this process and its children to it and to this machine."""
+    """Claim a domain, and set it for this process and its children; discovery is local only."""
     require_network()
     domain, lock = claim_domain()
-    ours = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    theirs = {name: os.environ.get(name) for name in ours}
-    os.environ.update(ours)
+    variables = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    previous = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     with lock:
         try:
             yield domain
         finally:
-            for name, value in theirs.items():
+            for name, value in previous.items():
                 if value is None:
                     del os.environ[name]
                 else:

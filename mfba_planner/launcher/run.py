@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One attempt at a run: what was ordered, where it goes, how far and how fast it is."""
+"""The state of one run, for all drivers: request, directory, console, progress, stop."""
 
 from __future__ import annotations
 
@@ -14,57 +14,57 @@ from .stop_request import StoppedError, StopRequest
 
 
 class Run:
-    """What the three drivers are given."""
+    """One run; each of the three drivers gets one."""
 
     def __init__(
         self, request: RunRequest, directory: RunDirectory, console: RunConsole, stop: StopRequest
     ) -> None:
-        """Nothing has happened yet."""
+        """Keep the arguments; the run has not started."""
         self.request = request
         self.directory = directory
         self.console = console
         self.stop = stop
         self.stopped: StoppedError | None = None
-        self.wall_s: float | None = None  # of the loop, without starting and ending
-        self._began_at: float | None = None
+        self.wall_s: float | None = None  # of the loop only, without start-up and shutdown
+        self._started_at: float | None = None
         self._shown = (0.0, 0)
 
     @property
-    def has_begun(self) -> bool:
-        """Whether the world was let go; before that there is nothing worth keeping."""
-        return self._began_at is not None
+    def has_started(self) -> bool:
+        """Whether the world has started; before that there is nothing to keep."""
+        return self._started_at is not None
 
-    def begin(self) -> None:
-        """The world is let go; again changes nothing."""
-        if self._began_at is None:
-            self._began_at = time.monotonic()
-            self._shown = (self._began_at, 0)
+    def start(self) -> None:
+        """Note that the world has started; a second call has no effect."""
+        if self._started_at is None:
+            self._started_at = time.monotonic()
+            self._shown = (self._started_at, 0)
 
     def end(self) -> None:
-        """The world has come to its end."""
-        if self._began_at is not None:
-            self.wall_s = time.monotonic() - self._began_at
+        """Note that the run has ended."""
+        if self._started_at is not None:
+            self.wall_s = time.monotonic() - self._started_at
 
-    def go_on(self, world: World | Fleet) -> bool:
-        """For drivers that let the world be seen: show it, and say whether to go on."""
-        self.begin()
+    def should_continue(self, world: World | Fleet) -> bool:
+        """Show the progress; return whether the run continues. For drivers in this process."""
+        self.start()
         try:
             self.stop.check()
         except StoppedError as stopped:
             self.stopped = stopped
             return False
-        if self.console.wants_progress():
+        if self.console.is_progress_due():
             self.show(world.tick, world.distance_to_goal_m)
         return True
 
     def show(self, tick: int, distance_m: float, mode: str = "") -> None:
-        """Show how far the run is."""
+        """Print the progress: tick, distance to the goal, mode, ticks per second."""
         now, (then, before) = time.monotonic(), self._shown
         self._shown = (now, tick)
-        parts = [
+        fields = [
             f"tick {tick}",
             f"{distance_m:.2f} m to the goal",
             mode.replace("_", " "),
             f"{(tick - before) / (now - then):.0f} ticks/s" if now > then else "",
         ]
-        self.console.progress(", ".join(part for part in parts if part))
+        self.console.show_progress(", ".join(field for field in fields if field))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run is ordered with: command line arguments turned into one checked Order."""
+"""Command line arguments of a run, and the checked RunRequest that they describe."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from ..swarm.bat_swarm import Algorithm
 from .set_option import add_set_argument, with_robot_settings, with_settings
 
 RECORDER = "recorder"
-# Where discovery stays on this machine, 32 processes find each other and later ones may not (as
-# measured with Fast DDS). A robot is two; recorder, world_sim, launcher and one onlooker are four.
+# With discovery on this machine only, 32 processes find each other, later ones may not (measured
+# with Fast DDS). A robot is two; recorder, world_sim, launcher and one viewer are four.
 MOST_ROBOTS = 14
-PROCESS_GB = 0.05  # without what they share
+PROCESS_GB = 0.05  # without shared memory
 TIMEOUT_S = 600.0
 
 _DESCRIPTION = """\
-Run one episode: a robot crosses a world of moving obstacles to its goal. Leaves a directory
-with the bag, result.json, a picture and, from several processes, their logs.
+Run one episode: a robot drives among moving obstacles to its goal. Writes a directory with the
+bag, result.json, a picture and, with several processes, their log.
 """
 _EPILOG = """\
 exit code: 0 goal reached without collision; 1 anything else, with the reason in one line;
-130 Ctrl-C (what was recorded until then is whole).
+130 Ctrl-C (the recording until then is complete).
 
 examples:
   {prog} case1 --seed 1
@@ -45,7 +45,7 @@ examples:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunRequest:
-    """One run to be made; out is None for a new directory below ./runs."""
+    """One run to make; out is None for a new directory below ./runs."""
 
     config: RunConfig
     out: Path | None = None
@@ -56,14 +56,14 @@ class RunRequest:
 
 
 def read_request(args: list[str], prog: str) -> RunRequest:
-    """Turn a command line into an Order; ConfigError for whatever cannot be accepted."""
+    """Turn a command line into a RunRequest; ConfigError for whatever cannot be accepted."""
     parser = Parser(prog=prog, description=_DESCRIPTION, epilog=_EPILOG.format(prog=prog))
     add_world_arguments(parser)
     driver = parser.add_argument_group("driver")
     driver.add_argument(
         "--driver",
         choices=[member.value for member in Driver],
-        help="who turns the loop; the decisions are the same (default: multi-process, of "
+        help="how the nodes run; the decisions are the same (default: multi-process, for "
         "several robots in-process)",
     )
     driver.add_argument(
@@ -79,8 +79,8 @@ def read_request(args: list[str], prog: str) -> RunRequest:
         "--timeout",
         type=float,
         metavar="SECONDS",
-        help=f"give up after so much wall time (default: {TIMEOUT_S:g}, or what the scenario's "
-        "time limit takes in real time if that is more)",
+        help=f"end the run after this wall time (default: {TIMEOUT_S:g}, or more if the "
+        "scenario's time limit takes longer in real time)",
     )
     for node in (*NODES, RECORDER):
         driver.add_argument(
@@ -96,13 +96,13 @@ def read_request(args: list[str], prog: str) -> RunRequest:
     )
     output.add_argument("--no-picture", action="store_true", help="leave out run.png")
     output.add_argument(
-        "--view", action="store_true", help="open the run in Rerun's viewer when it is over"
+        "--view", action="store_true", help="open the run in Rerun's viewer at its end"
     )
-    return _order(parser.parse(args))
+    return _build_request(parser.parse(args))
 
 
 def add_world_arguments(parser: argparse.ArgumentParser) -> None:
-    """What decides how an episode goes, whoever turns the loop."""
+    """Add the arguments that define an episode, for any driver: scenario, seed, planner, --set."""
     parser.add_argument(
         "scenario",
         nargs="?",
@@ -110,78 +110,78 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENARIO",
         help="a name that `mfba scenarios` lists, or a .yaml file (default: %(default)s)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of all randomness (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of all randomness (default: 0)")
     parser.add_argument(
         "--algorithm", choices=[a.value for a in Algorithm], help="mfba (default) or plain ba"
     )
     parser.add_argument(
         "--reading",
         metavar="NAME",
-        help="how the paper's path planning is read: "
+        help="interpretation of the paper's path planning: "
         f"{', '.join(readings.PLANNERS)} (default: {readings.DEFAULT_METHOD})",
     )
     parser.add_argument(
         "--planner",
         choices=[method.value for method in Method],
-        help="who decides: Algorithm 1, or our planner that predicts, with its own step and swarm "
+        help="paper: Algorithm 1; predictive: predicts obstacles, with its own step and swarm "
         f"(default: {DEFAULT_METHOD.value}; "
         f"{Method.PAPER.value} with --algorithm, --reading or --swarm)",
     )
     parser.add_argument(
         "--swarm",
         metavar="NAME",
-        help=f"how the paper's eq. 3-10 are read: {', '.join(readings.SWARMS)}",
+        help=f"interpretation of the paper's eq. 3-10: {', '.join(readings.SWARMS)}",
     )
     add_set_argument(parser)
 
 
-def read_config(found: argparse.Namespace, **more: Any) -> RunConfig:
-    """The RunConfig that add_world_arguments' values describe; later ones override earlier."""
-    planner = readings.planner(found.reading or readings.DEFAULT_METHOD)
-    if found.swarm:
-        planner = replace(planner, bat=readings.swarm(found.swarm))
-    if found.algorithm:
-        planner = override(planner, {"bat.algorithm": found.algorithm})
-    algorithm_1 = any((found.algorithm, found.reading, found.swarm))
-    planner = params_for_method(found.planner, planner, algorithm_1=algorithm_1)
-    scenario = load_scenario(found.scenario)
-    robot, others = with_robot_settings(scenario.robot, found.settings)
+def read_config(parsed: argparse.Namespace, **more: Any) -> RunConfig:
+    """The RunConfig of the arguments, applied as reading, swarm, algorithm, planner, --set."""
+    planner = readings.planner(parsed.reading or readings.DEFAULT_METHOD)
+    if parsed.swarm:
+        planner = replace(planner, bat=readings.swarm(parsed.swarm))
+    if parsed.algorithm:
+        planner = override(planner, {"bat.algorithm": parsed.algorithm})
+    algorithm_1 = any((parsed.algorithm, parsed.reading, parsed.swarm))
+    planner = params_for_method(parsed.planner, planner, algorithm_1=algorithm_1)
+    scenario = load_scenario(parsed.scenario)
+    robot, others = with_robot_settings(scenario.robot, parsed.settings)
     planner, sensor = with_settings(planner, SensorParams(), others)
     return RunConfig(
         scenario=replace(scenario, robot=robot),
         planner=planner,
         sensor=sensor,
-        seed=found.seed,
+        seed=parsed.seed,
         **more,
     )
 
 
-def _order(found: argparse.Namespace) -> RunRequest:
-    driver = Driver(found.driver or _usual_driver(found.scenario))
-    real_time = found.real_time or found.speed is not None
+def _build_request(parsed: argparse.Namespace) -> RunRequest:
+    driver = Driver(parsed.driver or _default_driver(parsed.scenario))
+    real_time = parsed.real_time or parsed.speed is not None
     if real_time and driver is Driver.CORE:
         raise ConfigError("--real-time: the core driver has no clock; choose another --driver")
-    speed = {} if found.speed is None else {"speed_factor": found.speed}
-    config = read_config(found, driver=driver, real_time=real_time, **speed)
+    speed = {} if parsed.speed is None else {"speed_factor": parsed.speed}
+    config = read_config(parsed, driver=driver, real_time=real_time, **speed)
     robots = len(config.scenario.robots)
     if robots and driver is Driver.CORE:
         raise ConfigError(
-            f"--driver core: of {robots} robots it leaves no directory; use `mfba sim`, or "
+            f"--driver core: writes no directory for {robots} robots; use `mfba sim`, or "
             "another --driver"
         )
     if robots > MOST_ROBOTS and driver is Driver.MULTI_PROCESS:
         raise ConfigError(
             f"--driver multi-process: {robots} robots would be {2 * robots + 2} processes of "
-            f"{PROCESS_GB:g} GB, more than find each other; give --driver in-process, or "
+            f"{PROCESS_GB:g} GB, too many for DDS discovery; give --driver in-process, or "
             f"{MOST_ROBOTS} robots at most"
         )
     if robots and real_time:
         raise ConfigError(
-            f"--real-time: {robots} robots run in lockstep here; leave it out, or use "
+            f"--real-time: {robots} robots run in lockstep only; leave it out, or use "
             "`ros2 launch mfba_planner simulate.launch.py` to watch them"
         )
     node_args = {
-        node: _split(f"--{node.replace('_', '-')}-args", getattr(found, f"{node}_args"))
+        node: _split(f"--{node.replace('_', '-')}-args", getattr(parsed, f"{node}_args"))
         for node in (*NODES, RECORDER)
     }
     given = [node for node, args in node_args.items() if args]
@@ -190,22 +190,22 @@ def _order(found: argparse.Namespace) -> RunRequest:
             f"--{given[0].replace('_', '-')}-args: the {driver.value} driver starts no processes; "
             "use --set, or --driver multi-process"
         )
-    if found.view:
+    if parsed.view:
         from ..report.rerun_viewer import require_viewer
 
         require_viewer()
     return RunRequest(
         config=config,
-        view=found.view,
-        out=found.out,
-        timeout_s=_timeout_s(found.timeout, config),
-        picture=not found.no_picture,
+        view=parsed.view,
+        out=parsed.out,
+        timeout_s=_timeout_s(parsed.timeout, config),
+        picture=not parsed.no_picture,
         node_args=node_args,
     )
 
 
-def _usual_driver(scenario: str) -> Driver:
-    """Every robot has two nodes: a fleet would need twice as many processes as robots."""
+def _default_driver(scenario: str) -> Driver:
+    """In-process for a fleet, which would need two processes per robot; else multi-process."""
     return Driver.IN_PROCESS if load_scenario(scenario).robots else Driver.MULTI_PROCESS
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The directory of one run: claimed before anything starts, so that no two runs share one."""
+"""The directory of one run, created before the start, so that no two runs share one."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from ..core.errors import OutputError
 from ..core.outputs import new_run_directory
 from ..recording.file_storage import make_directory, remove_empty
 
-_ATTEMPTS = 100  # as many launchers may start at once
+_MAX_TRIES = 100  # so many launchers may start at once
 
 
 class RunDirectory:
-    """A directory that this process has made."""
+    """A directory that this process has created, and the paths of its files."""
 
     def __init__(self, wanted: Path | None) -> None:
-        """Make wanted, or the next free directory below ./runs.
+        """Create wanted, or the next free directory below ./runs.
 
-        Raises OutputError where it exists (another launcher may be using it) or cannot be made.
+        Raises OutputError where it exists (another launcher may use it) or cannot be created.
         """
         self.path, self._made = _claim(wanted)
         self.bag = self.path / "bag"
@@ -29,24 +29,24 @@ class RunDirectory:
         self.log = self.path / "log.txt"
 
     def discard(self) -> None:
-        """Remove the directory and what is in it, for a run that never began."""
+        """Remove the directory and its files, for a run that has not started."""
         shutil.rmtree(self.path, ignore_errors=True)
         remove_empty(self._made)
 
     def contents(self) -> list[str]:
-        """Names of what was left in it, sorted."""
+        """Names of the files in it, sorted."""
         return sorted(os.listdir(self.path))
 
 
 def _claim(wanted: Path | None) -> tuple[Path, list[Path]]:
-    for run in range(_ATTEMPTS):
+    for run in range(_MAX_TRIES):
         path = wanted if wanted is not None else new_run_directory()
         try:
             return path, make_directory(path)
         except OutputError as error:
-            # Another launcher was quicker: with the same new name, or with a parent.
-            overtaken = isinstance(error.__cause__, FileExistsError)
-            lost = wanted is not None and os.path.lexists(path)
-            if not overtaken or lost or run == _ATTEMPTS - 1:
+            # Another launcher has created the same name, or a parent, in the meantime.
+            is_taken = isinstance(error.__cause__, FileExistsError)
+            cannot_retry = wanted is not None and os.path.lexists(path)
+            if not is_taken or cannot_retry or run == _MAX_TRIES - 1:
                 raise
     raise AssertionError("unreachable")

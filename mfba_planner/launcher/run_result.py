@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is left of a run: its table on the screen, result.json, the picture, and a verdict."""
+"""The result of one robot's run: printed table, result.json, picture, success or error."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from .run import Run
 
 @dataclass(frozen=True, slots=True)
 class RunResult:
-    """A run that was made, whatever came of it."""
+    """A finished run, with or without success."""
 
     directory: Path
     episode: Episode
     result: Result
 
-    def judge(self) -> None:
+    def require_success(self) -> None:
         """Raise MfbaError, with the reason, unless the goal was reached without collision."""
         if not self.result.success:
             raise MfbaError(f"{self.directory}: {why_no_success(self.episode, self.result)}")
 
 
 def why_no_success(episode: Episode, result: Result) -> str:
-    """What kept a run from reaching the goal without collision, in words."""
+    """The reasons why a run has no success, as text."""
     faults = []
     if result.collisions:
         faults.append(f"{result.collisions} collisions")

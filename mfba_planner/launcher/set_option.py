@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--set NAME=VALUE`: what can be changed by name, and to what."""
+"""`--set NAME=VALUE`: the option, the names it accepts, and how values are applied."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..simulation.robot_model import Robot
 
 
 def add_set_argument(parser: argparse.ArgumentParser) -> None:
-    """--set, as often as wanted."""
+    """Add --set, which may be repeated."""
     parser.add_argument(
         "--set",
         action="append",
@@ -30,10 +30,10 @@ def add_set_argument(parser: argparse.ArgumentParser) -> None:
 def with_settings(
     planner: PlannerParams, sensor: SensorParams, settings: list[str]
 ) -> tuple[PlannerParams, SensorParams]:
-    """Both with NAME=VALUE changes of --set; ConfigError for what cannot be set so."""
+    """Both with the changes of --set; ConfigError for an unknown name or a bad value."""
     changes = dict(map(_setting, settings))
     for name in _below("robot", changes):
-        raise ConfigError(f"--set robot.{name}: the scenario says that here; leave it out")
+        raise ConfigError(f"--set robot.{name}: the scenario sets the robot; leave it out")
     return (
         override(planner, _below("planner", changes)),
         override(sensor, _below("sensor", changes)),
@@ -69,7 +69,7 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 def _literal(text: str) -> Any:
-    """The number or truth value that text shows, otherwise text itself."""
+    """The number or bool that text spells, otherwise text itself."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):

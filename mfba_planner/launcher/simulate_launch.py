@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What simulate.launch.py offers and tells the nodes; here it can be tested without launch."""
+"""Arguments of simulate.launch.py and the node parameters they give; needs no `launch`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MFBA = Algorithm.MFBA.value
 
 
 @dataclass(frozen=True, slots=True)
-class Argument:
+class LaunchArgument:
     """A launch argument; choices are empty where there are too many to list."""
 
     default: str
@@ -37,30 +37,32 @@ class Argument:
 
 
 ARGUMENTS = {
-    "scenario": Argument("case1", "a shipped scenario's name, or a .yaml file"),
-    "seed": Argument("0", "seed of all randomness"),
-    "planner": Argument(
+    "scenario": LaunchArgument("case1", "a shipped scenario's name, or a .yaml file"),
+    "seed": LaunchArgument("0", "seed of all randomness"),
+    "planner": LaunchArgument(
         "",
-        f"who decides; empty: {DEFAULT_METHOD.value}, or {Method.PAPER.value} for another "
-        "algorithm or reading than the usual ones",
+        f"planning method; empty: {DEFAULT_METHOD.value}, or {Method.PAPER.value} for another "
+        "algorithm or reading than the default ones",
         ("", *(method.value for method in Method)),
     ),
-    "algorithm": Argument(_MFBA, "law of beta in eq. 4", tuple(a.value for a in Algorithm)),
-    "reading": Argument(
-        readings.DEFAULT_METHOD, "how section 6.2 is read", tuple(readings.PLANNERS)
+    "algorithm": LaunchArgument(_MFBA, "law of beta in eq. 4", tuple(a.value for a in Algorithm)),
+    "reading": LaunchArgument(
+        readings.DEFAULT_METHOD, "interpretation of section 6.2", tuple(readings.PLANNERS)
     ),
-    "real_time": Argument(
-        "true", "tick on a wall timer; false: as fast as it goes", _TRUE_OR_FALSE
+    "real_time": LaunchArgument(
+        "true", "tick on a wall timer; false: as fast as possible", _TRUE_OR_FALSE
     ),
-    "speed_factor": Argument("1.0", "simulated seconds per wall second, in real time"),
-    "record": Argument("false", "write a bag", _TRUE_OR_FALSE),
-    "bag": Argument("", "bag directory to create; empty: a new one below ./runs"),
-    "params_file": Argument("", "a --params-file for all nodes, which has the last word"),
+    "speed_factor": LaunchArgument("1.0", "simulated seconds per wall second, in real time"),
+    "record": LaunchArgument("false", "write a bag", _TRUE_OR_FALSE),
+    "bag": LaunchArgument("", "bag directory to create; empty: a new one below ./runs"),
+    "params_file": LaunchArgument(
+        "", "a --params-file for all nodes; it overrides the other arguments"
+    ),
 }
 
 
 def launch_parameters(given: Mapping[str, str]) -> Parameters:
-    """Every node's parameters, the recorder's first if there is one; ConfigError if refused."""
+    """Each node's parameters, the recorder's first; ConfigError for values that are refused."""
     planner = override(readings.planner(given["reading"]), {"bat.algorithm": given["algorithm"]})
     algorithm_1 = (given["algorithm"], given["reading"]) != (_MFBA, readings.DEFAULT_METHOD)
     config = RunConfig(
@@ -71,10 +73,10 @@ def launch_parameters(given: Mapping[str, str]) -> Parameters:
         speed_factor=_number("speed_factor", given["speed_factor"], float),
     )
     recorders = (RECORDER,) if given["record"] == "true" else ()
-    told = graph_parameters(config, (*NODES, *recorders))
-    told["world_sim"]["start_paused"] = False  # nobody is there to let it go
-    recorder = recorder_parameters(config, given["bag"], told)
-    return {**dict.fromkeys(recorders, recorder), **told}
+    parameters = graph_parameters(config, (*NODES, *recorders))
+    parameters["world_sim"]["start_paused"] = False  # no launcher resumes it
+    recorder = recorder_parameters(config, given["bag"], parameters)
+    return {**dict.fromkeys(recorders, recorder), **parameters}
 
 
 def _number(name: str, text: str, kind: type) -> Any:

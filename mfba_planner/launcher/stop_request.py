@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Signals as a question that is asked between two steps, so that nothing is torn apart."""
+"""Stop requests (signals, timeout), checked between ticks, so that a tick ends whole."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StoppedError(Exception):
-    """The run was ended from outside: exit_code says by which signal, 1 is the timeout."""
+    """The run was stopped from outside: exit_code is 128 + signal, or 1 for the timeout."""
 
     def __init__(self, reason: str, exit_code: int) -> None:
-        """Keep the reason, in words, and the exit code."""
+        """Keep the reason and the exit code."""
         super().__init__(reason)
         self.exit_code = exit_code
 
 
 class StopRequest:
-    """Ctrl-C, SIGTERM, SIGHUP or the end of the time, while this context lasts."""
+    """A context manager that catches Ctrl-C, SIGTERM and SIGHUP, and holds the timeout."""
 
     def __init__(self, timeout_s: float) -> None:
-        """Start the clock."""
+        """Start the time limit, s of wall time."""
         self._timeout_s = timeout_s
         self._deadline = time.monotonic() + timeout_s
         self._received: list[int] = []
@@ -43,7 +43,7 @@ class StopRequest:
         self._received.append(number)
 
     def check(self) -> None:
-        """Raise StoppedError when the run is to end."""
+        """Raise StoppedError after a signal or the timeout."""
         if self._received:
             name = signal.Signals(self._received[0]).name
             raise StoppedError(f"interrupted by {name}", 128 + self._received[0])
@@ -53,5 +53,5 @@ class StopRequest:
             )
 
     def is_urgent(self) -> bool:
-        """Whether the user has asked twice."""
+        """Whether a second signal has come."""
         return len(self._received) > 1

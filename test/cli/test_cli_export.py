@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mfba export: the table says what the episode says, to the last bit, in both formats."""
+"""`mfba export`: the table equals the episode, to the last bit, in both formats."""
 
 import csv
 import math
@@ -49,7 +49,7 @@ def expected_rows() -> list[dict[str, Any]]:
     ]
 
 
-def test_csv_says_what_the_episode_says(bag: Path, tmp_path: Path) -> None:
+def test_csv_equals_the_episode(bag: Path, tmp_path: Path) -> None:
     table = tmp_path / "run.csv"
     assert cli.main(["export", str(bag), str(table)]) == 0
     with table.open(newline="", encoding="utf-8") as file:
@@ -59,7 +59,7 @@ def test_csv_says_what_the_episode_says(bag: Path, tmp_path: Path) -> None:
     assert read == expected_rows()
 
 
-def test_parquet_says_the_same(bag: Path, tmp_path: Path) -> None:
+def test_parquet_equals_the_episode(bag: Path, tmp_path: Path) -> None:
     table = tmp_path / "run.parquet"
     assert cli.main(["export", str(bag), str(table)]) == 0
     assert parquet.read_table(table).to_pylist() == expected_rows()
@@ -78,20 +78,20 @@ def test_a_blind_sensor_leaves_nan_not_fewer_columns(bag: Path, tmp_path: Path) 
     assert second["range_12"] == math.inf
 
 
-def test_what_cannot_be_is_one_line_and_leaves_nothing(bag: Path, tmp_path: Path) -> None:
+def test_mistakes_give_one_line_and_no_file(bag: Path, tmp_path: Path) -> None:
     for name in ("run.xlsx", "run"):
-        with pytest.raises(ConfigError, match=r"unknown kind of table; give a name in \.csv"):
+        with pytest.raises(ConfigError, match=r"unknown table format; give a name in \.csv"):
             cli.main(["export", str(bag), str(tmp_path / name)])
     with pytest.raises(OutputError, match="cannot be written"):
         cli.main(["export", str(bag), str(tmp_path / "no" / "run.csv")])
     with pytest.raises(BagError):
         cli.main(["export", str(tmp_path), str(tmp_path / "run.csv")])
-    there = tmp_path / "there.csv"
-    there.write_text("mine")
+    existing = tmp_path / "existing.csv"
+    existing.write_text("mine")
     with pytest.raises(OutputError, match="already exists"):
-        cli.main(["export", str(bag), str(there)])
-    assert [path.name for path in tmp_path.iterdir()] == ["there.csv"]
-    assert there.read_text() == "mine"
+        cli.main(["export", str(bag), str(existing)])
+    assert [path.name for path in tmp_path.iterdir()] == ["existing.csv"]
+    assert existing.read_text() == "mine"
 
 
 def test_a_bag_whose_sectors_are_missing_leaves_no_half_table(bag: Path, tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba report`: from bags and results to a page, or one line that says why not."""
+"""`mfba report`: a page from bags and results, or one line of error."""
 
 import json
 from pathlib import Path
@@ -16,23 +16,23 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.run_episode import run
 
-Said = pytest.CaptureFixture[str]
+Capture = pytest.CaptureFixture[str]
 
 
-def report(said: Said, *args: str | Path) -> tuple[int, str, str]:
+def report(capture: Capture, *args: str | Path) -> tuple[int, str, str]:
     code = run_and_return_exit_code(lambda: cli.main(["report", *map(str, args)]), "mfba")
-    return code, *said.readouterr()
+    return code, *capture.readouterr()
 
 
-def refused(said: Said, *args: str | Path) -> str:
-    """The one line that a mistake costs; nothing is written."""
-    code, out, err = report(said, *args)
+def refused(capture: Capture, *args: str | Path) -> str:
+    """Run a command that fails; return its one line of error."""
+    code, out, err = report(capture, *args)
     assert (code, out, err.count("\n")) == (1, "", 1)
     return err
 
 
 @pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _in_tmp_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
@@ -50,24 +50,24 @@ def kept(tmp_path: Path, episode: Episode) -> Path:
 
 
 def changed(result: Path, **values: Any) -> Path:
-    """The result again, with other values."""
+    """A copy of the result with other values."""
     data = {**json.loads(result.read_text()), **values}
     path = result.with_name("changed.json")
     path.write_text(json.dumps({k: v for k, v in data.items() if v is not None}))
     return path
 
 
-def test_a_result_is_made_again(capsys: Said, kept: Path, episode: Episode) -> None:
+def test_a_result_is_simulated_again(capsys: Capture, kept: Path, episode: Episode) -> None:
     assert report(capsys, kept) == (0, "wrote report.html\n", "")
     assert report(capsys, kept / "result.json", "--out", "b.html") == (0, "wrote b.html\n", "")
     assert Path("report.html").read_bytes() == Path("b.html").read_bytes()
-    (told,) = data_of(Path("b.html"))["runs"]
-    assert told["name"] == "kept"
-    assert told["ticks"]["x"] == [tick.pose.x for tick in episode.ticks]
-    assert told["digest"] == result_to_dict(episode)["digest"]
+    (shown,) = data_of(Path("b.html"))["runs"]
+    assert shown["name"] == "kept"
+    assert shown["ticks"]["x"] == [tick.pose.x for tick in episode.ticks]
+    assert shown["digest"] == result_to_dict(episode)["digest"]
 
 
-def test_a_result_holds_its_world(capsys: Said, tmp_path: Path) -> None:
+def test_a_result_holds_its_world(capsys: Capture, tmp_path: Path) -> None:
     world = tmp_path / "mine.yaml"
     world.write_text("name: mine\nstart_m: [0.0, 0.0]\ngoal_m: [2.0, 0.0]\n")
     assert (
@@ -80,16 +80,16 @@ def test_a_result_holds_its_world(capsys: Said, tmp_path: Path) -> None:
     assert data_of(Path("report.html"))["runs"][0]["world"]["goal"] == [2.0, 0.0]
 
 
-def test_a_result_without_its_world_needs_a_shipped_one(capsys: Said, kept: Path) -> None:
+def test_a_result_without_its_world_needs_a_shipped_one(capsys: Capture, kept: Path) -> None:
     result = kept / "result.json"
     assert report(capsys, changed(result, world=None)) == (0, "wrote report.html\n", "")
     err = refused(capsys, changed(result, world=None, scenario="mine"), "--out", "b.html")
-    assert "its run cannot be made again (scenario mine is not shipped); give its bag" in err
+    assert "its run cannot be simulated again (scenario mine is not shipped); give its bag" in err
 
 
-def test_a_run_that_decides_otherwise_is_refused(capsys: Said, kept: Path) -> None:
+def test_a_run_with_other_decisions_is_refused(capsys: Capture, kept: Path) -> None:
     err = refused(capsys, changed(kept / "result.json", seed=5))
-    assert "made again, its run decides otherwise (digest " in err
+    assert "simulated again, its run has other decisions (digest " in err
     assert err.endswith("; give its bag\n")
     assert not Path("report.html").exists()
 
@@ -103,15 +103,15 @@ def test_a_run_that_decides_otherwise_is_refused(capsys: Said, kept: Path) -> No
         ({"seed": -1}, "negative"),
     ],
 )
-def test_a_result_that_makes_no_sense_is_refused(
-    capsys: Said, kept: Path, values: dict[str, Any], reason: str
+def test_an_invalid_result_is_refused(
+    capsys: Capture, kept: Path, values: dict[str, Any], reason: str
 ) -> None:
     err = refused(capsys, changed(kept / "result.json", **values))
-    assert "its run cannot be made again" in err
+    assert "its run cannot be simulated again" in err
     assert reason in err
 
 
-def test_mistakes_cost_one_line(capsys: Said, kept: Path, tmp_path: Path) -> None:
+def test_mistakes_give_one_line(capsys: Capture, kept: Path, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("no bag")
     (tmp_path / "empty.mcap").touch()
     (tmp_path / "empty").mkdir()
@@ -127,17 +127,17 @@ def test_mistakes_cost_one_line(capsys: Said, kept: Path, tmp_path: Path) -> Non
     assert not Path("report.html").exists()
 
 
-def test_what_is_there_is_not_overwritten(capsys: Said, kept: Path) -> None:
+def test_existing_files_are_not_overwritten(capsys: Capture, kept: Path) -> None:
     Path("report.html").write_text("mine")
     assert "report.html: exists" in refused(capsys, kept)
     assert "cannot be written" in refused(capsys, kept, "--out", "no/where.html")
     assert Path("report.html").read_text() == "mine"
 
 
-def test_several_runs_keep_their_order(capsys: Said, kept: Path) -> None:
+def test_several_runs_keep_their_sequence(capsys: Capture, kept: Path) -> None:
     assert (
         run_and_return_exit_code(lambda: cli.main(["sim", "case1", "--out", "other"]), "mfba") == 0
     )
     capsys.readouterr()
     assert report(capsys, "other", kept)[0] == 0
-    assert [told["name"] for told in data_of(Path("report.html"))["runs"]] == ["other", "kept"]
+    assert [run["name"] for run in data_of(Path("report.html"))["runs"]] == ["other", "kept"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba sweep` and `mfba show`: what a user gets, what a mistake costs, and interrupts."""
+"""`mfba sweep` and `mfba show`: output, errors in one line, and interrupts."""
 
 import csv
 import os
@@ -13,17 +13,17 @@ from launched_programs import Program, complete
 from waiting import wait_until
 
 from mfba_planner import cli
-from mfba_planner.cli.sweep import command
+from mfba_planner.cli.sweep import command_line
 from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
-from mfba_planner.evaluation.sweep import chunks as parts
+from mfba_planner.evaluation.sweep import chunks as sweep_chunks
 from mfba_planner.evaluation.sweep.run_sweep import sweep
 from mfba_planner.evaluation.sweep.sweep_spec import Setting, SweepSpec
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
 
-Said = pytest.CaptureFixture[str]
+Capture = pytest.CaptureFixture[str]
 HASH = re.compile(r"^sorted hash ([0-9a-f]{64})$", re.MULTILINE)
 LONG = ["sweep", "random-3", "--planner", "straight", "--worlds", "1500", "--no-oracle"]
 SMALL = ["random-3", "--planner", "paper", "--planner", "straight", "--worlds", "4"]
@@ -33,10 +33,10 @@ def mfba(*args: str) -> int:
     return run_and_return_exit_code(lambda: cli.main(list(args)), "mfba")
 
 
-def refused(said: Said, *args: str) -> str:
-    """The one line that a mistake costs."""
+def refused(capture: Capture, *args: str) -> str:
+    """Run a command that fails; return its one line of error."""
     code = mfba(*args)
-    out, err = said.readouterr()
+    out, err = capture.readouterr()
     assert (code, out, err.count("\n")) == (1, "", 1), err
     return err
 
@@ -54,30 +54,30 @@ def rows(directory: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_where_nobody_says_who_it_is_the_one_that_predicts(tmp_path: Path) -> None:
+def test_the_default_planner_is_predictive(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert mfba("sweep", "random-3", "--worlds", "1", "--workers", "1", "--out", str(out)) == 0
     assert [row["planner"] for row in rows(out)] == ["predictive"]
 
 
-def test_a_sweep_leaves_table_timings_report_and_parts(swept: Path) -> None:
+def test_a_sweep_writes_table_timings_report_and_chunks(swept: Path) -> None:
     assert {path.name for path in swept.iterdir()} == {
         "chunks", "report.md", "study.json", "table.csv", "timings.csv",
     }  # fmt: skip
     assert len(rows(swept)) == 8
     report = (swept / "report.md").read_text(encoding="utf-8")
     assert "`mfba sweep random-3 --planner paper --planner straight --worlds 4`" in report
-    order = SweepSpec(suite="random-3", planners=("paper", "straight"), worlds=4)
-    assert f"sorted hash of the table `{sweep(order).hash}`" in report
+    spec = SweepSpec(suite="random-3", planners=("paper", "straight"), worlds=4)
+    assert f"sorted hash of the table `{sweep(spec).hash}`" in report
     assert re.search(r"^\| paper \| 4 \| 100\.00 % \[51\.01, 100\.00\] \|", report, re.MULTILINE)
 
 
-def test_again_it_computes_nothing_and_says_the_same(
-    swept: Path, capsys: Said, monkeypatch: pytest.MonkeyPatch
+def test_a_repeated_sweep_computes_nothing_and_prints_the_same(
+    swept: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = {path: path.stat().st_mtime_ns for path in swept.rglob("*")}
-    monkeypatch.setattr(parts.Runs, "run", lambda _: pytest.fail("nothing is left to do"))
-    monkeypatch.setattr(parts.Optima, "run", lambda _: pytest.fail("nothing is left to do"))
+    monkeypatch.setattr(sweep_chunks.Runs, "run", lambda _: pytest.fail("nothing is left to do"))
+    monkeypatch.setattr(sweep_chunks.Optima, "run", lambda _: pytest.fail("nothing is left to do"))
     assert mfba("sweep", *SMALL, "--out", str(swept)) == 0
     out, err = capsys.readouterr()
     assert {path: path.stat().st_mtime_ns for path in swept.rglob("*")} == before
@@ -85,17 +85,17 @@ def test_again_it_computes_nothing_and_says_the_same(
     assert err == ""
 
 
-def test_a_half_written_part_is_computed_again(swept: Path, capsys: Said) -> None:
-    part = swept / "chunks/random-3-straight-0-4.json"
-    table, whole = (swept / "table.csv").read_bytes(), part.read_bytes()
-    part.write_bytes(whole[: len(whole) // 2])
-    for name in ("timings.csv", "report.md"):  # what the clock says is another time
+def test_a_half_written_chunk_is_computed_again(swept: Path, capsys: Capture) -> None:
+    chunk = swept / "chunks/random-3-straight-0-4.json"
+    table, whole = (swept / "table.csv").read_bytes(), chunk.read_bytes()
+    chunk.write_bytes(whole[: len(whole) // 2])
+    for name in ("timings.csv", "report.md"):  # computing times differ
         (swept / name).unlink()
     assert mfba("sweep", *SMALL, "--out", str(swept)) == 0
     assert (swept / "table.csv").read_bytes() == table
 
 
-def test_a_half_written_table_is_refused(swept: Path, capsys: Said) -> None:
+def test_a_half_written_table_is_refused(swept: Path, capsys: Capture) -> None:
     path = swept / "table.csv"
     whole = path.read_bytes()
     path.write_bytes(whole[:200])
@@ -125,12 +125,12 @@ def test_a_half_written_table_is_refused(swept: Path, capsys: Said) -> None:
         ([], "required: SUITE"),
     ],
 )
-def test_mistakes_cost_one_line(args: list[str], reason: str, capsys: Said) -> None:
+def test_mistakes_give_one_line(args: list[str], reason: str, capsys: Capture) -> None:
     assert reason in refused(capsys, "sweep", *args)
 
 
-def test_a_scheduler_that_is_not_there_costs_one_line(
-    capsys: Said, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_an_unreachable_scheduler_gives_one_line(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mfba_planner.evaluation.sweep.run_sweep.CONNECT_S", 1)
     monkeypatch.chdir(tmp_path)
@@ -138,27 +138,25 @@ def test_a_scheduler_that_is_not_there_costs_one_line(
     assert "--scheduler tcp://127.0.0.1:9: cannot be reached" in capsys.readouterr().err
 
 
-def test_an_existing_directory_of_something_else_is_left_alone(
-    capsys: Said, tmp_path: Path
-) -> None:
+def test_a_directory_with_other_files_is_not_changed(capsys: Capture, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     assert "no results of `mfba sweep`" in refused(capsys, "sweep", *SMALL, "--out", str(tmp_path))
     assert os.listdir(tmp_path) == ["mine.txt"]
 
 
-def test_parquet(tmp_path: Path, capsys: Said) -> None:
+def test_parquet(tmp_path: Path, capsys: Capture) -> None:
     from pyarrow import parquet
 
     out = tmp_path / "out"
-    told = ["--worlds", "2", "--no-oracle", "--format", "parquet", "--workers", "1"]
-    assert mfba("sweep", "random-3", *told, "--out", str(out)) == 0
+    args = ["--worlds", "2", "--no-oracle", "--format", "parquet", "--workers", "1"]
+    assert mfba("sweep", "random-3", *args, "--out", str(out)) == 0
     table = parquet.read_table(out / "table.parquet").to_pylist()
     assert [(row["world"], row["certificate"], row["gap"]) for row in table] == [
         (0, "", None), (1, "", None),
     ]  # fmt: skip
 
 
-def test_the_command_of_a_report_makes_the_same_order() -> None:
+def test_the_command_line_of_a_report_gives_the_same_sweep() -> None:
     setting = Setting(
         params=PlannerParams(speed_mps=0.5, step_length_m=0.1),
         perception="scan-12",
@@ -167,35 +165,35 @@ def test_the_command_of_a_report_makes_the_same_order() -> None:
         suite_seed=7,
         patience_s=9.0,
     )
-    order = SweepSpec(
+    spec = SweepSpec(
         suite="dense", planners=("paper", "ba"), worlds=3, first=4, seeds=2, oracle=False,
         setting=setting,
     )  # fmt: skip
-    words = command(order).split()
+    words = command_line(spec).split()
     assert words[:2] == ["mfba", "sweep"]
-    from mfba_planner.cli.sweep import _order, _parser
+    from mfba_planner.cli.sweep import _parser, _sweep_spec
 
-    assert _order(_parser().parse(words[2:])) == order
+    assert _sweep_spec(_parser().parse(words[2:])) == spec
 
 
 def test_predictive_has_its_own_step_and_swarm_unless_others_are_given() -> None:
-    from mfba_planner.cli.sweep import _order, _parser
+    from mfba_planner.cli.sweep import _parser, _sweep_spec
 
-    told = ["random-3", "--planner", "paper", "--planner", "predictive", "--worlds", "1"]
-    order = _order(_parser().parse(told))
+    args = ["random-3", "--planner", "paper", "--planner", "predictive", "--worlds", "1"]
+    spec = _sweep_spec(_parser().parse(args))
     usual = PlannerParams(speed_mps=SPEED_MPS)
-    assert order.setting_of("paper").params == usual
-    assert order.setting_of("predictive").params == preset(usual)
-    assert command(order) == "mfba sweep " + " ".join(told)
-    told += ["--set", "planner.step_length_m=0.3"]
-    order = _order(_parser().parse(told))
-    assert order.setting_of("paper").params == usual
-    assert order.setting_of("predictive").params == replace(preset(usual), step_length_m=0.3)
-    assert command(order) == "mfba sweep " + " ".join(told)
+    assert spec.setting_of("paper").params == usual
+    assert spec.setting_of("predictive").params == preset(usual)
+    assert command_line(spec) == "mfba sweep " + " ".join(args)
+    args += ["--set", "planner.step_length_m=0.3"]
+    spec = _sweep_spec(_parser().parse(args))
+    assert spec.setting_of("paper").params == usual
+    assert spec.setting_of("predictive").params == replace(preset(usual), step_length_m=0.3)
+    assert command_line(spec) == "mfba sweep " + " ".join(args)
 
 
 def interrupted(out: Path, tmp_path: Path, send: signal.Signals, *, group: bool) -> Program:
-    """A sweep that is ended when some of its parts are finished."""
+    """A sweep that is stopped when some of its chunks are finished."""
     with Program("mfba", *LONG, "--workers", "2", "--out", str(out), cwd=tmp_path) as program:
         chunks = out / "chunks"
         wait_until(lambda: chunks.is_dir() and len(list(chunks.glob("*.json"))) >= 2, 120.0)
@@ -204,7 +202,7 @@ def interrupted(out: Path, tmp_path: Path, send: signal.Signals, *, group: bool)
         else:
             program.process.send_signal(send)
         program.end()
-        wait_until(lambda: program.family() == [], 20.0)
+        wait_until(lambda: program.processes() == [], 20.0)
         return program
 
 
@@ -212,11 +210,11 @@ def finished(out: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in (out / "chunks").glob("*.json")}
 
 
-def test_after_ctrl_c_it_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_after_ctrl_c_a_sweep_continues(tmp_path: Path) -> None:
     out = tmp_path / "out"
     program = interrupted(out, tmp_path, signal.SIGINT, group=True)
     assert program.process.returncode == 130
-    assert program.stderr == f"interrupted; go on with --out {out}\n"
+    assert program.stderr == f"interrupted; continue with --out {out}\n"
     kept = finished(out)
     assert 2 <= len(kept) < 15
     assert not (out / "table.csv").exists()
@@ -225,18 +223,18 @@ def test_after_ctrl_c_it_goes_on_where_it_was(tmp_path: Path) -> None:
     assert again.process.returncode == 0, again.stderr
     after = finished(out)
     assert len(after) == 15
-    assert {name: after[name] for name in kept} == kept, "what was finished is not done again"
+    assert {name: after[name] for name in kept} == kept, "finished chunks are not computed again"
     found = HASH.search(again.stdout)
     assert found
-    order = SweepSpec(suite="random-3", planners=("straight",), worlds=1500, oracle=False)
-    assert found.group(1) == sweep(order).hash
+    spec = SweepSpec(suite="random-3", planners=("straight",), worlds=1500, oracle=False)
+    assert found.group(1) == sweep(spec).hash
 
 
-def test_killed_it_leaves_nobody_behind(tmp_path: Path) -> None:
+def test_a_killed_sweep_leaves_no_process(tmp_path: Path) -> None:
     interrupted(tmp_path / "out", tmp_path, signal.SIGKILL, group=False)
 
 
-def test_one_worker_killed_is_named_and_the_sweep_goes_on(tmp_path: Path) -> None:
+def test_one_worker_killed_is_named_and_the_sweep_continues(tmp_path: Path) -> None:
     out = tmp_path / "out"
     args = ["sweep", "random-3", "--planner", "straight", "--worlds", "600", "--no-oracle"]
     with Program("mfba", *args, "--workers", "2", "--out", str(out), cwd=tmp_path) as program:
@@ -246,15 +244,15 @@ def test_one_worker_killed_is_named_and_the_sweep_goes_on(tmp_path: Path) -> Non
     assert "its worker process may have died; trying it again alone" in program.stderr
     found = HASH.search(program.stdout)
     assert found
-    order = SweepSpec(suite="random-3", planners=("straight",), worlds=600, oracle=False)
-    assert found.group(1) == sweep(order).hash
+    spec = SweepSpec(suite="random-3", planners=("straight",), worlds=600, oracle=False)
+    assert found.group(1) == sweep(spec).hash
 
 
 def _workers(program: Program) -> list[int]:
-    """Processes of the pool, without the children they make runs in."""
+    """PIDs of the pool's workers, without their child processes."""
     return [
         pid
-        for pid in program.family()
+        for pid in program.processes()
         if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
     ]
 
@@ -266,8 +264,8 @@ def a_collision(swept: Path) -> tuple[int, dict[str, str]]:
     return next((k, row) for k, row in enumerate(rows(swept)) if int(row["collisions"] or 0))
 
 
-def test_a_failed_run_becomes_words_pictures_and_a_bag(
-    swept: Path, tmp_path: Path, capsys: Said
+def test_a_failed_run_becomes_text_pictures_and_a_bag(
+    swept: Path, tmp_path: Path, capsys: Capture
 ) -> None:
     number, row = a_collision(swept)
     name = f"random-3/{row['world']}/straight/0"
@@ -292,14 +290,14 @@ def test_a_failed_run_becomes_words_pictures_and_a_bag(
     ).read_text()
 
 
-def test_a_bag_of_the_paper_s_planner_can_be_verified(tmp_path: Path, capsys: Said) -> None:
+def test_a_bag_of_the_paper_s_planner_can_be_verified(tmp_path: Path, capsys: Capture) -> None:
     assert mfba("show", "random-10/1/paper/0", "--out", str(tmp_path / "a")) == 0
     assert "goal reached without collision" in capsys.readouterr().out
     assert mfba("verify", str(tmp_path / "a"), "--closed-loop") == 0
     assert "closed loop: identical" in capsys.readouterr().out
 
 
-def test_runs_without_success_are_listed(swept: Path, capsys: Said) -> None:
+def test_runs_without_success_are_listed(swept: Path, capsys: Capture) -> None:
     failed = [k for k, row in enumerate(rows(swept)) if row["success"] == "false"]
     assert mfba("show", str(swept)) == 0
     out = capsys.readouterr().out
@@ -314,31 +312,39 @@ def test_runs_without_success_are_listed(swept: Path, capsys: Said) -> None:
         ("Sleeps", "the planner failed at tick 5: hung: no end after 1 s of wall time"),
     ],
 )
-def test_a_planner_s_own_fault_is_shown(
-    planner: str, line: str, tmp_path: Path, capsys: Said
+def test_a_failure_of_a_planner_is_shown(
+    planner: str, line: str, tmp_path: Path, capsys: Capture
 ) -> None:
     out = tmp_path / "out"
-    told = ["--planner", f"faulty_planners:{planner}", "--worlds", "1", "--no-oracle"]
-    told += ["--patience", "1", "--workers", "1"]
-    assert mfba("sweep", "random-3", *told, "--out", str(out)) == 0
+    args = ["--planner", f"faulty_planners:{planner}", "--worlds", "1", "--no-oracle"]
+    args += ["--patience", "1", "--workers", "1"]
+    assert mfba("sweep", "random-3", *args, "--out", str(out)) == 0
     assert "1 x " in (out / "report.md").read_text()
     capsys.readouterr()
     assert mfba("show", str(out), "0", "--out", str(tmp_path / "shown")) == 0
-    said = capsys.readouterr().out
-    assert line in said
-    assert "straight to the goal" in said, "the last decisions that were followed"
+    output = capsys.readouterr().out
+    assert line in output
+    assert "straight to the goal" in output, "the last executed decisions"
     assert len(read_episode(tmp_path / "shown/bag").ticks) == 5
 
 
-def test_a_run_that_did_not_arrive(tmp_path: Path, capsys: Said) -> None:
+def test_a_run_that_did_not_reach_the_goal(tmp_path: Path, capsys: Capture) -> None:
     out = tmp_path / "out"
-    told = ["--set", "planner.speed_mps=0.1", "--worlds", "1", "--no-oracle", "--workers", "1"]
-    assert mfba("sweep", "random-3", *told, "--out", str(out)) == 0
+    args = [
+        "--set",
+        "planner.speed_mps=0.1",
+        "--worlds",
+        "1",
+        "--no-oracle",
+        "--workers",
+        "1",
+    ]
+    assert mfba("sweep", "random-3", *args, "--out", str(out)) == 0
     capsys.readouterr()
     assert mfba("show", str(out), "0", "--no-bag", "--out", str(tmp_path / "shown")) == 0
-    said = capsys.readouterr().out
-    assert re.search(r"m left to the goal when time was up \(1\d\d\.\d s\)", said)
-    assert "modes: " in said
+    output = capsys.readouterr().out
+    assert re.search(r"m left to the goal when time was up \(1\d\d\.\d s\)", output)
+    assert "modes: " in output
 
 
 @pytest.mark.parametrize(
@@ -353,11 +359,11 @@ def test_a_run_that_did_not_arrive(tmp_path: Path, capsys: Said) -> None:
         ([], "required: DIR | RUN"),
     ],
 )
-def test_mistakes_of_show_cost_one_line(words: list[str], reason: str, capsys: Said) -> None:
+def test_mistakes_of_show_give_one_line(words: list[str], reason: str, capsys: Capture) -> None:
     assert reason in refused(capsys, "show", *words)
 
 
-def test_runs_that_a_sweep_does_not_have(swept: Path, tmp_path: Path, capsys: Said) -> None:
+def test_runs_that_a_sweep_does_not_have(swept: Path, tmp_path: Path, capsys: Capture) -> None:
     assert "8: the table has 8 rows" in refused(capsys, "show", str(swept), "8")
     other = "random-3/9/paper/0"
     assert f"{other}: not a run of this sweep" in refused(capsys, "show", str(swept), other)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba tables`: the quick form's numbers, every verdict, every form, and mistakes."""
+"""`mfba tables`: numbers of --quick, verdicts, output formats, and errors."""
 
 import base64
 import csv
@@ -33,20 +33,20 @@ from mfba_planner.report.tables.text import Origin
 PAGE = ROOT / "docs/reproduction.md"
 FORMS = {"tables.html", "tables.md", "tables.csv", "tables.json"}
 
-Said = pytest.CaptureFixture[str]
+Capture = pytest.CaptureFixture[str]
 
 
-def refused(said: Said, *args: str) -> str:
-    """The one line that a mistake costs."""
+def refused(capture: Capture, *args: str) -> str:
+    """Run a command that fails; return its one line of error."""
     code = run_and_return_exit_code(lambda: cli.main(["tables", *args]), "mfba")
-    out, err = said.readouterr()
+    out, err = capture.readouterr()
     assert (code, out, err.count("\n")) == (1, "", 1)
     return err
 
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The directory of the quick form."""
+    """The directory of `mfba tables --quick`."""
     out = tmp_path_factory.mktemp("tables") / "quick"
     page = out.parent / "page.md"
     page.write_text(PAGE.read_text(encoding="utf-8"), encoding="utf-8")
@@ -57,11 +57,11 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def made(quick: Path) -> Any:
-    """What the quick form says, as data."""
+    """The tables of --quick, as data."""
     return json.loads((quick / "tables.json").read_text(encoding="utf-8"))
 
 
-def test_every_printed_number_is_there_with_a_verdict_and_a_reason(made: Any) -> None:
+def test_every_printed_number_has_a_verdict_and_a_reason(made: Any) -> None:
     found = numbers(made)
     for printed in published.ALL:
         number = found[printed.key]
@@ -74,11 +74,11 @@ def test_every_printed_number_is_there_with_a_verdict_and_a_reason(made: Any) ->
     )
 
 
-def test_the_quick_form_s_numbers_are_those_stored(made: Any) -> None:
-    """To the sixth digit; a swarm on F2, F5, F6 follows the last bit of sin, cos and exp.
+def test_the_numbers_of_quick_are_those_stored(made: Any) -> None:
+    """To the sixth digit. A swarm on F2, F5, F6 depends on the last bit of sin, cos and exp.
 
-    So where those are others, of these three the means and chances are compared, within half of
-    their intervals. Renew with `python tools/store_tables.py` after a change that is meant.
+    Where that bit differs, means and chances of these three are compared, within half of their
+    intervals. After an intended change run `python tools/store_tables.py`.
     """
     stored = json.loads(STORED.read_text(encoding="utf-8"))
     same_libm = stored.pop("libm") == libm()
@@ -93,7 +93,7 @@ def test_the_quick_form_s_numbers_are_those_stored(made: Any) -> None:
             assert abs(found[key][0] - middle) <= 0.5 * (high - low), key
 
 
-def test_impossible_numbers_tell_why_with_figures(made: Any) -> None:
+def test_impossible_numbers_have_a_reason_with_numbers(made: Any) -> None:
     found = numbers(made)
     assert (
         "at most 9.62e-05: printed 553 times that"
@@ -104,7 +104,7 @@ def test_impossible_numbers_tell_why_with_figures(made: Any) -> None:
     assert "computing time" in found["Section 6.2, case 2/BA/run time"]["why"]
 
 
-def test_verdicts_follow_the_interval_of_the_reading_that_is_meant(made: Any) -> None:
+def test_verdicts_follow_the_interval_of_the_intended_reading(made: Any) -> None:
     meant = {"Table 3": "table3", "MFBA": "section6", "BA": "fig1"}
     checked = 0
     for key, n in numbers(made).items():
@@ -118,7 +118,7 @@ def test_verdicts_follow_the_interval_of_the_reading_that_is_meant(made: Any) ->
     assert checked == 48 - 4 + 16 - 3 + 4
 
 
-def test_what_needs_no_run_is_reproduced(made: Any) -> None:
+def test_tables_without_runs_are_reproduced(made: Any) -> None:
     for section in made["sections"]:
         if section["key"] in ("1", "2", "4", "6"):
             assert {n["verdict"] for n in section["numbers"]} == {"reproduced"}
@@ -131,7 +131,7 @@ def test_fitted_constants_are_named(made: Any) -> None:
     assert "was chosen because it comes near the printed rows" in notes["3"]
 
 
-def test_all_forms_tell_the_same(quick: Path, made: Any) -> None:
+def test_all_formats_have_the_same_content(quick: Path, made: Any) -> None:
     lines = list(csv.DictReader(io.StringIO((quick / "tables.csv").read_text(encoding="utf-8"))))
     found = numbers(made)
     assert {f"{x['place']}/{x['row']}/{x['column']}" for x in lines} == set(found)
@@ -147,7 +147,7 @@ def test_all_forms_tell_the_same(quick: Path, made: Any) -> None:
             assert n["why"].replace("*", "\\*") in text or n["why"] in text
 
 
-def test_the_page_is_sound_and_needs_nothing_else(quick: Path) -> None:
+def test_the_page_is_valid_and_needs_no_other_file(quick: Path) -> None:
     page = (quick / "tables.html").read_text(encoding="utf-8")
     open_tags: list[str] = []
 
@@ -168,15 +168,15 @@ def test_the_page_is_sound_and_needs_nothing_else(quick: Path) -> None:
     assert len(page) < 4_000_000
 
 
-def test_pictures_go_into_the_page(made: Any) -> None:
+def test_pictures_are_embedded_in_the_page(made: Any) -> None:
     origin = Origin(command="mfba tables", seed=0, quick=True)
     page = html.page([], origin, [html.Picture(title="A & B", svg="<svg>ö</svg>")])
     (found,) = re.findall(r'alt="A &amp; B" src="data:image/svg\+xml;base64,([^"]+)"', page)
     assert base64.b64decode(found).decode() == "<svg>ö</svg>"
 
 
-def test_the_record_has_a_place_for_each_generated_part(quick: Path, made: Any) -> None:
-    """docs/reproduction.md is current in form: same blocks, rows, printed numbers and columns."""
+def test_the_reproduction_page_has_each_generated_block(quick: Path, made: Any) -> None:
+    """docs/reproduction.md has the current blocks, rows, printed numbers and columns."""
     committed, filled = (
         path.read_text(encoding="utf-8") for path in (PAGE, quick.parent / "page.md")
     )
@@ -186,7 +186,7 @@ def test_the_record_has_a_place_for_each_generated_part(quick: Path, made: Any) 
 
 
 def _form(page: str) -> list[tuple[str, list[list[str]]]]:
-    """Of each generated block the cells of its tables that do not depend on our numbers."""
+    """The cells of each generated block's tables that do not depend on our numbers."""
     blocks = re.findall(
         r"<!-- begin generated: (.+?) -->\n(.*?)<!-- end generated: \1 -->", page, re.DOTALL
     )
@@ -195,7 +195,7 @@ def _form(page: str) -> list[tuple[str, list[list[str]]]]:
 
 
 def _labels(body: str) -> Iterator[list[str]]:
-    """Heads, and of each row what it is about: the first cell, the printed number beside it."""
+    """Table heads, and the first cell of each row with the printed number beside it."""
     shown = 1
     for line in body.splitlines():
         cells = line.split(" | ")
@@ -211,26 +211,26 @@ def _labels(body: str) -> Iterator[list[str]]:
 
 
 def _rows_below(page: str, title: str) -> list[list[str]]:
-    """Cells of all rows of the tables whose title begins so."""
+    """Cells of all rows of the tables whose title starts with `title`."""
     found = re.findall(rf"^\*\*{re.escape(title)}.*?\n\n(?:\| .*\n)+", page, re.MULTILINE)
     lines = [line for table in found for line in table.splitlines()[4:]]
     return [line.strip("| ").split(" | ") for line in lines]
 
 
-def test_the_record_s_first_runs_are_those_of_this_code(quick: Path, made: Any) -> None:
-    """The full form begins with the quick form's seeds: the record is of this code, or stale."""
+def test_the_reproduction_page_s_first_runs_are_those_of_this_code(quick: Path, made: Any) -> None:
+    """The full form starts with the seeds of --quick; other values mean a stale page."""
     same_libm = json.loads(STORED.read_text(encoding="utf-8"))["libm"] == libm()
     committed, filled = (
         _rows_below(path.read_text(encoding="utf-8"), "As the paper made it")
         for path in (PAGE, quick.parent / "page.md")
     )
     assert len(committed) == len(filled) == 12 + 2 * 4
-    for told, found in zip(committed, filled):
-        if told[0][1] in "134" or told[0] in PLANNERS or same_libm:
-            assert told[:6] == found[:6]
+    for old, new in zip(committed, filled):
+        if old[0][1] in "134" or old[0] in PLANNERS or same_libm:
+            assert old[:6] == new[:6]
 
 
-def test_the_record_s_full_form_holds_what_it_was_made_to_show() -> None:
+def test_the_reproduction_page_supports_its_claims() -> None:
     page = PAGE.read_text(encoding="utf-8")
     joint = _rows_below(page, "Could the printed row be fifteen runs?")
     assert len(joint) == 12
@@ -250,8 +250,8 @@ def test_the_record_s_full_form_holds_what_it_was_made_to_show() -> None:
     assert "no" in held["section6", "BA"] + held["fig1", "MFBA"]
 
 
-def test_resumed_and_repeated_it_gives_the_same_bytes(tmp_path: Path) -> None:
-    """Killed in the middle with Ctrl-C, then called again with another number of workers."""
+def test_resumed_and_repeated_runs_give_the_same_bytes(tmp_path: Path) -> None:
+    """Interrupted with Ctrl-C, then called again with another number of workers."""
     mfba = [sys.executable, "-c", PROGRAM.format("mfba"), "tables", "5", "--quick"]
     out = tmp_path / "out"
     first = subprocess.Popen(
@@ -264,14 +264,14 @@ def test_resumed_and_repeated_it_gives_the_same_bytes(tmp_path: Path) -> None:
     )
     wait_until(lambda: any(out.glob("chunks/*.json")) or first.poll() is not None, 60.0)
     os.killpg(first.pid, signal.SIGINT)  # as a terminal does: workers get it too
-    said, wrong = first.communicate(timeout=60)
-    assert (first.returncode, said) == (130, "")
-    assert wrong == f"interrupted; go on with --out {out}\n"
+    output, errors = first.communicate(timeout=60)
+    assert (first.returncode, output) == (130, "")
+    assert errors == f"interrupted; continue with --out {out}\n"
     assert not FORMS & set(os.listdir(out))
     kept = len(list(out.glob("chunks/*.json")))
-    for where, workers in ((out, "1"), (out, "2"), (tmp_path / "whole", "1")):
+    for directory, workers in ((out, "1"), (out, "2"), (tmp_path / "whole", "1")):
         done = subprocess.run(
-            [*mfba, "--workers", workers, "--out", str(where)],
+            [*mfba, "--workers", workers, "--out", str(directory)],
             cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
         )  # fmt: skip
         assert (done.returncode, done.stderr) == (0, "")
@@ -280,22 +280,22 @@ def test_resumed_and_repeated_it_gives_the_same_bytes(tmp_path: Path) -> None:
         assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_killed_it_leaves_no_worker_and_can_be_resumed(tmp_path: Path) -> None:
+def test_a_killed_command_leaves_no_worker_and_can_be_resumed(tmp_path: Path) -> None:
     words = ("tables", "7", "--quick", "--workers", "2", "--out", str(tmp_path / "out"))
     with Program("mfba", *words, cwd=tmp_path) as program:
         wait_until(
             lambda: any(tmp_path.glob("out/chunks/*.json")) or program.process.poll() is not None,
             60.0,
         )
-        assert len(program.family()) > 2
+        assert len(program.processes()) > 2
         program.process.kill()
-        wait_until(lambda: program.family() == [], 30.0)
+        wait_until(lambda: program.processes() == [], 30.0)
     again = complete("mfba", *words, cwd=tmp_path)
     assert (again.process.returncode, again.stderr) == (0, "")
     assert set(os.listdir(tmp_path / "out")) >= FORMS
 
 
-def test_mistakes_cost_one_line(capsys: Said, tmp_path: Path) -> None:
+def test_mistakes_give_one_line(capsys: Capture, tmp_path: Path) -> None:
     out = ("--out", str(tmp_path / "out"))
     assert "9: unknown table; known: 1, 2, " in refused(capsys, "9", *out)
     assert "claim: unknown table; did you mean 'claims'?" in refused(capsys, "claim", *out)
@@ -320,7 +320,7 @@ def tables(*args: str) -> int:
     return run_and_return_exit_code(lambda: cli.main(["tables", *args]), "mfba")
 
 
-def test_a_directory_belongs_to_one_command(capsys: Said, tmp_path: Path) -> None:
+def test_a_directory_belongs_to_one_command(capsys: Capture, tmp_path: Path) -> None:
     out = str(tmp_path / "out")
     assert tables("1", "--out", out) == 0
     assert set(os.listdir(out)) == FORMS | {"study.json", "chunks"}
@@ -336,8 +336,8 @@ def test_a_directory_belongs_to_one_command(capsys: Said, tmp_path: Path) -> Non
     assert (tmp_path / "out/tables.md").read_text() == "mine"
 
 
-def test_without_out_a_new_directory_below_runs(
-    capsys: Said, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_without_out_a_new_directory_is_created_below_runs(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert tables("1") == tables("4", "1") == 0
@@ -348,22 +348,22 @@ def test_without_out_a_new_directory_below_runs(
     assert out.index("Table 1. ") < out.index("Table 4. ")
 
 
-def test_a_terminal_without_greek_letters_will_do(tmp_path: Path) -> None:
+def test_an_ascii_terminal_is_enough(tmp_path: Path) -> None:
     done = complete("mfba", "tables", "2", "--out", "out", cwd=tmp_path, PYTHONIOENCODING="ascii")
     assert (done.process.returncode, done.stderr) == (0, "")
     assert "F1: Sphere" in done.stdout
 
 
-def test_a_page_without_a_place_is_left_as_it_was(capsys: Said, tmp_path: Path) -> None:
+def test_a_page_without_marks_is_not_changed(capsys: Capture, tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("# mine\n")
-    said = refused(capsys, "1", "--out", str(tmp_path / "out"), "--update", str(page))
-    assert "no block 'origin' in the page: add the lines <!-- begin generated: origin -->" in said
+    error = refused(capsys, "1", "--out", str(tmp_path / "out"), "--update", str(page))
+    assert "no block 'origin' in the page: add the lines <!-- begin generated: origin -->" in error
     assert page.read_text() == "# mine\n"
-    assert os.listdir(tmp_path) == ["page.md"]  # seen to before anything is run
+    assert os.listdir(tmp_path) == ["page.md"]  # checked before anything is run
 
 
-def test_a_page_is_filled_where_its_marks_are(capsys: Said, tmp_path: Path) -> None:
+def test_a_page_is_filled_where_its_marks_are(capsys: Capture, tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     marks = [
         f"<!-- begin generated: {name} -->\nold\n<!-- end generated: {name} -->"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mfba digest, verify and diff, as a user calls them."""
+"""`mfba digest`, `mfba verify` and `mfba diff` on the command line."""
 
 import json
 from pathlib import Path
@@ -41,7 +41,7 @@ def test_a_result_without_digest_is_refused(tmp_path: Path) -> None:
         cli.main(["digest", str(result)])
 
 
-def test_verify_an_honest_bag(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_verify_an_unchanged_bag(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["verify", str(bag), "--closed-loop"]) == 0
     ticks = len(run_episode.run(load_scenario("case1"), seed=2).ticks)
     assert capsys.readouterr().out == (
@@ -67,7 +67,7 @@ def test_verify_names_the_first_tick_that_differs(
 def test_closed_loop_finds_a_world_that_was_not_simulated(
     bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Each decision is what the planner decides, but the robot did not go there."""
+    """Each decision is the planner's, but the robot did not follow it."""
     from mfba_planner.recording.bag_reader import BagReader
 
     with BagReader(bag) as reader:
@@ -78,7 +78,7 @@ def test_closed_loop_finds_a_world_that_was_not_simulated(
         return latched + [m for m in messages if m.log_time_ns > end // 2]
 
     late = rewrite(bag, tmp_path / "late", only_half)
-    with pytest.raises(BagError, match="tick 0 is not what the simulated world leads to"):
+    with pytest.raises(BagError, match="tick 0 differs from the simulated world"):
         cli.main(["verify", str(late), "--closed-loop"])
     assert "note: the recording starts at stamp" in capsys.readouterr().out
 
@@ -100,7 +100,7 @@ def test_what_if_nothing_changes(bag: Path, capsys: pytest.CaptureFixture[str]) 
     assert capsys.readouterr().out.endswith("no decision differs\n")
 
 
-def test_wrong_orders_are_refused(bag: Path) -> None:
+def test_wrong_arguments_are_refused(bag: Path) -> None:
     with pytest.raises(ConfigError, match=r"did you mean 'planner\.speed_mps'"):
         cli.main(["verify", str(bag), "--set", "planner.speed=1"])
     with pytest.raises(ConfigError, match=r"^--picture: there is one trail only"):

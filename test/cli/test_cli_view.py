@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mfba view`: what is written for Rerun's viewer, as Rerun's own reader tells of it."""
+"""`mfba view`: the file for Rerun's viewer, checked with Rerun's own reader."""
 
 import math
 import sys
@@ -23,7 +23,7 @@ def episode() -> Episode:
     return run(load_scenario("walled"), seed=1)
 
 
-def test_every_tick_of_every_run_is_there(episode: Episode, tmp_path: Path) -> None:
+def test_every_tick_of_every_run_is_saved(episode: Episode, tmp_path: Path) -> None:
     other = run(load_scenario("empty"))
     save([("a", episode), ("b", other)], tmp_path / "two.rrd")
     rows = rows_of(tmp_path / "two.rrd")
@@ -52,7 +52,7 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert not Path("no.rrd").exists()
 
 
-def test_without_a_screen_or_a_viewer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_a_display_or_a_viewer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A real Chromium without a window, for pages that are files."""
+"""Helper: a headless Chromium for tests of HTML pages."""
 
 import json
 import os
@@ -27,7 +27,7 @@ _ARGUMENTS = (
 
 
 class Browser:
-    """One Chromium; every page is opened afresh, in a window of the given size."""
+    """One Chromium; each page is opened anew, in a window of the given size."""
 
     def __init__(self, profile: Path) -> None:
         chromium = next(filter(None, map(shutil.which, CHROMIUMS)), None)
@@ -44,7 +44,7 @@ class Browser:
         for argument in (*_ARGUMENTS, f"--user-data-dir={profile}"):
             options.add_argument(argument)
         if os.geteuid() == 0:
-            options.add_argument("--no-sandbox")  # Chromium's own refuses root
+            options.add_argument("--no-sandbox")  # Chromium's sandbox refuses root
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         self.driver = webdriver.Chrome(options=options, service=Service(driver))
 
@@ -57,7 +57,7 @@ class Browser:
         dark: bool = False,
         calm: bool = False,
     ) -> None:
-        """Open a page and wait until it says that all of it is there."""
+        """Open a page and wait until its script has set data-ready."""
         self.command(
             "Emulation.setDeviceMetricsOverride",
             width=width,
@@ -65,14 +65,14 @@ class Browser:
             deviceScaleFactor=1,
             mobile=width < 500,
         )
-        wishes = {
+        preferences = {
             "prefers-color-scheme": "dark" if dark else "light",
             "prefers-reduced-motion": "reduce" if calm else "no-preference",
         }
-        features = [{"name": name, "value": value} for name, value in wishes.items()]
+        features = [{"name": name, "value": value} for name, value in preferences.items()]
         self.command("Emulation.setEmulatedMedia", features=features)
         for kind in ("browser", "performance"):
-            self.driver.get_log(kind)  # what was before is of no interest
+            self.driver.get_log(kind)  # discards older entries
         self.driver.get("about:blank")
         self.driver.get(page.as_uri())
         ready = "return document.documentElement.dataset.ready === 'yes'"
@@ -82,11 +82,11 @@ class Browser:
         return self.driver.execute_cdp_cmd(name, arguments)
 
     def run(self, script: str, *arguments: Any) -> Any:
-        """What a script returns."""
+        """Run a script and return its result."""
         return self.driver.execute_script(script, *arguments)
 
     def said(self) -> list[str]:
-        """What the console holds: errors and warnings."""
+        """The messages of the console: errors and warnings."""
         return [entry["message"] for entry in self.driver.get_log("browser")]
 
     def requested(self) -> list[str]:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Launch files run without `launch`, which is no wheel: what they declare, and what they start.
+"""Helper: runs launch files without `launch` (not on PyPI): their arguments and their nodes.
 
-Stands in for the few names of launch and launch_ros that launch/*.py use, with their signatures;
-each keeps what it is told. What launch makes of that, tools and tests here cannot say: where it
-is installed, test_launch_file lets it read the files.
+Replaces the few names of launch and launch_ros that launch/*.py use by stubs with the same
+signatures, which store their arguments. The real launch is not tested with it: where launch is
+installed, test_launch_file reads the files with it.
 """
 
 import runpy
@@ -38,20 +38,20 @@ class Node:
 
     @property
     def full_name(self) -> str:
-        """Its name below its namespace."""
+        """NAMESPACE/NAME."""
         return f"{self.namespace}/{self.name}".lstrip("/")
 
     def command_line(self, folder: Path) -> list[str]:
-        """What launch_ros makes of it: everything told in files, the later the last word."""
-        words = [*self.arguments, "--ros-args", "-r", f"__node:={self.name}"]
-        words += ["-r", f"__ns:=/{self.namespace}"] if self.namespace else []
-        for number, part in enumerate(self.parameters):
-            if isinstance(part, dict):
-                told = {name: getattr(value, "value", value) for name, value in part.items()}
-                part = folder / f"{self.full_name.replace('/', '_')}{number}.yaml"
-                part.write_text(yaml.safe_dump({"/**": {"ros__parameters": told}}))
-            words += ["--params-file", str(part)]
-        return words + [w for a, b in self.remappings for w in ("-r", f"{a}:={b}")]
+        """The arguments as launch_ros builds them: parameters in files, later ones override."""
+        arguments = [*self.arguments, "--ros-args", "-r", f"__node:={self.name}"]
+        arguments += ["-r", f"__ns:=/{self.namespace}"] if self.namespace else []
+        for number, entry in enumerate(self.parameters):
+            if isinstance(entry, dict):
+                values = {name: getattr(value, "value", value) for name, value in entry.items()}
+                entry = folder / f"{self.full_name.replace('/', '_')}{number}.yaml"
+                entry.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
+            arguments += ["--params-file", str(entry)]
+        return arguments + [w for a, b in self.remappings for w in ("-r", f"{a}:={b}")]
 
 
 @dataclass
@@ -109,7 +109,7 @@ _OURS = "mfba_planner.launcher.launch_actions"
 
 
 @contextmanager
-def _standing_in() -> Iterator[None]:
+def _stub_modules() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for name, names in _NAMES.items():
             module = ModuleType(name)
@@ -126,19 +126,21 @@ def _entities(file: str, kind: type) -> list[Any]:
 
 
 def declared(file: str) -> dict[str, tuple[str, str, list[str] | None]]:
-    """Default, description and choices of every argument, as `--show-args` tells them."""
-    with _standing_in():
+    """Default, description and choices of every argument, as `--show-args` prints them."""
+    with _stub_modules():
         found = _entities(file, _Declared)
     return {e.name: (e.default_value, e.description, e.choices) for e in found}
 
 
 def launched(file: str, given: Mapping[str, str]) -> list[Node]:
-    """The nodes that `ros2 launch mfba_planner FILE NAME:=VALUE...` starts, in its order."""
-    with _standing_in():
+    """The nodes that `ros2 launch mfba_planner FILE NAME:=VALUE...` starts, in sequence."""
+    with _stub_modules():
         declared = {entity.name: entity for entity in _entities(file, _Declared)}
         assert set(given) <= set(declared), f"{file}: {given}"
         for name, value in given.items():
             assert value in (declared[name].choices or [value]), f"{name}:={value}"
-        told = {name: argument.default_value for name, argument in declared.items()} | dict(given)
+        values = {name: argument.default_value for name, argument in declared.items()} | dict(
+            given
+        )
         (function,) = _entities(file, _Function)
-        return list(function.function(told))
+        return list(function.function(values))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the launcher share: real processes, and who of them is still there."""
+"""Helper: runs the package's programs as real processes and lists those still running."""
 
 import os
 import signal
@@ -16,13 +16,13 @@ from waiting import wait_until
 MARK = "MFBA_TEST_MARK"
 INSTALLED = Path(sys.executable).parent
 PROGRAM = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.{}())"
-# Thousands of ticks: long enough to be caught in the middle of it.
+# Thousands of ticks: long enough for a test to interrupt it.
 LONG = ["case1", "--planner", "paper", "--seed", "1", "--no-picture"]
 LONG += ["--set", "planner.step_length_m=0.002"]
 
 
 class Program:
-    """One of our commands as a process, and all that descend from it."""
+    """One program of the package as a process, with all its descendants."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class Program:
         more_env: Mapping[str, str] | None = None,
         installed: bool = False,
     ) -> None:
-        """With `installed` it is the executable that pip and colcon make, as `ros2 run` does."""
+        """Start it; `installed` uses the executable of pip and colcon, as `ros2 run` does."""
         self.mark = uuid.uuid4().hex
         env = {**os.environ, MARK: self.mark, "PYTHONPATH": str(ROOT), **(more_env or {})}
         self.process = subprocess.Popen(
@@ -51,8 +51,8 @@ class Program:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for pid in self.family():
-            with suppress(ProcessLookupError):  # it has ended by itself in between
+        for pid in self.processes():
+            with suppress(ProcessLookupError):  # it has ended in the meantime
                 os.kill(pid, signal.SIGKILL)
         self.process.communicate()
 
@@ -61,26 +61,28 @@ class Program:
         os.killpg(self.process.pid, sent)
 
     def end(self, timeout_s: float = 60.0) -> int:
-        """Wait for the end; keep what was said."""
+        """Wait for the end, keep stdout and stderr; return the exit code."""
         self.stdout, self.stderr = self.process.communicate(timeout=timeout_s)
         return self.process.returncode
 
-    def family(self) -> list[int]:
-        """Processes that run and carry our mark, the first one included."""
+    def processes(self) -> list[int]:
+        """PIDs of running processes with this program's mark, including the first one."""
         return [pid for pid, environ in _environments() if f"{MARK}={self.mark}" in environ]
 
     def node(self, name: str) -> int:
-        """The process of a node, NAMESPACE/node in a fleet."""
+        """The PID of a node, NODE or NAMESPACE/NODE."""
         namespace, _, program = name.rpartition("/")
-        told = [f"entry.{program}()", f"__ns:=/{namespace}\0" if namespace else ""]
+        required = [f"entry_points.{program}()", f"__ns:=/{namespace}\0" if namespace else ""]
         found = [
-            pid for pid in self.family() if all(words in _read(pid, "cmdline") for words in told)
+            pid
+            for pid in self.processes()
+            if all(text in _read(pid, "cmdline") for text in required)
         ]
         assert len(found) == 1, f"{name}: {found}"
         return found[0]
 
     def wait_for_data(self, run: Path) -> None:
-        """Wait until the run goes on and a first chunk of it is in the bag."""
+        """Wait until the bag has a first chunk of the run."""
         bag = run / "bag" / "bag_0.mcap"
         wait_until(lambda: bag.exists() and bag.stat().st_size > 30_000, timeout_s=60.0)
 
@@ -102,8 +104,8 @@ def _read(pid: int, what: str) -> str:
 
 
 def complete(name: str, *args: str, cwd: Path, **more_env: str) -> Program:
-    """Let a command run to its end."""
+    """Run a command to its end."""
     with Program(name, *args, cwd=cwd, more_env=more_env) as program:
         program.end()
-        assert program.family() == []
+        assert program.processes() == []
         return program

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stored numbers of `mfba tables --quick`, and how a run is brought into their form."""
+"""Helper: the stored numbers of `mfba tables --quick`, and a run's numbers in that form."""
 
 import hashlib
 from typing import Any
@@ -17,7 +17,7 @@ def numbers(made: Any) -> dict[str, dict[str, Any]]:
 
 
 def flat(made: Any) -> dict[str, Any]:
-    """Every number of ours: {place: value or [middle, low, high]}."""
+    """Every computed number: {key: value or [middle, low, high]}."""
     found: dict[str, Any] = {}
     for key, n in numbers(made).items():
         for reading, ours in n["ours"].items():
@@ -35,7 +35,7 @@ def short(value: Any) -> Any:
 
 
 def libm() -> str:
-    """Which sin, cos and exp numpy has here: they may differ in the last bit between machines."""
+    """A hash of numpy's sin, cos and exp, which may differ between machines in the last bit."""
     x = np.linspace(-20.0, 20.0, 20_001)
     bits = b"".join(f(x).tobytes() for f in (np.sin, np.cos, np.exp))
     return hashlib.sha256(bits).hexdigest()[:16]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The whole graph in one process takes the core's decisions, tick by tick."""
+"""The in-process driver makes the same decisions as the core, tick by tick."""
 
 import math
 from dataclasses import replace
@@ -47,11 +47,16 @@ def config(
     )
 
 
-def run_and_compare(told: RunConfig, bag: Path, domain_id: int) -> episode.Episode:
-    """Run the graph, read its bag back and hold it against the core's run."""
-    run_in_process(told, bag, domain_id=domain_id)
+def run_and_compare(run_config: RunConfig, bag: Path, domain_id: int) -> episode.Episode:
+    """Run the graph, read its bag back and compare it with the core's run."""
+    run_in_process(run_config, bag, domain_id=domain_id)
     recorded = read_episode(bag)
-    expected = simulate(told.scenario, planner=told.planner, sensor=told.sensor, seed=told.seed)
+    expected = simulate(
+        run_config.scenario,
+        planner=run_config.planner,
+        sensor=run_config.sensor,
+        seed=run_config.seed,
+    )
     assert recorded.ticks == expected.ticks
     assert recorded.outcome is expected.outcome
     assert (recorded.scenario, recorded.sensor, recorded.planner, recorded.seed) == (
@@ -87,17 +92,17 @@ def test_other_worlds(scenario: str, tmp_path: Path, domain_id: int) -> None:
 
 
 def test_the_persistent_swarm_of_fig_1(tmp_path: Path, domain_id: int) -> None:
-    told = config("case2", readings.planner("fig1"), 2)
-    recorded = run_and_compare(told, tmp_path / "bag", domain_id)
+    run_config = config("case2", readings.planner("fig1"), 2)
+    recorded = run_and_compare(run_config, tmp_path / "bag", domain_id)
     assert recorded.outcome is Outcome.GOAL_REACHED
 
 
 @pytest.mark.parametrize("scenario", ["case1", "case2"])
-def test_the_planner_that_predicts(scenario: str, tmp_path: Path, domain_id: int) -> None:
-    """On the same sectors it takes a shorter way than the paper's, and a bag of it is checked."""
+def test_the_predictive_planner(scenario: str, tmp_path: Path, domain_id: int) -> None:
+    """On the same sectors its path is not longer than the paper's; its bag can be verified."""
     paper = config(scenario, PlannerParams(), 1)
-    told = replace(paper, planner=preset(PlannerParams(method=Method.PREDICTIVE)))
-    recorded = run_and_compare(told, tmp_path / "bag", domain_id)
+    run_config = replace(paper, planner=preset(PlannerParams(method=Method.PREDICTIVE)))
+    recorded = run_and_compare(run_config, tmp_path / "bag", domain_id)
     result = evaluate(recorded)
     assert result.success
     others = run_episode.run(paper.scenario, planner=paper.planner, seed=1)
@@ -106,10 +111,10 @@ def test_the_planner_that_predicts(scenario: str, tmp_path: Path, domain_id: int
     assert report.is_identical, report.faults
 
 
-def test_another_ring_of_sensors(tmp_path: Path, domain_id: int) -> None:
+def test_another_number_of_sectors(tmp_path: Path, domain_id: int) -> None:
     sensor = SensorParams(sectors=36, sensing_range_m=1.5)
-    told = config("case2", PlannerParams(), 4, sensor)
-    recorded = run_and_compare(told, tmp_path / "bag", domain_id)
+    run_config = config("case2", PlannerParams(), 4, sensor)
+    recorded = run_and_compare(run_config, tmp_path / "bag", domain_id)
     assert len(recorded.ticks[0].vs) == 36
 
 
@@ -117,37 +122,37 @@ def test_a_run_can_be_ended_early(tmp_path: Path, domain_id: int) -> None:
     def first_ten(world: World) -> bool:
         return world.tick < 10
 
-    told = config("case1", PlannerParams(), 0)
-    run_in_process(told, tmp_path / "bag", domain_id=domain_id, on_turn=first_ten)
+    run_config = config("case1", PlannerParams(), 0)
+    run_in_process(run_config, tmp_path / "bag", domain_id=domain_id, on_turn=first_ten)
     recorded = read_episode(tmp_path / "bag")
     assert recorded.outcome is Outcome.INTERRUPTED
     count = len(recorded.ticks)
     assert 10 <= count < 30
-    assert recorded.ticks == run_episode.run(told.scenario).ticks[:count]
+    assert recorded.ticks == run_episode.run(run_config.scenario).ticks[:count]
 
 
 def test_a_run_that_takes_too_long_is_a_clear_error(tmp_path: Path, domain_id: int) -> None:
-    told = config("case1", PlannerParams(), 0)
+    run_config = config("case1", PlannerParams(), 0)
     with pytest.raises(GraphError, match=r"^the graph is stuck: tick \d+ after 0 s"):
-        run_in_process(told, tmp_path / "bag", domain_id=domain_id, timeout_s=0.0)
-    assert (tmp_path / "bag" / "metadata.yaml").exists(), "the bag is closed all the same"
+        run_in_process(run_config, tmp_path / "bag", domain_id=domain_id, timeout_s=0.0)
+    assert (tmp_path / "bag" / "metadata.yaml").exists(), "the bag is closed after an error too"
 
 
-def test_in_real_time_the_goal_is_reached_too(tmp_path: Path, domain_id: int) -> None:
+def test_a_real_time_run_reaches_the_goal(tmp_path: Path, domain_id: int) -> None:
     near = '{"name": "near", "start_m": [0, 0], "goal_m": [3, 0]}'
-    told = replace(config(near, PlannerParams(), 1), real_time=True, speed_factor=4.0)
-    took_s = run_in_process(told, tmp_path / "bag", domain_id=domain_id)
+    run_config = replace(config(near, PlannerParams(), 1), real_time=True, speed_factor=4.0)
+    wall_s = run_in_process(run_config, tmp_path / "bag", domain_id=domain_id)
     recorded = read_episode(tmp_path / "bag")
     assert recorded.outcome is Outcome.GOAL_REACHED
-    assert took_s >= 0.9 * (len(recorded.ticks) - 1) * told.planner.tick_ns * NANO / 4.0
+    assert wall_s >= 0.9 * (len(recorded.ticks) - 1) * run_config.planner.tick_ns * NANO / 4.0
 
 
 def start_loop(graph: Graph, scenario: str, seed: int, **more: Any) -> WorldSim:
-    """World, sensor and planner, paused before the first tick; more goes to all of them."""
-    told = node_parameters(config(scenario, PlannerParams(), seed), peers=())
-    graph.start(VirtualSensor, told["virtual_sensor"])
-    planner = graph.start(PlannerNode, {**told["planner"], **more})
-    world = graph.start(WorldSim, {**told["world_sim"], **more})
+    """Start world, sensor and planner, paused before the first tick; more: parameters."""
+    parameters = node_parameters(config(scenario, PlannerParams(), seed), peers=())
+    graph.start(VirtualSensor, parameters["virtual_sensor"])
+    planner = graph.start(PlannerNode, {**parameters["planner"], **more})
+    world = graph.start(WorldSim, {**parameters["world_sim"], **more})
     graph.until(lambda: planner.goals.goal_queue.goal is not None)
     return world
 
@@ -173,7 +178,7 @@ def test_a_loop_of_stamped_twists(graph: Graph) -> None:
 
 
 @pytest.mark.parametrize("yaw", [1.0, -2.5, math.pi])
-def test_a_robot_that_looks_elsewhere_takes_the_same_way(graph: Graph, yaw: float) -> None:
+def test_a_robot_with_another_yaw_takes_the_same_path(graph: Graph, yaw: float) -> None:
     decisions = graph.hear(topics.DECISION)
     world = start_loop(graph, "case2", 6)
     teleport(graph, 0.0, 0.0, yaw)
@@ -184,7 +189,7 @@ def test_a_robot_that_looks_elsewhere_takes_the_same_way(graph: Graph, yaw: floa
     assert world.world.pose == pytest.approx((*expected[-1].pose.position, yaw), abs=1e-6)
 
 
-def test_a_kidnapped_robot_finds_the_goal_from_where_it_is(graph: Graph) -> None:
+def test_a_kidnapped_robot_reaches_the_goal(graph: Graph) -> None:
     world = start_loop(graph, "case1", 6)
     world.resume()
     graph.until(lambda: world.world.tick > 20)
@@ -199,25 +204,25 @@ def teleport(graph: Graph, x: float, y: float, yaw: float) -> None:
     graph.settle()
 
 
-def test_a_planner_that_is_restarted_picks_up_where_the_other_left(graph: Graph) -> None:
-    told = node_parameters(config("case2", PlannerParams(), 7), peers=())
+def test_a_restarted_planner_continues_the_run(graph: Graph) -> None:
+    parameters = node_parameters(config("case2", PlannerParams(), 7), peers=())
     decisions = graph.hear(topics.DECISION)
     world = graph.start(
-        WorldSim, {**told["world_sim"], "answer_timeout_s": 0.2, "answer_retries": 1000}
+        WorldSim, {**parameters["world_sim"], "answer_timeout_s": 0.2, "answer_retries": 1000}
     )
-    graph.start(VirtualSensor, told["virtual_sensor"])
-    first = graph.start(PlannerNode, told["planner"])
+    graph.start(VirtualSensor, parameters["virtual_sensor"])
+    first = graph.start(PlannerNode, parameters["planner"])
     graph.until(lambda: first.goals.goal_queue.goal is not None)
     world.resume()
     graph.until(lambda: world.world.tick > 20)
     graph.stop(first)
     graph.settle()
     left_at = world.world.tick
-    second = graph.start(PlannerNode, told["planner"])
+    second = graph.start(PlannerNode, parameters["planner"])
     run_to_the_end(graph, world)
     assert second._refused_inputs.count == 0
     expected = run_episode.run(load_scenario("case2"), seed=7).ticks
-    assert left_at < len(expected) - 5, "it was restarted too late to say anything"
+    assert left_at < len(expected) - 5, "it was restarted too late to show anything"
     assert [stamp_ns(message.header.stamp) for message in decisions] == [
         tick.stamp_ns for tick in expected
     ]

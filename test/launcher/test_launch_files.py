@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launch files: what they tell the nodes, and that `launch` can read them."""
+"""The launch files: the node parameters they give, and that `launch` can read them."""
 
 import importlib.util
 import xml.etree.ElementTree as ElementTree
@@ -16,7 +16,12 @@ from ros_graph import Graph
 
 from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.core.options import flatten
-from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, REPLAY_ARGUMENTS, replayed, robot
+from mfba_planner.launcher.robot_launch import (
+    PLANNER_ARGUMENTS,
+    REPLAY_ARGUMENTS,
+    replay_nodes,
+    robot_nodes,
+)
 from mfba_planner.launcher.simulate_launch import ARGUMENTS, launch_parameters
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive import preset
@@ -51,21 +56,23 @@ def test_defaults_are_case_study_1_in_real_time_and_unrecorded() -> None:
         ({"planner": "predictive", "algorithm": "ba"}, "predictive", 1),
     ],
 )
-def test_what_is_about_algorithm_1_is_given_to_it(
+def test_options_of_algorithm_1_select_algorithm_1(
     changes: dict[str, str], method: str, iterations: int
 ) -> None:
-    told = launch_parameters(given(**changes))["planner"]
-    assert (told["method"], told["bat.iterations"]) == (method, iterations)
+    parameters = launch_parameters(given(**changes))["planner"]
+    assert (parameters["method"], parameters["bat.iterations"]) == (method, iterations)
 
 
-def test_a_robot_drives_with_the_planner_that_does_not_collide() -> None:
-    told = yaml.safe_load((LAUNCH.parent / "config/planner.yaml").read_text(encoding="utf-8"))
-    planner = told["/**/planner"]["ros__parameters"]
+def test_the_shipped_parameters_use_the_predictive_planner() -> None:
+    parameters = yaml.safe_load(
+        (LAUNCH.parent / "config/planner.yaml").read_text(encoding="utf-8")
+    )
+    planner = parameters["/**/planner"]["ros__parameters"]
     assert (planner["method"], planner["bat.iterations"]) == ("predictive", 1)
 
 
 def test_arguments_reach_the_nodes() -> None:
-    told = launch_parameters(
+    parameters = launch_parameters(
         given(
             scenario="case2",
             seed="5",
@@ -73,29 +80,38 @@ def test_arguments_reach_the_nodes() -> None:
             reading="fig1",
             real_time="false",
             record="true",
-            bag="here",
+            bag="my_bag",
         )
     )
-    assert next(iter(told)) == "recorder"
-    assert (told["recorder"]["output"], told["recorder"]["nodes"]) == ("here", ",".join(NODES))
-    assert told["planner"]["wait_for"] == ",".join((*NODES, "recorder"))
-    assert told["planner"]["seed"] == 5
-    assert (told["planner"]["bat.algorithm"], told["planner"]["swarm"]) == ("ba", "persistent")
-    assert (told["world_sim"]["lockstep"], "case2" in told["world_sim"]["scenario"]) == (
+    assert next(iter(parameters)) == "recorder"
+    assert (parameters["recorder"]["output"], parameters["recorder"]["nodes"]) == (
+        "my_bag",
+        ",".join(NODES),
+    )
+    assert parameters["planner"]["wait_for"] == ",".join((*NODES, "recorder"))
+    assert parameters["planner"]["seed"] == 5
+    assert (parameters["planner"]["bat.algorithm"], parameters["planner"]["swarm"]) == (
+        "ba",
+        "persistent",
+    )
+    assert (
+        parameters["world_sim"]["lockstep"],
+        "case2" in parameters["world_sim"]["scenario"],
+    ) == (
         True,
         True,
     )
 
 
-def test_a_fleet_s_nodes_are_told_in_their_namespaces() -> None:
-    told = launch_parameters(given(scenario="swap", record="true"))
+def test_a_fleet_s_nodes_have_parameters_per_namespace() -> None:
+    parameters = launch_parameters(given(scenario="swap", record="true"))
     robots = [f"robot{number}" for number in range(10)]
     of_robots = [f"{robot}/{node}" for robot in robots for node in OF_ROBOT]
-    assert list(told) == ["recorder", "world_sim", *of_robots]
-    assert told["recorder"]["namespaces"] == ",".join(robots)
-    assert told["recorder"]["nodes"].split(",") == ["world_sim", *of_robots]
-    assert len({told[f"{robot}/planner"]["seed"] for robot in robots}) == len(robots)
-    assert not told["world_sim"]["lockstep"]
+    assert list(parameters) == ["recorder", "world_sim", *of_robots]
+    assert parameters["recorder"]["namespaces"] == ",".join(robots)
+    assert parameters["recorder"]["nodes"].split(",") == ["world_sim", *of_robots]
+    assert len({parameters[f"{robot}/planner"]["seed"] for robot in robots}) == len(robots)
+    assert not parameters["world_sim"]["lockstep"]
 
 
 @pytest.mark.parametrize(
@@ -135,7 +151,7 @@ def test_every_argument_is_described_and_its_default_is_a_choice(name: str) -> N
 
 @pytest.mark.parametrize("name", FILES)
 def test_launch_file_is_what_launch_expects(name: str) -> None:
-    """Read by launch itself where it is installed (it is no wheel), otherwise by its stand-in."""
+    """Read by launch itself where it is installed (it is no wheel), otherwise by its stub."""
     path = LAUNCH / f"{name}.launch.py"
     if importlib.util.find_spec("launch_ros") is not None:
         sources = import_module("launch.launch_description_sources")
@@ -143,18 +159,18 @@ def test_launch_file_is_what_launch_expects(name: str) -> None:
         assert [a.name for a in description.get_launch_arguments()] == list(FILES[name])
         return
     assert declared(path.name) == {
-        argument: (told.default, told.description, list(told.choices) or None)
-        for argument, told in FILES[name].items()
+        argument_name: (argument.default, argument.description, list(argument.choices) or None)
+        for argument_name, argument in FILES[name].items()
     }
     given = {"bag": "runs/mine/bag"} if name == "replay" else {}
     nodes = launched(path.name, given)
     assert [node.name for node in nodes] == STARTED[name]
     for node in nodes:
         assert (node.package, node.executable) == ("mfba_planner", node.name)
-        assert node.on_exit.reason == f"{node.name} has ended", "when one ends, so do all"
+        assert node.on_exit.reason == f"{node.name} has ended", "when one ends, all are shut down"
 
 
-def test_the_xml_twin_declares_and_starts_the_same() -> None:
+def test_the_xml_launch_file_declares_and_starts_the_same() -> None:
     root = ElementTree.parse(LAUNCH / "planner.launch.xml").getroot()
     declared = {a.get("name"): (a.get("default"), a.get("description")) for a in root.iter("arg")}
     shipped = "$(find-pkg-share mfba_planner)/config/planner.yaml"
@@ -166,11 +182,11 @@ def test_the_xml_twin_declares_and_starts_the_same() -> None:
         for name, argument in PLANNER_ARGUMENTS.items()
     }
     names = ("scan", "odom", "cmd_vel", "goal_pose", "waypoints")
-    starts = robot(by_default(PLANNER_ARGUMENTS) | {name: f"my_{name}" for name in names})
+    starts = robot_nodes(by_default(PLANNER_ARGUMENTS) | {name: f"my_{name}" for name in names})
     for start, node in zip(starts, root.iter("node"), strict=True):
         assert (node.get("exec"), node.get("name")) == (start.name, start.name)
-        told = {param.get("name") for param in node.iter("param") if param.get("name")}
-        assert told == set(start.parameters)
+        in_xml = {param.get("name") for param in node.iter("param") if param.get("name")}
+        assert in_xml == set(start.parameters)
         remaps = [(remap.get("from"), f"my_{remap.get('from')}") for remap in node.iter("remap")]
         assert remaps == list(start.remaps)
 
@@ -179,8 +195,8 @@ def by_default(arguments: Any) -> dict[str, str]:
     return {name: argument.default for name, argument in arguments.items()}
 
 
-def test_on_a_robot_the_sensor_reads_the_scan_and_the_shipped_file_has_the_last_word() -> None:
-    sensor, planner = robot(by_default(PLANNER_ARGUMENTS))
+def test_on_a_robot_the_sensor_reads_the_scan_and_the_shipped_file_overrides() -> None:
+    sensor, planner = robot_nodes(by_default(PLANNER_ARGUMENTS))
     assert sensor.parameters["source"] == "scan"
     assert planner.parameters == {
         "use_sim_time": False,
@@ -195,33 +211,33 @@ def test_on_a_robot_the_sensor_reads_the_scan_and_the_shipped_file_has_the_last_
 def test_remaps_and_files_reach_the_nodes_of_a_robot(tmp_path: Path) -> None:
     mine = tmp_path / "mine.yaml"
     mine.write_text("{}")
-    told = {"scan": "/front/scan", "odom": "wheel/odom", "stamped": "true"}
-    told["params_file"] = str(mine)
-    sensor, planner = robot(by_default(PLANNER_ARGUMENTS) | told)
+    changes = {"scan": "/front/scan", "odom": "wheel/odom", "stamped": "true"}
+    changes["params_file"] = str(mine)
+    sensor, planner = robot_nodes(by_default(PLANNER_ARGUMENTS) | changes)
     assert sensor.remaps == (("scan", "/front/scan"), ("odom", "wheel/odom"))
     assert planner.remaps == (("odom", "wheel/odom"),)
     assert planner.parameters["enable_stamped_cmd_vel"] is True
     assert sensor.files == planner.files == (str(mine),)
-    with pytest.raises(InputError, match="params_file:=nowhere: not there"):
-        robot(by_default(PLANNER_ARGUMENTS) | {"params_file": "nowhere"})
+    with pytest.raises(InputError, match="params_file:=nowhere: does not exist"):
+        robot_nodes(by_default(PLANNER_ARGUMENTS) | {"params_file": "nowhere"})
 
 
-def test_a_replay_is_told_what_its_command_line_understands() -> None:
+def test_replay_gets_valid_command_line_arguments() -> None:
     given = by_default(REPLAY_ARGUMENTS) | {"bag": "runs/mine", "rate": "2.5", "loop": "true"}
-    (replay,) = replayed(given)
+    (replay,) = replay_nodes(given)
     settings = parse(list(replay.arguments))
     assert (settings.bag, settings.rate, settings.loop) == ("runs/mine", 2.5, True)
     assert settings.inputs_of == ()
-    planner, replay = replayed(given | {"planner": "true"})
+    planner, replay = replay_nodes(given | {"planner": "true"})
     assert planner.parameters == {"lockstep": True}
     settings = parse(list(replay.arguments))
     assert (settings.inputs_of, settings.wait_for_subscribers) == (("planner",), ())
     with pytest.raises(InputError, match=r"^bag:= is empty; give a bag"):
-        replayed(by_default(REPLAY_ARGUMENTS))
+        replay_nodes(by_default(REPLAY_ARGUMENTS))
 
 
 @pytest.mark.parametrize("namespace", ["", "robot1"])
-def test_the_shipped_parameters_are_taken_by_the_nodes_in_any_namespace(
+def test_nodes_accept_the_shipped_parameters_in_any_namespace(
     graph: Graph, namespace: str
 ) -> None:
     file = ["--ros-args", "--params-file", str(LAUNCH.parent / "config/planner.yaml")]
@@ -232,12 +248,12 @@ def test_the_shipped_parameters_are_taken_by_the_nodes_in_any_namespace(
         ("planner", flatten(planner.settings) | flatten(planner.path_planner.params)),
         ("virtual_sensor", flatten(sensor.settings) | flatten(sensor.sensor)),
     ):
-        defaults = {k: v for part in reference.NODES[node] for k, v in flatten(part).items()}
+        defaults = {k: v for params in reference.NODES[node] for k, v in flatten(params).items()}
         assert found == defaults | reference.ROBOT[node]
 
 
-def test_a_robot_that_is_told_the_shipped_parameters_stops_in_time() -> None:
-    told = reference.ROBOT["planner"]
-    watch_s = 0.25 * told["input_timeout_s"]
-    assert told["input_timeout_s"] + watch_s < 0.32
-    assert told["step_length_m"] / told["speed_mps"] == pytest.approx(0.1)
+def test_a_robot_with_the_shipped_parameters_stops_in_time() -> None:
+    planner = reference.ROBOT["planner"]
+    watch_s = 0.25 * planner["input_timeout_s"]
+    assert planner["input_timeout_s"] + watch_s < 0.32
+    assert planner["step_length_m"] / planner["speed_mps"] == pytest.approx(0.1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launcher from end to end: real processes, real DDS, and the core's decisions."""
+"""The launcher end to end: real processes and real DDS make the core's decisions."""
 
 import json
 from pathlib import Path
@@ -44,7 +44,9 @@ def check_bag(bag: Path, expected: episode.Episode) -> None:
 
 
 @pytest.mark.parametrize(("scenario", "algorithm"), [("case1", "mfba"), ("case2", "ba")])
-def test_multi_process_run_is_the_core_s(tmp_path: Path, scenario: str, algorithm: str) -> None:
+def test_multi_process_run_equals_the_core_s(
+    tmp_path: Path, scenario: str, algorithm: str
+) -> None:
     done = complete("launcher", scenario, "--seed", "3", "--algorithm", algorithm, cwd=tmp_path)
     assert (done.process.returncode, done.stderr) == (0, "")
     run = tmp_path / "runs" / "run-001"
@@ -69,7 +71,7 @@ def test_multi_process_run_is_the_core_s(tmp_path: Path, scenario: str, algorith
     assert "wrote runs/run-001: bag, log.txt, result.json, run.png" in done.stdout
 
 
-def test_in_process_run_is_the_core_s(tmp_path: Path) -> None:
+def test_in_process_run_equals_the_core_s(tmp_path: Path) -> None:
     done = complete(
         "launcher", "--driver", "in-process", "--out", "a/b", "--no-picture", cwd=tmp_path
     )
@@ -81,7 +83,7 @@ def test_in_process_run_is_the_core_s(tmp_path: Path) -> None:
     assert sorted(path.name for path in (tmp_path / "a/b").iterdir()) == ["bag", "result.json"]
 
 
-def test_core_run_leaves_result_and_picture(tmp_path: Path) -> None:
+def test_core_run_writes_result_and_picture(tmp_path: Path) -> None:
     done = complete("launcher", "case2", "--driver", "core", cwd=tmp_path)
     assert (done.process.returncode, done.stderr) == (0, "")
     assert "wrote runs/run-001: result.json, run.png" in done.stdout
@@ -89,7 +91,7 @@ def test_core_run_leaves_result_and_picture(tmp_path: Path) -> None:
     assert (result["driver"], result["result"]["success"]) == ("core", True)
 
 
-def test_two_launchers_at_once_do_not_meet(tmp_path: Path) -> None:
+def test_two_launchers_at_once_use_different_domains(tmp_path: Path) -> None:
     with (
         Program("launcher", "case1", "--seed", "1", *PAPER, cwd=tmp_path) as first,
         Program("launcher", "case2", "--seed", "2", *PAPER, cwd=tmp_path) as second,

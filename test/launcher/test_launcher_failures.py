@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launcher when things go wrong: one line, the right code, nobody left behind."""
+"""Failures of the launcher: one line, the right exit code, no process left running."""
 
 import json
 import os
@@ -48,7 +48,7 @@ def only_line(program: Program) -> str:
         (["--out", "file/run"], "launcher: file/run: cannot be created (Not a directory); choose"),
     ],
 )
-def test_what_cannot_be_ordered_is_one_line(
+def test_a_bad_request_is_one_line(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -59,10 +59,10 @@ def test_what_cannot_be_ordered_is_one_line(
     Path("taken").mkdir()
     Path("file").touch()
     assert run_and_return_exit_code(lambda: launcher.main(args), "launcher") == 1
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.startswith(line)
-    assert said.err.count("\n") == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith(line)
+    assert captured.err.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "taken"]
 
 
@@ -77,7 +77,7 @@ def test_node_that_refuses_its_arguments_is_named(tmp_path: Path) -> None:
     done = complete("launcher", "--virtual-sensor-args=-p sectors:=2", cwd=tmp_path)
     assert done.process.returncode == 1
     assert only_line(done) == (
-        "launcher: virtual_sensor ended (exit code 1); it said last: virtual_sensor: "
+        "launcher: virtual_sensor ended (exit code 1); last line: virtual_sensor: "
         "sectors=2: out of range; give a value in [3, 3600]\n"
     )
     assert [*tmp_path.iterdir()] == []
@@ -95,12 +95,12 @@ def test_second_launcher_in_the_same_directory_is_refused(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("node", ["planner", "world_sim"])
-def test_node_killed_in_mid_run_is_named(tmp_path: Path, node: str) -> None:
+def test_node_killed_during_the_run_is_named(tmp_path: Path, node: str) -> None:
     with Program("launcher", *LONG, "--out", "run", cwd=tmp_path) as program:
         program.wait_for_data(tmp_path / "run")
         os.kill(program.node(node), signal.SIGKILL)
         assert program.end() == 1
-        assert program.family() == []
+        assert program.processes() == []
     assert only_line(program).startswith(f"launcher: {node} ended (killed by SIGKILL)")
     assert program.stderr.endswith("; what was recorded is in run\n")
     recorded = read_episode(tmp_path / "run/bag")
@@ -110,24 +110,24 @@ def test_node_killed_in_mid_run_is_named(tmp_path: Path, node: str) -> None:
     assert result["extra"]["failure"].startswith(f"{node} ended")
 
 
-def test_recorder_killed_in_mid_run_leaves_a_bag_to_recover(tmp_path: Path) -> None:
+def test_recorder_killed_during_the_run_leaves_a_bag_to_recover(tmp_path: Path) -> None:
     with Program("launcher", *LONG, "--out", "run", cwd=tmp_path) as program:
         program.wait_for_data(tmp_path / "run")
         os.kill(program.node("recorder"), signal.SIGKILL)
         assert program.end() == 1
-        assert program.family() == []
+        assert program.processes() == []
     assert only_line(program).startswith("launcher: recorder ended (killed by SIGKILL)")
     assert recover(tmp_path / "run/bag", tmp_path / "whole").messages > 100
     assert len(read_episode(tmp_path / "whole").ticks) > 10
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_interrupted_run_is_whole(tmp_path: Path, number: signal.Signals, code: int) -> None:
+def test_interrupted_run_is_complete(tmp_path: Path, number: signal.Signals, code: int) -> None:
     with Program("launcher", *LONG, "--out", "run", cwd=tmp_path) as program:
         program.wait_for_data(tmp_path / "run")
         program.process.send_signal(number)
         assert program.end() == code
-        assert program.family() == []
+        assert program.processes() == []
     assert only_line(program) == f"interrupted by {number.name}; what was recorded is in run\n"
     recorded = read_episode(tmp_path / "run/bag")
     result = json.loads((tmp_path / "run/result.json").read_text())
@@ -136,7 +136,7 @@ def test_interrupted_run_is_whole(tmp_path: Path, number: signal.Signals, code: 
 
 
 @pytest.mark.parametrize("driver", ["in-process", "core"])
-def test_interrupted_run_of_one_process_is_whole(tmp_path: Path, driver: str) -> None:
+def test_interrupted_run_of_one_process_is_complete(tmp_path: Path, driver: str) -> None:
     args = ["walled", "--no-picture", "--set", "planner.step_length_m=0.001", "--out", "run"]
     with Program("launcher", *args, "--driver", driver, cwd=tmp_path) as program:
         if driver == "in-process":
@@ -158,7 +158,7 @@ def test_interrupt_before_the_start_leaves_nothing(tmp_path: Path) -> None:
         wait_until(lambda: (tmp_path / "runs/run-001").exists(), timeout_s=30.0)
         program.process.send_signal(signal.SIGINT)
         assert program.end() == 130
-        assert program.family() == []
+        assert program.processes() == []
     assert only_line(program) == "interrupted by SIGINT\n"
     assert [*tmp_path.iterdir()] == []
 
@@ -167,8 +167,8 @@ def test_nodes_do_not_outlive_a_killed_launcher(tmp_path: Path) -> None:
     with Program("launcher", *LONG, "--out", "run", cwd=tmp_path) as program:
         program.wait_for_data(tmp_path / "run")
         program.process.kill()
-        wait_until(lambda: program.family() == [], timeout_s=20.0)
-    assert len(read_episode(tmp_path / "run/bag").ticks) > 10  # even closed in order
+        wait_until(lambda: program.processes() == [], timeout_s=20.0)
+    assert len(read_episode(tmp_path / "run/bag").ticks) > 10  # the bag is closed properly
 
 
 def test_timeout_ends_a_run(tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_timeout_ends_a_run(tmp_path: Path) -> None:
     assert "timeout of 4 s reached; raise --timeout or look at the log" in only_line(done)
 
 
-def test_reader_that_goes_away_ends_the_run(tmp_path: Path) -> None:
+def test_closed_stdout_ends_the_run(tmp_path: Path) -> None:
     with Program("launcher", *LONG, "--out", "run", cwd=tmp_path) as program:
         assert program.process.stdout is not None
         program.process.stdout.close()
@@ -186,4 +186,4 @@ def test_reader_that_goes_away_ends_the_run(tmp_path: Path) -> None:
         ended.start()
         ended.join(60.0)
         assert program.process.returncode == 141
-        assert program.family() == []
+        assert program.processes() == []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fleet as real processes: the core's decisions, whoever starts first, nobody left behind."""
+"""A fleet as real processes: the core's decisions in any start sequence; clean shutdown."""
 
 import json
 import os
@@ -44,28 +44,39 @@ PAIR = Scenario(
 
 
 @pytest.fixture
-def here(tmp_path: Path) -> Path:
+def pair_directory(tmp_path: Path) -> Path:
     """A directory with the pair's scenario."""
     (tmp_path / "pair.json").write_text(scenario_to_json(PAIR), encoding="utf-8")
     return tmp_path
 
 
-def test_two_robots_as_six_processes_decide_as_in_one(here: Path) -> None:
-    told = "--planner-args=-p view_period_s:=7.5"
-    done = complete("launcher", "pair.json", "--seed", "3", *PAPER, *PROCESSES, told, cwd=here)
+def test_two_robots_as_six_processes_decide_as_in_one(pair_directory: Path) -> None:
+    planner_args = "--planner-args=-p view_period_s:=7.5"
+    done = complete(
+        "launcher",
+        "pair.json",
+        "--seed",
+        "3",
+        *PAPER,
+        *PROCESSES,
+        planner_args,
+        cwd=pair_directory,
+    )
     assert (done.process.returncode, done.stderr) == (0, "")
-    recorded = read_recording(here / "run/bag").episodes
+    recorded = read_recording(pair_directory / "run/bag").episodes
     core = run_fleet(PAIR, seed=3)
     assert list(recorded) == ["east", "west"]
     assert [digest(e.ticks) for e in recorded.values()] == [digest(e.ticks) for e in core]
     assert tuple(replace(e, driver="core") for e in recorded.values()) == core
-    assert len(core[0].ticks) != len(core[1].ticks)  # one is there first, and asked no more
+    assert len(core[0].ticks) != len(
+        core[1].ticks
+    )  # one arrives first; its planner is not called again
     assert "[west/planner] INFO: goal_pose: on to (0.0, 0.0)" in done.stdout
     assert "2 of 2 robots at the goal without collision" in done.stdout
-    found = sorted(path.name for path in (here / "run").iterdir())
+    found = sorted(path.name for path in (pair_directory / "run").iterdir())
     assert found == ["bag", "east.json", "log.txt", "west.json"]
-    assert json.loads((here / "run/west.json").read_text())["driver"] == "multi-process"
-    with BagReader(here / "run/bag") as reader:
+    assert json.loads((pair_directory / "run/west.json").read_text())["driver"] == "multi-process"
+    with BagReader(pair_directory / "run/bag") as reader:
         counts = {name: topic.message_count for name, topic in reader.topics.items()}
         nodes = read_configuration(reader)["nodes"]
     of_robots = {f"{robot}/{node}" for robot in recorded for node in OF_ROBOT}
@@ -77,71 +88,71 @@ def test_two_robots_as_six_processes_decide_as_in_one(here: Path) -> None:
     assert counts["/clock"] == max(len(episode.ticks) for episode in core)
 
 
-def test_whoever_starts_first(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_nodes_may_start_in_any_sequence(
+    pair_directory: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The launcher's own order is one of many; the recorder may come last, too."""
+    """Also other sequences than the launcher's own; the recorder may be the last."""
     start = node_processes.NodeProcesses.start
-    told_in: list[list[str]] = []
+    sequences: list[list[str]] = []
 
     def shuffled(
-        self: node_processes.NodeProcesses, told: Parameters, more: dict[str, list[str]]
+        self: node_processes.NodeProcesses, parameters: Parameters, extra: dict[str, list[str]]
     ) -> None:
-        names = list(told)
-        random.Random(len(told_in)).shuffle(names)
-        told_in.append(names)
-        start(self, {name: told[name] for name in names}, more)
+        names = list(parameters)
+        random.Random(len(sequences)).shuffle(names)
+        sequences.append(names)
+        start(self, {name: parameters[name] for name in names}, extra)
 
     monkeypatch.setattr(node_processes.NodeProcesses, "start", shuffled)
-    monkeypatch.chdir(here)
+    monkeypatch.chdir(pair_directory)
     from mfba_planner import launcher
 
-    planner = read_request([], "launcher").config.planner  # who drives where nobody says
+    planner = read_request([], "launcher").config.planner  # the default planner
     core = simulate_fleet(PAIR, planner=planner, sensor=SensorParams(), seed=1)
-    for place in ("one", "two"):
-        args = ["pair.json", "--seed", "1", *PROCESSES[:-1], place]
+    for name in ("one", "two"):
+        args = ["pair.json", "--seed", "1", *PROCESSES[:-1], name]
         assert launcher.main(args) == 0, capsys.readouterr().out
-        recorded = read_recording(here / place / "bag").episodes
+        recorded = read_recording(pair_directory / name / "bag").episodes
         assert [e.ticks for e in recorded.values()] == [e.ticks for e in core]
-    assert told_in[0] != told_in[1]
+    assert sequences[0] != sequences[1]
 
 
 @pytest.mark.parametrize("node", ["west/planner", "east/virtual_sensor"])
-def test_a_node_that_dies_is_named_with_its_robot(here: Path, node: str) -> None:
-    with Program("launcher", "pair.json", *LONG, cwd=here) as program:
-        program.wait_for_data(here / "run")
+def test_a_killed_node_is_named_with_its_robot(pair_directory: Path, node: str) -> None:
+    with Program("launcher", "pair.json", *LONG, cwd=pair_directory) as program:
+        program.wait_for_data(pair_directory / "run")
         os.kill(program.node(node), signal.SIGKILL)
         assert program.end() == 1
-        assert program.family() == []
+        assert program.processes() == []
     assert program.stderr.count("\n") == 1
     assert program.stderr.startswith(f"launcher: {node} ended (killed by SIGKILL)")
     assert program.stderr.endswith("; what was recorded is in run\n")
-    for name, episode in read_recording(here / "run/bag").episodes.items():
+    for name, episode in read_recording(pair_directory / "run/bag").episodes.items():
         assert episode.outcome is Outcome.INTERRUPTED
         assert len(episode.ticks) > 10
-        told = json.loads((here / f"run/{name}.json").read_text())
-        assert told["extra"]["failure"].startswith(f"{node} ended")
+        result = json.loads((pair_directory / f"run/{name}.json").read_text())
+        assert result["extra"]["failure"].startswith(f"{node} ended")
 
 
-def test_ctrl_c_leaves_a_whole_bag_and_nobody(here: Path) -> None:
-    with Program("launcher", "pair.json", *LONG, cwd=here) as program:
-        program.wait_for_data(here / "run")
+def test_ctrl_c_leaves_a_complete_bag_and_no_process(pair_directory: Path) -> None:
+    with Program("launcher", "pair.json", *LONG, cwd=pair_directory) as program:
+        program.wait_for_data(pair_directory / "run")
         program.send_group(signal.SIGINT)
         assert program.end() == 130
-        assert program.family() == []
+        assert program.processes() == []
     assert program.stderr == "interrupted by SIGINT; what was recorded is in run\n"
-    east, west = read_recording(here / "run/bag").episodes.values()
+    east, west = read_recording(pair_directory / "run/bag").episodes.values()
     assert len(east.ticks) == len(west.ticks) > 10
 
 
-def test_nodes_do_not_outlive_a_killed_launcher(here: Path) -> None:
-    with Program("launcher", "pair.json", *LONG, cwd=here) as program:
-        program.wait_for_data(here / "run")
+def test_nodes_do_not_outlive_a_killed_launcher(pair_directory: Path) -> None:
+    with Program("launcher", "pair.json", *LONG, cwd=pair_directory) as program:
+        program.wait_for_data(pair_directory / "run")
         program.process.kill()
-        wait_until(lambda: program.family() == [], timeout_s=30.0)
+        wait_until(lambda: program.processes() == [], timeout_s=30.0)
 
 
-def test_more_than_find_each_other_are_refused(tmp_path: Path) -> None:
+def test_too_many_robots_for_discovery_are_refused(tmp_path: Path) -> None:
     robots = tuple(
         Member(name=f"r{n}", start_m=(0.0, float(n)), goal_m=(9.0, float(n)))
         for n in range(MOST_ROBOTS + 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launcher's parts: orders, directories, domains, children, lines."""
+"""Launcher modules: requests, directories, domains, node processes, console, signals."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ from waiting import wait_until
 
 from mfba_planner.core.errors import GraphError, OutputError
 from mfba_planner.core.options import flatten
-from mfba_planner.launcher import node_process as child_module
+from mfba_planner.launcher import node_process
 from mfba_planner.launcher.console import RunConsole
 from mfba_planner.launcher.node_process import NodeProcess
 from mfba_planner.launcher.node_processes import NodeProcesses, parameters_yaml
@@ -36,29 +36,29 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.swarm.bat_swarm import Algorithm
 
 
-def test_order_without_arguments_is_case_study_1() -> None:
-    order = read_request([], "launcher")
+def test_request_without_arguments_is_case_study_1() -> None:
+    request = read_request([], "launcher")
     usual = preset(PlannerParams(method=Method.PREDICTIVE))
-    assert order.config == RunConfig(scenario=load_scenario("case1"), planner=usual)
-    assert order.config.driver is Driver.MULTI_PROCESS
-    assert (order.out, order.timeout_s, order.picture) == (None, 600.0, True)
-    assert order.node_args == {
+    assert request.config == RunConfig(scenario=load_scenario("case1"), planner=usual)
+    assert request.config.driver is Driver.MULTI_PROCESS
+    assert (request.out, request.timeout_s, request.picture) == (None, 600.0, True)
+    assert request.node_args == {
         name: [] for name in ("world_sim", "virtual_sensor", "planner", "recorder")
     }
 
 
-def test_order_takes_readings_then_algorithm_then_single_options() -> None:
-    order = read_request(
+def test_request_applies_readings_then_algorithm_then_single_options() -> None:
+    request = read_request(
         ["--reading=fig1", "--swarm=table3", "--algorithm=ba", "--set=planner.bat.rho=7"]
         + ["--set=planner.swarm=fresh", "--set=sensor.sectors=16", "--set=planner.speed_mps=1"],
         "launcher",
     )
-    planner = order.config.planner
+    planner = request.config.planner
     assert planner.step_length_m == readings.planner("fig1").step_length_m
     assert planner.bat.population == readings.swarm("table3").population
     assert planner.bat.algorithm is Algorithm.BA
     assert (planner.bat.rho, planner.speed_mps, planner.swarm.value) == (7.0, 1.0, "fresh")
-    assert order.config.sensor.sectors == 16
+    assert request.config.sensor.sectors == 16
 
 
 def test_every_option_can_be_set_to_its_default() -> None:
@@ -68,9 +68,11 @@ def test_every_option_can_be_set_to_its_default() -> None:
     ]
     settings = [setting.replace("True", "true") for setting in settings]
     assert len(settings) > 10
-    paper = ["--planner=paper"]  # whose defaults they are
-    told, plain = (read_request([*paper, *more], "launcher").config for more in (settings, []))
-    assert told == plain
+    paper = ["--planner=paper"]  # the defaults are those of this planner
+    with_settings, plain = (
+        read_request([*paper, *more], "launcher").config for more in (settings, [])
+    )
+    assert with_settings == plain
 
 
 @pytest.mark.parametrize(
@@ -86,7 +88,7 @@ def test_every_option_can_be_set_to_its_default() -> None:
         (["--swarm=literal"], "paper", 0.3),
     ],
 )
-def test_what_is_about_algorithm_1_is_given_to_it(
+def test_options_of_algorithm_1_select_algorithm_1(
     args: list[str], method: str, step_m: float
 ) -> None:
     planner = read_request(args, "launcher").config.planner
@@ -94,11 +96,11 @@ def test_what_is_about_algorithm_1_is_given_to_it(
     assert (planner.bat.algorithm is Algorithm.BA) == ("--algorithm=ba" in args)
 
 
-def test_speed_means_real_time_and_time_enough() -> None:
-    order = read_request(["--speed=0.1"], "launcher")
-    assert order.config.real_time
-    assert order.config.speed_factor == 0.1
-    assert order.timeout_s > order.config.scenario.time_limit_s / 0.1
+def test_speed_implies_real_time_and_a_longer_timeout() -> None:
+    request = read_request(["--speed=0.1"], "launcher")
+    assert request.config.real_time
+    assert request.config.speed_factor == 0.1
+    assert request.timeout_s > request.config.scenario.time_limit_s / 0.1
 
 
 def test_node_arguments_are_split_as_in_a_shell() -> None:
@@ -130,14 +132,14 @@ def test_parameter_files_keep_values_and_types(parameters: dict[str, object]) ->
     }
 
 
-def test_parameter_files_are_read_so_by_ros(tmp_path: Path, domain_id: int) -> None:
+def test_ros_reads_parameter_files_unchanged(tmp_path: Path, domain_id: int) -> None:
     from rclpy.context import Context
     from rclpy.node import Node
 
     config = read_request(["case2", "--seed", str(2**63 - 1)], "launcher").config
-    told = node_parameters(config, ("planner", "recorder"))
-    told["planner"]["bat.rho"] = 1e-5
-    for name, parameters in told.items():
+    by_node = node_parameters(config, ("planner", "recorder"))
+    by_node["planner"]["bat.rho"] = 1e-5
+    for name, parameters in by_node.items():
         path = tmp_path / f"{name}.yaml"
         path.write_text(parameters_yaml(parameters), encoding="utf-8")
         context = Context()
@@ -168,7 +170,7 @@ def test_directories_claimed_at_once_are_different(
     assert sorted(map(str, claimed)) == [f"runs/run-{k:03d}" for k in range(1, 9)]
 
 
-def test_directory_is_claimed_once_and_discarded_whole(tmp_path: Path) -> None:
+def test_directory_is_claimed_once_and_discarded_completely(tmp_path: Path) -> None:
     wanted = tmp_path / "a" / "b"
     directory = RunDirectory(wanted)
     with pytest.raises(OutputError, match="a/b: exists already and is never overwritten"):
@@ -204,11 +206,11 @@ def test_domain_is_free_again_after_kill_9() -> None:
     done = subprocess.run(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, check=False
     )
-    assert int(done.stdout) in offered()
+    assert int(done.stdout) in free_domains()
 
 
-def offered() -> set[int]:
-    """All domains that are given out at present, none of them held for long."""
+def free_domains() -> set[int]:
+    """All domains that claim_domain returns at present; none of them stays locked."""
     found = set()
     for _ in DOMAINS:
         domain, lock = claim_domain()
@@ -217,128 +219,130 @@ def offered() -> set[int]:
     return found
 
 
-def test_a_domain_that_a_strange_program_talks_in_is_passed_over() -> None:
-    """A robot's own graph, say: whoever holds no lock of ours."""
+def test_a_domain_that_another_program_uses_is_skipped() -> None:
+    """For example a robot's own nodes, which hold no lock of this package."""
     domain, lock = claim_domain()
     context = Context()
     context.init(domain_id=domain)
-    node = Node("strange", context=context)
+    node = Node("other", context=context)
     lock.close()
     try:
-        found = offered()
+        found = free_domains()
         assert domain not in found
         assert len(found) > len(DOMAINS) / 2
     finally:
         node.destroy_node()
         context.try_shutdown()
         context.destroy()
-    assert domain in offered()
+    assert domain in free_domains()
 
 
 PROGRAMS = {
-    "talker": "print('one'); print('two', end='', flush=True); sys.exit(3)",
-    "deaf": (
+    "prints": "print('one'); print('two', end='', flush=True); sys.exit(3)",
+    "ignores_sigterm": (
         "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('up', flush=True);"
         "signal.pause()"
     ),
-    "patient": "import signal; print('up', flush=True); signal.pause()",
-    "garbled": "sys.stdout.buffer.write(b'\\xff\\xfe ok\\n')",
+    "waits": "import signal; print('up', flush=True); signal.pause()",
+    "prints_bytes": "sys.stdout.buffer.write(b'\\xff\\xfe ok\\n')",
 }
 
 
 @pytest.fixture
 def programs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Children that are quicker than nodes."""
+    """Child programs that start faster than nodes."""
     boot = "import sys\nprograms = {programs!r}\nexec(programs[{program!r}])"
     monkeypatch.setattr(
-        child_module,
+        node_process,
         "_BOOT",
         boot.replace("{programs!r}", repr(PROGRAMS).replace("{", "{{").replace("}", "}}")),
     )
 
 
 class Lines:
-    """A sink that remembers."""
+    """A sink that stores its lines."""
 
     def __init__(self) -> None:
         self.all: list[tuple[str, str]] = []
 
-    def __call__(self, who: str, text: str) -> None:
-        self.all.append((who, text))
+    def __call__(self, node: str, text: str) -> None:
+        self.all.append((node, text))
 
 
 @pytest.mark.usefixtures("programs")
-def test_child_says_everything_and_how_it_ended() -> None:
+def test_all_output_and_the_exit_of_a_node_process() -> None:
     lines = Lines()
-    child = NodeProcess("talker", [], lines)
-    assert child.ended_within(10.0)
-    assert lines.all == [("talker", "one"), ("talker", "two")]
-    assert child.how_it_ended() == "exit code 3"
-    garbled = NodeProcess("garbled", [], lines)
-    assert garbled.ended_within(10.0)
-    assert lines.all[-1] == ("garbled", "\ufffd\ufffd ok")
+    child = NodeProcess("prints", [], lines)
+    assert child.wait_for_exit(10.0)
+    assert lines.all == [("prints", "one"), ("prints", "two")]
+    assert child.describe_exit() == "exit code 3"
+    garbled = NodeProcess("prints_bytes", [], lines)
+    assert garbled.wait_for_exit(10.0)
+    assert lines.all[-1] == ("prints_bytes", "\ufffd\ufffd ok")
 
 
 @pytest.mark.usefixtures("programs")
-def test_crew_ends_even_those_who_do_not_listen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stop_kills_processes_that_ignore_sigterm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mfba_planner.launcher.node_processes.GRACE_S", 0.2)
     lines = Lines()
     node_processes = NodeProcesses(lines, lambda: False)
-    node_processes.start({"deaf": {}, "patient": {}}, {})
+    node_processes.start({"ignores_sigterm": {}, "waits": {}}, {})
     children = [*node_processes.children]
     wait_until(lambda: len(lines.all) == 2, timeout_s=10.0)
     with pytest.raises(RuntimeError, match="inside"), node_processes:
         raise RuntimeError("inside")
-    assert [child.how_it_ended() for child in children] == [
+    assert [child.describe_exit() for child in children] == [
         "killed by SIGKILL",
         "killed by SIGTERM",
     ]
 
 
 @pytest.mark.usefixtures("programs")
-def test_crew_does_not_wait_for_the_deaf_when_in_a_hurry() -> None:
-    lines, hurry = Lines(), threading.Event()
-    node_processes = NodeProcesses(lines, hurry.is_set)
-    node_processes.start({"deaf": {}}, {})
+def test_stop_kills_without_waiting_when_urgent() -> None:
+    lines, is_urgent = Lines(), threading.Event()
+    node_processes = NodeProcesses(lines, is_urgent.is_set)
+    node_processes.start({"ignores_sigterm": {}}, {})
     wait_until(lambda: bool(lines.all), timeout_s=10.0)
     children = [*node_processes.children]
-    hurry.set()
+    is_urgent.set()
     node_processes.stop()
-    assert children[0].how_it_ended() == "killed by SIGKILL"
+    assert children[0].describe_exit() == "killed by SIGKILL"
 
 
 @pytest.mark.usefixtures("programs")
-def test_crew_tells_of_a_death_and_of_a_bad_end() -> None:
-    with pytest.raises(GraphError, match=r"^talker ended \(exit code 3\); it said last: two$"):
-        _one_process("talker", check=True)
-    with pytest.raises(GraphError, match=r"^talker ended \(exit code 3\)"):
-        _one_process("talker", check=False)
+def test_an_ended_process_and_a_bad_exit_code_are_errors() -> None:
+    with pytest.raises(GraphError, match=r"^prints ended \(exit code 3\); last line: two$"):
+        _run_one_process("prints", check=True)
+    with pytest.raises(GraphError, match=r"^prints ended \(exit code 3\)"):
+        _run_one_process("prints", check=False)
 
 
-def _one_process(name: str, check: bool) -> None:
+def _run_one_process(name: str, check: bool) -> None:
     with NodeProcesses(Lines(), lambda: False) as node_processes:
         node_processes.start({name: {}}, {})
-        wait_until(lambda: not node_processes.has(name), timeout_s=10.0)
+        wait_until(lambda: not node_processes.is_running(name), timeout_s=10.0)
         if check:
             node_processes.check()
 
 
-def test_lines_are_not_torn(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_lines_of_several_threads_stay_whole(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     console = RunConsole()
     console.log_to(tmp_path / "log.txt")
 
-    def talk(who: str) -> None:
+    def print_lines(node: str) -> None:
         for k in range(200):
-            console.line(who, f"{k} " + who * 50)
+            console.print_node_line(node, f"{k} " + node * 50)
 
     with ThreadPoolExecutor(4) as pool:
-        list(pool.map(talk, "abcd"))
+        list(pool.map(print_lines, "abcd"))
     console.close()
-    said = capfd.readouterr().out
-    assert sorted(said.splitlines()) == sorted(
-        f"[{who}] {k} " + who * 50 for who in "abcd" for k in range(200)
+    output = capfd.readouterr().out
+    assert sorted(output.splitlines()) == sorted(
+        f"[{node}] {k} " + node * 50 for node in "abcd" for k in range(200)
     )
-    assert (tmp_path / "log.txt").read_text() == said
+    assert (tmp_path / "log.txt").read_text() == output
 
 
 def test_stop_request_counts_signals_and_gives_the_handlers_back() -> None:
@@ -354,13 +358,13 @@ def test_stop_request_counts_signals_and_gives_the_handlers_back() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_stop_request_runs_out_of_time() -> None:
+def test_stop_request_has_a_timeout() -> None:
     with StopRequest(-1.0) as stop, pytest.raises(StoppedError, match="timeout of") as caught:
         stop.check()
     assert caught.value.exit_code == 1
 
 
-def test_without_a_network_the_reason_is_told() -> None:
+def test_without_a_network_the_reason_is_reported() -> None:
     require_network()
     with pytest.raises(GraphError, match=r"^255.255.255.255: .*ip link set lo up"):
-        require_network("255.255.255.255")  # as little to be had as 127.0.0.1 without loopback
+        require_network("255.255.255.255")  # fails like 127.0.0.1 without loopback

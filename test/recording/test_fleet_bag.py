@@ -296,7 +296,7 @@ def test_an_unknown_robot_is_refused_in_one_line(
 
 
 def test_robot_option_is_refused_for_foreign_recordings(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"--robot: .* is not a recording of ours"):
+    with pytest.raises(ConfigError, match=r"--robot: .* was not recorded by mfba"):
         cli.main(["verify", str(FOREIGN), "--robot", "a"])
 
 

@@ -281,7 +281,7 @@ def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
         "note: /tf_static: laser is rotated by 0 rad in base_link, 0.1 m from its origin: "
         "--robot-radius must include that\n"
         f"modes: obstacle_avoidance 67, path_generation 66\n"
-        f"from scratch, 133 decisions, digest {expected.digest}\n"
+        f"computed: 133 decisions, digest {expected.digest}\n"
     )
     assert cli.main(["verify", str(FOREIGN), "--set", "sensor.sensing_range_m=0.05"]) == 0
     other = capsys.readouterr().out
@@ -292,7 +292,7 @@ def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--closed-loop", "not a recording of ours, so there is no world to simulate"),
+        ("--closed-loop", "was not recorded by mfba, so there is no world to simulate"),
         ("--goal nan 1", "--goal nan 1.0: not finite"),
         ("--seed -1", "seed=-1: negative"),
         ("--robot-radius -1", "robot_radius_m=-1.0: out of range"),
@@ -322,5 +322,5 @@ def test_without_goal(tmp_path: Path) -> None:
 
 def test_options_are_refused_for_a_bag_of_mfba(tmp_path: Path) -> None:
     ours = record(tmp_path / "ours", "case1", 2)
-    with pytest.raises(ConfigError, match=r"--seed: .* says that itself; leave it out"):
+    with pytest.raises(ConfigError, match=r"--seed: .* contains that already; leave it out"):
         cli.main(["verify", str(ours), "--seed", "3"])
