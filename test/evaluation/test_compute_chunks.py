@@ -52,12 +52,14 @@ EXPECTED = {f"square-{k}": k * k for k in range(7)}
 
 @pytest.mark.parametrize("workers", [1, 2, 3])
 def test_any_number_of_workers(workers: int) -> None:
-    heard: list[str] = []
+    finished: list[str] = []
     found = compute(
-        [Square(k) for k in range(7)], workers=workers, done=lambda chunk: heard.append(chunk.name)
+        [Square(k) for k in range(7)],
+        workers=workers,
+        done=lambda chunk: finished.append(chunk.name),
     )
     assert squares(found) == EXPECTED
-    assert sorted(heard) == sorted(EXPECTED)
+    assert sorted(finished) == sorted(EXPECTED)
 
 
 def test_any_executor_which_is_left_open() -> None:
@@ -69,10 +71,10 @@ def test_any_executor_which_is_left_open() -> None:
 def test_a_part_whose_worker_dies_is_named_and_tried_again(tmp_path: Path) -> None:
     deaths = tmp_path / "deaths"
     deaths.write_text("2")
-    said: list[str] = []
+    messages: list[str] = []
     chunks = [Square(k, deaths if k == 3 else None) for k in range(7)]
-    assert squares(compute(chunks, workers=2, say=said.append)) == EXPECTED
-    assert "square-3: its worker process may have died; trying it again alone" in said
+    assert squares(compute(chunks, workers=2, say=messages.append)) == EXPECTED
+    assert "square-3: its worker process may have died; running it again alone" in messages
     assert deaths.read_text() == "-1"
 
 
@@ -114,10 +116,10 @@ class KilledWorker(Exception):  # noqa: N818
 
 @pytest.mark.parametrize("error", [BrokenProcessPool(), KilledWorker()])
 def test_a_cluster_that_loses_a_worker(error: Exception) -> None:
-    said: list[str] = []
+    messages: list[str] = []
     chunks = [Square(k) for k in range(7)]
-    assert squares(compute(chunks, executor=Unlucky(error), say=said.append)) == EXPECTED
-    assert len(said) == 1
+    assert squares(compute(chunks, executor=Unlucky(error), say=messages.append)) == EXPECTED
+    assert len(messages) == 1
 
 
 def test_an_error_of_a_part_arrives_as_it_was() -> None:

@@ -151,21 +151,21 @@ def test_a_contact_over_the_edge_of_a_block_is_one(monkeypatch: pytest.MonkeyPat
 
 def test_figures_may_be_asked_for_on_the_way() -> None:
     episode = run(load_scenario("case1"), seed=1)
-    tally = MetricsAccumulator(episode)
+    accumulator = MetricsAccumulator(episode)
     for k, tick in enumerate(episode.ticks):
-        tally.add(tick)
+        accumulator.add(tick)
         if k in (0, 1, 17):
-            part = replace(episode, ticks=episode.ticks[: k + 1])
-            assert tally.result(episode.outcome) == evaluate(part)
-    assert tally.result(episode.outcome) == evaluate(episode)
-    assert tally.run_motion().turning_rad == run_motion(episode).turning_rad
+            prefix = replace(episode, ticks=episode.ticks[: k + 1])
+            assert accumulator.result(episode.outcome) == evaluate(prefix)
+    assert accumulator.result(episode.outcome) == evaluate(episode)
+    assert accumulator.run_motion().turning_rad == run_motion(episode).turning_rad
 
 
-PLACES = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+POINTS = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 
 
 @settings(max_examples=50)
-@given(points=st.lists(PLACES, min_size=2, max_size=8), far=st.floats(10.0, 20.0))
+@given(points=st.lists(POINTS, min_size=2, max_size=8), far=st.floats(10.0, 20.0))
 def test_what_is_turned_and_shifted_is_as_smooth_and_as_near(
     points: list[tuple[float, float]], far: float
 ) -> None:

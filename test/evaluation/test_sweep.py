@@ -21,8 +21,7 @@ from mfba_planner.evaluation.metrics import assess
 from mfba_planner.evaluation.oracle import solve
 from mfba_planner.evaluation.suites import suite
 from mfba_planner.evaluation.suites.survivability import survivability
-from mfba_planner.evaluation.sweep import chunks, worker
-from mfba_planner.evaluation.sweep import single_run as play_module
+from mfba_planner.evaluation.sweep import chunks, single_run, worker
 from mfba_planner.evaluation.sweep.chunks import chunks_of, make
 from mfba_planner.evaluation.sweep.columns import COLUMNS, TIMINGS, Row
 from mfba_planner.evaluation.sweep.run_sweep import Swept, dask_executor, open_store, sweep
@@ -104,26 +103,28 @@ def test_runs_made_together_are_the_runs_made_alone(planner: str) -> None:
     runs = [Run("dense", world, planner, seed) for world in range(6) for seed in range(3)]
     setting = Setting(perception="scan-12", noise_m=0.01)
     assert generates_paths_together(planner, setting)
-    for run_alone, together in zip(runs, run_together(runs, setting)):
-        played = run_one(run_alone, setting, whole=False)
-        assert played.episode == together.episode
+    for each_run, together in zip(runs, run_together(runs, setting)):
+        completed = run_one(each_run, setting, whole=False)
+        assert completed.episode == together.episode
         assert (together.fault, together.times_ns) == ("", ())
-        assert len(played.times_ns) == len(played.episode.ticks)
+        assert len(completed.times_ns) == len(completed.episode.ticks)
 
 
 def test_runs_with_many_ticks_are_made_together_in_few(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [Run("random-3", world, "paper", 0) for world in range(7)]
     running: list[int] = []
 
-    def noted(planners: Sequence[Algorithm1], seen: Sequence[Observation]) -> None:
+    def noted(planners: Sequence[Algorithm1], observations: Sequence[Observation]) -> None:
         running.append(len(planners))
 
-    monkeypatch.setattr(play_module, "fly_together", noted)
+    monkeypatch.setattr(single_run, "generate_paths_together", noted)
     # Of 120 s in ticks of 0.375 s, 320 each.
-    monkeypatch.setattr(play_module, "TICKS_HELD", 1000)
+    monkeypatch.setattr(single_run, "TICKS_HELD", 1000)
     found = list(run_together(runs, Setting()))
     assert max(running) == 3
-    assert [one.episode for one in found] == [run_one(run, Setting()).episode for run in runs]
+    assert [completed.episode for completed in found] == [
+        run_one(run, Setting()).episode for run in runs
+    ]
     assert len(list(run_together(runs, Setting(params=PlannerParams(step_length_m=2.0))))) == 7
     assert max(running) == 7
 
@@ -160,7 +161,7 @@ def test_runs_that_are_lost_together_are_made_one_by_one(
     assert all(row["decision_us"] > 0.0 for row in again.timings), "each was made alone"
 
 
-@pytest.mark.usefixtures("tiny_parts")
+@pytest.mark.usefixtures("tiny_chunks")
 @pytest.mark.parametrize("workers", [2, 4])
 def test_processes_change_nothing(small: Swept, workers: int) -> None:
     again = sweep(a_request(oracle=True), workers=workers)
@@ -180,7 +181,7 @@ def scheduler() -> Iterator[str]:
         yield cluster.scheduler_address
 
 
-@pytest.mark.usefixtures("tiny_parts")
+@pytest.mark.usefixtures("tiny_chunks")
 @pytest.mark.filterwarnings("default")  # of dask's own
 def test_dask_changes_nothing(small: Swept, scheduler: str) -> None:
     with dask_executor(scheduler) as executor:
@@ -210,8 +211,10 @@ def test_a_suite_that_repeats_its_worlds_changes_the_seed() -> None:
     assert found.rows[0]["length_m"] != found.rows[2]["length_m"]
     with pytest.raises(ConfigError, match="--seeds=2: paper has 2 worlds, which --worlds repeats"):
         a_request(suite="paper", seeds=2)
-    judged = sweep(a_request(suite="paper", planners=("paper",), worlds=4, oracle=True)).rows
-    assert judged[0]["optimum_m"] == judged[2]["optimum_m"] != judged[1]["optimum_m"]
+    with_oracle = sweep(a_request(suite="paper", planners=("paper",), worlds=4, oracle=True)).rows
+    assert (
+        with_oracle[0]["optimum_m"] == with_oracle[2]["optimum_m"] != with_oracle[1]["optimum_m"]
+    )
 
 
 # --- planners that go wrong -------------------------------------------------------------------
@@ -258,13 +261,13 @@ def test_one_that_hangs_or_dies_costs_its_run(
     planner: str, failure: str, workers: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 4)
-    order = a_request(
+    spec = a_request(
         planners=(f"faulty_planners:{planner}",),
         worlds=2,
         seeds=3,
         setting=Setting(patience_s=4.0),
     )
-    found = sweep(order, workers=workers)
+    found = sweep(spec, workers=workers)
     assert [row["failure"] for row in found.rows] == ["", failure, ""] * 2
     assert [row["outcome"] for row in found.rows] == ["goal_reached", "failed", "goal_reached"] * 2
     lost = found.rows[1]
@@ -312,7 +315,7 @@ def test_a_table_that_was_cut_short_is_left_and_refused(small: Swept, tmp_path: 
     write(path, small.rows, COLUMNS)
     assert path.read_bytes() == whole
     path.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(OutputError, match=r"table.csv: is not what the finished runs say"):
+    with pytest.raises(OutputError, match=r"table.csv: differs from the finished runs"):
         write(path, small.rows, COLUMNS)
     assert path.read_bytes() == whole[: len(whole) // 2]
 
@@ -320,10 +323,10 @@ def test_a_table_that_was_cut_short_is_left_and_refused(small: Swept, tmp_path: 
 def test_standings(small: Swept) -> None:
     paper, straight = standings(small.rows, small.timings)
     assert (paper.planner, straight.planner) == ("paper", "straight")
-    good = [row for row in small.rows if row["planner"] == "paper" and row["success"]]
-    assert paper.success.middle == len(good) / 5
+    successes = [row for row in small.rows if row["planner"] == "paper" and row["success"]]
+    assert paper.success.middle == len(successes) / 5
     assert paper.gap is not None
-    assert paper.gap.middle == pytest.approx(sum(row["gap"] for row in good) / len(good))
+    assert paper.gap.middle == pytest.approx(sum(row["gap"] for row in successes) / len(successes))
     assert paper.gap.low <= paper.gap.middle <= paper.gap.high
     assert paper.certified_runs == 5
     hit = [row for row in small.rows if row["planner"] == "straight" and row["collisions"]]
@@ -416,14 +419,14 @@ def test_perception_reaches_the_planner() -> None:
 
 
 def test_a_directory_belongs_to_one_order(tmp_path: Path) -> None:
-    order = a_request()
-    open_store(tmp_path / "out", order)
+    spec = a_request()
+    open_store(tmp_path / "out", spec)
     open_store(tmp_path / "out", a_request())
     for other, what in (
-        (replace(order, worlds=6), "worlds=5, now 6"),
-        (replace(order, planners=("paper",)), "planners=['paper', 'straight'], now ['paper']"),
-        (replace(order, oracle=True), "oracle=False, now True"),
-        (replace(order, setting=Setting(noise_m=0.1)), "setting="),
+        (replace(spec, worlds=6), "worlds=5, now 6"),
+        (replace(spec, planners=("paper",)), "planners=['paper', 'straight'], now ['paper']"),
+        (replace(spec, oracle=True), "oracle=False, now True"),
+        (replace(spec, setting=Setting(noise_m=0.1)), "setting="),
     ):
         with pytest.raises(OutputError) as caught:
             open_store(tmp_path / "out", other)
@@ -461,9 +464,9 @@ def test_work_is_done_by_one_thread_whatever_the_workers_are_told(
 def test_one_child_makes_one_part_after_the_other() -> None:
     first, second = chunks_of(a_request())
     first.run()
-    child = worker._LOCAL.keeper
+    child = worker._LOCAL.worker
     second.run()
-    assert worker._LOCAL.keeper is child
+    assert worker._LOCAL.worker is child
     assert child.is_alive
 
 

@@ -12,7 +12,7 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.peers.straight_line import Straight
 from mfba_planner.planning.planner_params import PlannerParams
 
-GOOD_TICKS = 5
+NORMAL_TICKS = 5
 
 
 class Faulty(Straight):
@@ -25,7 +25,7 @@ class Faulty(Straight):
     def plan(self, obs: Observation) -> Decision:
         decision = super().plan(obs)
         self.tick += 1
-        return decision if self.tick <= GOOD_TICKS else self.wrong(decision)
+        return decision if self.tick <= NORMAL_TICKS else self.wrong(decision)
 
     def wrong(self, decision: Decision) -> Any:
         raise NotImplementedError

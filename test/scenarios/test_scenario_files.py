@@ -471,10 +471,10 @@ def test_json_and_back_is_the_same_scenario(scenario: Scenario) -> None:
     assert json.loads(text) == scenario_to_dict(scenario)
 
 
-def outcome(door: Callable[[dict[str, Any]], Scenario], data: dict[str, Any]) -> object:
+def outcome(parse: Callable[[dict[str, Any]], Scenario], data: dict[str, Any]) -> object:
     """What comes of plain data: a scenario, or what is said of it."""
     try:
-        return door(data)
+        return parse(data)
     except ConfigError as error:
         return str(error).removeprefix("x: ")
 
@@ -495,18 +495,18 @@ def test_what_is_not_as_programs_write_it_is_judged_by_the_long_way(
     scenario: Scenario, odd: Any, data: st.DataObject
 ) -> None:
     plain = scenario_to_dict(scenario)
-    place: Any = plain
+    node: Any = plain
     while True:
-        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
-        key = data.draw(st.sampled_from(keys + ["another"] * isinstance(place, dict)))
-        deeper = key != "another" and isinstance(place[key], dict | list) and place[key]
+        keys = list(node) if isinstance(node, dict) else list(range(len(node)))
+        key = data.draw(st.sampled_from(keys + ["another"] * isinstance(node, dict)))
+        deeper = key != "another" and isinstance(node[key], dict | list) and node[key]
         if not deeper or data.draw(st.booleans()):
             break
-        place = place[key]
+        node = node[key]
     if key != "another" and data.draw(st.booleans()):
-        del place[key]
+        del node[key]
     else:
-        place[key] = odd
+        node[key] = odd
     text = json.dumps(plain)
     assert outcome(lambda _: parse_scenario(text, "x"), plain) == outcome(checked, plain)
 

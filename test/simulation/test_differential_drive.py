@@ -70,10 +70,10 @@ def test_ahead_it_drives_and_aside_it_turns_first() -> None:
 def test_half_as_far_aside_as_it_turns_first_it_drives_at_half_the_speed() -> None:
     u = 0.5  # m/s, slow enough for every limit
     wanted = (u * math.cos(0.4), u * math.sin(0.4))
-    told = track(decision(wanted), replace(BASE, turn_first_rad=0.8), TICK_NS)
-    assert told.v == pytest.approx(0.5 * u)
+    commanded = track(decision(wanted), replace(BASE, turn_first_rad=0.8), TICK_NS)
+    assert commanded.v == pytest.approx(0.5 * u)
     a, t = BASE.max_turn_accel_radps2, 0.1
-    assert told.omega == pytest.approx(a * (math.sqrt(t * t + 2.0 * 0.4 / a) - t))
+    assert commanded.omega == pytest.approx(a * (math.sqrt(t * t + 2.0 * 0.4 / a) - t))
 
 
 def test_behind_it_reverses_only_where_it_may() -> None:
@@ -91,14 +91,14 @@ def test_from_brakes_speed_one_stops_in_time(left: float, a: float, held: float)
     assert v * held + v * v / (2.0 * a) == pytest.approx(left, rel=1e-6, abs=1e-9)
 
 
-@given(yaw=angles, v=st.floats(-2.0, 2.0), omega=st.floats(-3.0, 3.0), parts=st.integers(2, 50))
+@given(yaw=angles, v=st.floats(-2.0, 2.0), omega=st.floats(-3.0, 3.0), chunks=st.integers(2, 50))
 def test_an_arc_is_the_same_in_one_piece_or_many(
-    yaw: float, v: float, omega: float, parts: int
+    yaw: float, v: float, omega: float, chunks: int
 ) -> None:
     whole = arc(Pose2D(1.0, 2.0, yaw), v, omega, 0.4)
     pose = Pose2D(1.0, 2.0, yaw)
-    for _ in range(parts):
-        pose = arc(pose, v, omega, 0.4 / parts)
+    for _ in range(chunks):
+        pose = arc(pose, v, omega, 0.4 / chunks)
     assert (pose.x, pose.y) == pytest.approx((whole.x, whole.y), abs=1e-9)
     assert math.cos(pose.yaw - whole.yaw) == pytest.approx(1.0)
 
@@ -109,14 +109,14 @@ def test_a_quarter_of_a_circle() -> None:
 
 
 @given(
-    told=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0)),
+    commanded=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0)),
     v=st.floats(-1.0, 1.0),
     omega=st.floats(-2.84, 2.84),
 )
 def test_limits_hold_whatever_it_is_told(
-    told: tuple[float, float], v: float, omega: float
+    commanded: tuple[float, float], v: float, omega: float
 ) -> None:
-    pose, now = apply_command(Pose2D(0.0, 0.0), Speeds(v, omega), told, BASE, TICK_NS)
+    pose, now = apply_command(Pose2D(0.0, 0.0), Speeds(v, omega), commanded, BASE, TICK_NS)
     assert abs(now.v) <= BASE.max_speed_mps
     assert abs(now.omega) <= BASE.max_turn_radps
     assert abs(now.v - v) <= BASE.max_accel_mps2 * 0.1 + 1e-9

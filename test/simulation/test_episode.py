@@ -159,14 +159,14 @@ def test_a_start_within_the_tolerance_of_the_goal_is_an_arrival() -> None:
 
 
 def test_a_run_can_be_ended_from_outside() -> None:
-    seen = []
+    ticks = []
 
     def go_on(world: World) -> bool:
-        seen.append(world.tick)
+        ticks.append(world.tick)
         return world.tick < 5
 
     episode = run(load_scenario("case1"), go_on=go_on)
-    assert seen == [0, 1, 2, 3, 4, 5]
+    assert ticks == [0, 1, 2, 3, 4, 5]
     assert len(episode.ticks) == 6
     assert episode.outcome is Outcome.INTERRUPTED
     assert not evaluate(episode).success
@@ -237,8 +237,8 @@ def test_the_first_step_begins_at_the_start_of_the_motion() -> None:
 
 
 def test_two_contacts_with_one_obstacle_are_two_collisions() -> None:
-    there = [(0.0, 0.0), (2.0, 0.0), (4.0, 0.0)]  # through the post in both steps
-    episode = trip([*there, (6.0, 0.0), (4.0, 0.0), (2.0, 0.0)], obstacles=(post((2.0, 0.0)),))
+    through = [(0.0, 0.0), (2.0, 0.0), (4.0, 0.0)]  # through the post in both steps
+    episode = trip([*through, (6.0, 0.0), (4.0, 0.0), (2.0, 0.0)], obstacles=(post((2.0, 0.0)),))
     assert [row[0] < 0.0 for row in tick_clearances(episode)] == [True, True, False, False, True]
     assert evaluate(episode).collisions == 2
 

@@ -29,7 +29,13 @@ from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
-from mfba_planner.simulation.fleet import Fleet, alone, robot_seed, run_fleet, way
+from mfba_planner.simulation.fleet import (
+    Fleet,
+    path_as_obstacle,
+    robot_seed,
+    run_fleet,
+    single_robot_scenario,
+)
 from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at
 from mfba_planner.simulation.planner_observations import Perception
 from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
@@ -124,9 +130,9 @@ def test_time_goes_on_around_who_has_arrived() -> None:
     assert fleet.running == [1]
     for _ in range(3):
         fleet.step({1: (0.1, 0.0)})
-    here = fleet.robot_worlds[0]
-    assert here.tick == fleet.tick == 4
-    _, circles = here.near(10.0)
+    arrived = fleet.robot_worlds[0]
+    assert arrived.tick == fleet.tick == 4
+    _, circles = arrived.near(10.0)
     assert circles[0][0] == pytest.approx(center_at(obstacle, 4 * TICK_NS * 1e-9))
 
 
@@ -136,8 +142,8 @@ def test_the_others_are_where_they_went() -> None:
         others = [e for e in done if e is not episode]
         for obstacle, other in zip(episode.scenario.obstacles, others, strict=True):
             for tick in other.ticks:
-                there = center_at(obstacle, other.time_s(tick.stamp_ns))
-                assert distance(there, tick.pose.position) < 1e-9
+                center = center_at(obstacle, other.time_s(tick.stamp_ns))
+                assert distance(center, tick.pose.position) < 1e-9
             last_s = other.time_s(other.ticks[-1].stamp_ns)
             assert (
                 distance(center_at(obstacle, last_s + 50.0), other.ticks[-1].pose.position) < 1e-9
@@ -166,9 +172,9 @@ def test_an_episode_is_an_ordinary_one() -> None:
 
 def test_equal_seeds_equal_decisions_and_streams_of_their_own() -> None:
     scenario = load_scenario("swap")
-    one, same, other = (run_fleet(scenario, seed=seed) for seed in (5, 5, 6))
-    assert [digest(e.ticks) for e in one] == [digest(e.ticks) for e in same]
-    assert [digest(e.ticks) for e in one] != [digest(e.ticks) for e in other]
+    first, same, other = (run_fleet(scenario, seed=seed) for seed in (5, 5, 6))
+    assert [digest(e.ticks) for e in first] == [digest(e.ticks) for e in same]
+    assert [digest(e.ticks) for e in first] != [digest(e.ticks) for e in other]
     assert len({robot_seed(seed, n) for seed in range(50) for n in range(10)}) == 500
     assert all(0 <= robot_seed(seed, n) < 2**63 for seed in range(50) for n in range(10))
 
@@ -192,9 +198,9 @@ def test_obstacles_and_robots_are_seen_alike() -> None:
     fleet.step({0: (0.0, 0.0), 1: (0.5, -0.25)})
     assert first.velocity(1) == pytest.approx((0.5, -0.25))
     assert second.velocity(1) == (0.0, 0.0)
-    seen = Perception("known")(first, SensorParams())
-    assert seen.circles is not None
-    assert [c.velocity_mps for c in seen.circles] == [(0.0, 0.0), first.velocity(1)]
+    obs = Perception("known")(first, SensorParams())
+    assert obs.circles is not None
+    assert [c.velocity_mps for c in obs.circles] == [(0.0, 0.0), first.velocity(1)]
 
 
 @pytest.mark.parametrize("beams", [0, 360])
@@ -223,10 +229,10 @@ def test_a_way_goes_through_its_poses(stretches: list[tuple[float, float, int]])
     for vx, vy, ticks in stretches:
         for _ in range(ticks):
             poses.append(Pose2D(poses[-1].x + 0.1 * vx, poses[-1].y + 0.1 * vy))
-    obstacle = way(poses, 100_000_000, 0.3)
+    obstacle = path_as_obstacle(poses, 100_000_000, 0.3)
     for k, pose in enumerate(poses):
-        there = center_at(obstacle, k * 100_000_000 * 1e-9)
-        assert distance(there, pose.position) < 1e-9
+        center = center_at(obstacle, k * 100_000_000 * 1e-9)
+        assert distance(center, pose.position) < 1e-9
     # What moves by less than can be told from rounding may count as several stretches.
     if all(v == 0.0 or abs(v) > 1e-3 for vx, vy, _ in stretches for v in (vx, vy)):
         assert len(obstacle.turns) <= len(stretches) + 1
@@ -257,7 +263,7 @@ def test_scenario_files_name_robots_and_come_back_the_same() -> None:
     assert (scenario.start_m, scenario.goal_m) == ((6.0, 0.0), (-6.0, 0.0))
     assert load_scenario(scenario_to_json(scenario)) == scenario
     assert "robots" not in scenario_to_json(load_scenario("case1"))
-    assert alone(scenario, 1).start_m == scenario.robots[1].start_m
+    assert single_robot_scenario(scenario, 1).start_m == scenario.robots[1].start_m
 
 
 TWO = (((0.0, 0.0), (5.0, 0.0)), ((2.0, 0.0), (5.0, 5.0)))
@@ -303,14 +309,14 @@ def test_what_cannot_be_a_fleet(make_it: Any, what: str) -> None:
 
 def test_sim_prints_a_row_per_robot_or_per_seed(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["sim", "swap"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert len(said) == 12
-    assert said[1].split()[:2] == ["robot0", "goal_reached"]
-    assert said[-1] == "10 of 10 robots at the goal without collision"
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 12
+    assert lines[1].split()[:2] == ["robot0", "goal_reached"]
+    assert lines[-1] == "10 of 10 robots at the goal without collision"
     assert cli.main(["sim", "swap", "--seeds", "2"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[1].split()[:4] == ["0", "10", "of", "10"]
-    assert said[-1] == "2 of 2 seeds with all robots at the goal without collision"
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].split()[:4] == ["0", "10", "of", "10"]
+    assert lines[-1] == "2 of 2 seeds with all robots at the goal without collision"
 
 
 PAPER = ("--planner", "paper")
@@ -319,13 +325,15 @@ PAPER = ("--planner", "paper")
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """`mfba run` of four robots: the whole graph, one call."""
-    place = tmp_path_factory.mktemp("fleet")
+    directory = tmp_path_factory.mktemp("fleet")
     whole = load_scenario("swap")
-    some = replace(whole, robots=whole.robots[::5] + whole.robots[2::5])
-    file = place / "some.json"
-    file.write_text(scenario_to_json(some), encoding="utf-8")
-    assert cli.main(["run", str(file), *PAPER, "--seed", "3", "--out", str(place / "run")]) == 0
-    return place / "run"
+    four = replace(whole, robots=whole.robots[::5] + whole.robots[2::5])
+    file = directory / "some.json"
+    file.write_text(scenario_to_json(four), encoding="utf-8")
+    assert (
+        cli.main(["run", str(file), *PAPER, "--seed", "3", "--out", str(directory / "run")]) == 0
+    )
+    return directory / "run"
 
 
 def test_the_graph_decides_as_the_core_does(driven: Path) -> None:
@@ -353,11 +361,11 @@ def test_a_result_for_each_robot_and_one_picture(driven: Path) -> None:
     found = sorted(path.name for path in driven.iterdir())
     assert found == ["bag", *(f"robot{n}.json" for n in (0, 2, 5, 7)), "run.png"]
     core = run_fleet(load_scenario(str(driven.parent / "some.json")), seed=3)
-    told = read_result(driven / "robot0.json")
-    assert told["digest"] == digest(core[0].ticks)
-    assert told["result"]["success"]
-    assert told["extra"]["fleet_seed"] == 3
-    assert told["seed"] == robot_seed(3, 0)
+    result = read_result(driven / "robot0.json")
+    assert result["digest"] == digest(core[0].ticks)
+    assert result["result"]["success"]
+    assert result["extra"]["fleet_seed"] == 3
+    assert result["seed"] == robot_seed(3, 0)
 
 
 def test_what_knows_one_robot_only_says_so(driven: Path) -> None:

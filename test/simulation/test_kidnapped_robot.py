@@ -53,13 +53,13 @@ def carried(episode: Episode) -> list[int]:
     return [k for k, tick in enumerate(episode.ticks) if is_jump_reason(tick.reason)]
 
 
-def played(scenario: Scenario, planner: PlannerParams) -> Episode:
+def simulated(scenario: Scenario, planner: PlannerParams) -> Episode:
     return simulate(scenario, planner=planner, sensor=SensorParams(), seed=1)
 
 
 @pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS)
 def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams) -> None:
-    episode = played(KIDNAPPED, planner)
+    episode = simulated(KIDNAPPED, planner)
     assert evaluate(episode).success
     noticed = carried(episode)
     times_s = [episode.time_s(episode.ticks[k].stamp_ns) for k in noticed]
@@ -75,12 +75,12 @@ def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams
 @pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS)
 def test_afterwards_it_decides_as_one_that_knows_of_nothing(planner: PlannerParams) -> None:
     """What a planner remembers must not outlive the jump: a fresh one decides the same."""
-    episode = played(KIDNAPPED, planner)
+    episode = simulated(KIDNAPPED, planner)
     first, second = carried(episode)
     fresh = make_planner(planner, SensorParams(), seed=1)
     for tick in episode.ticks[first:second]:
-        seen = observe(tick.stamp_ns, tick.pose, tick.ranges_m, tick.goal, tick.pose)
-        own = fresh.plan(seen)
+        obs = observe(tick.stamp_ns, tick.pose, tick.ranges_m, tick.goal, tick.pose)
+        own = fresh.plan(obs)
         assert (own.waypoint, own.velocity, own.mode) == (tick.waypoint, tick.velocity, tick.mode)
 
 
@@ -95,8 +95,8 @@ def test_being_carried_is_no_way_driven_and_no_contact() -> None:
     )
     episode = run(scenario, seed=2)
     (k,) = carried(episode)
-    places = [tick.pose.position for tick in episode.ticks]
-    steps = [distance(a, b) for a, b in zip(places, places[1:])]
+    positions = [tick.pose.position for tick in episode.ticks]
+    steps = [distance(a, b) for a, b in zip(positions, positions[1:])]
     result, run_motion = assess(episode)
     assert result.collisions == 0
     assert result.length_m == pytest.approx(sum(steps) - steps[k - 1])
@@ -141,17 +141,17 @@ def test_the_graph_is_kidnapped_as_the_core_is(tmp_path: Path, domain_id: int) -
     config = RunConfig(scenario=KIDNAPPED, seed=1, driver=Driver.IN_PROCESS)
     run_in_process(config, tmp_path / "bag", domain_id=domain_id)
     recorded = read_episode(tmp_path / "bag")
-    assert recorded.ticks == played(KIDNAPPED, PlannerParams()).ticks
+    assert recorded.ticks == simulated(KIDNAPPED, PlannerParams()).ticks
     assert len(carried(recorded)) == 2
     report = verify(tmp_path / "bag")
     assert report.is_identical, report.faults
 
 
 def start(graph: Graph, scenario: Scenario) -> WorldSim:
-    told = node_parameters(RunConfig(scenario=scenario, seed=6), peers=())
-    graph.start(VirtualSensor, told["virtual_sensor"])
-    planner = graph.start(PlannerNode, told["planner"])
-    world = graph.start(WorldSim, told["world_sim"])
+    parameters = node_parameters(RunConfig(scenario=scenario, seed=6), peers=())
+    graph.start(VirtualSensor, parameters["virtual_sensor"])
+    planner = graph.start(PlannerNode, parameters["planner"])
+    world = graph.start(WorldSim, parameters["world_sim"])
     graph.until(lambda: planner.goals.goal_queue.goal is not None)
     return world
 
@@ -170,9 +170,9 @@ def test_initialpose_carries_the_robot_off_and_the_planner_says_so(
     graph.until(lambda: world.over, timeout_s=60.0)
     graph.settle()
     assert world.world.outcome() is Outcome.GOAL_REACHED
-    said = [m.status[0] for m in decisions if is_jump_reason(m.status[0].message)]
-    assert len(said) == 1
-    assert said[0].level == b"\x01"
+    reports = [m.status[0] for m in decisions if is_jump_reason(m.status[0].message)]
+    assert len(reports) == 1
+    assert reports[0].level == b"\x01"
 
 
 @pytest.mark.parametrize(
@@ -199,7 +199,7 @@ def test_kidnappings_are_written_and_read_again() -> None:
     assert parse_scenario(scenario_to_json(KIDNAPPED), "again") == KIDNAPPED
 
 
-def free_place(rng: np.random.Generator, scenario: Scenario, t_s: float) -> Point:
+def free_point(rng: np.random.Generator, scenario: Scenario, t_s: float) -> Point:
     while True:
         x, y = rng.uniform(0.5, 11.5, size=2).tolist()
         if all(distance((x, y), c) > r + 0.3 for c, r in scenario.enlarged(t_s)):
@@ -211,7 +211,7 @@ def test_wherever_and_whenever_it_arrives() -> None:
     case = load_scenario("case1")
     for seed in range(10):
         at_s = float(rng.uniform(0.5, 20.0))
-        kidnapping = Kidnapping(at_s=at_s, to_m=free_place(rng, case, at_s))
+        kidnapping = Kidnapping(at_s=at_s, to_m=free_point(rng, case, at_s))
         episode = run(replace(case, kidnappings=(kidnapping,)), seed=seed)
         assert episode.outcome is Outcome.GOAL_REACHED
         assert len(carried(episode)) == 1

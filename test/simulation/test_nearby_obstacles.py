@@ -28,13 +28,13 @@ def test_nobody_within_reach_is_missing(name: str) -> None:
             world.pose = Pose2D(*rng.uniform(0.0, 12.0, 2).tolist())
         if k % 90 == 11:  # as a bag does
             world.tick = int(rng.integers(0, 300))
-        here = world.pose.position
-        everyone = scenario.enlarged(world.time_s)
-        within = [i for i, (c, r) in enumerate(everyone) if distance(here, c) - r <= SR_M]
+        position = world.pose.position
+        circles_now = scenario.enlarged(world.time_s)
+        within = [i for i, (c, r) in enumerate(circles_now) if distance(position, c) - r <= SR_M]
         which, circles = world.near(SR_M)
         assert set(within) <= set(which)
         assert which == sorted(which)
-        assert circles == [everyone[i] for i in which]
+        assert circles == [circles_now[i] for i in which]
         fewest = min(fewest, len(which))
         world.step(velocity)
     assert (fewest < len(scenario.obstacles)) == (len(scenario.obstacles) > FEW)

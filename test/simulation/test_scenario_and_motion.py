@@ -28,8 +28,8 @@ RADII = st.floats(0.05, 1.0)
 SPEEDS = st.floats(0.0, 2.0)
 HEADINGS = st.floats(-10.0, 10.0)
 TIMES = st.floats(0.0, 200.0)
-PLACES = st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
-FREE = st.builds(Obstacle, center_m=PLACES, radius_m=RADII, speed_mps=SPEEDS, heading_rad=HEADINGS)
+POINTS = st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
+FREE = st.builds(Obstacle, center_m=POINTS, radius_m=RADII, speed_mps=SPEEDS, heading_rad=HEADINGS)
 
 
 @st.composite
@@ -235,7 +235,7 @@ def turner() -> Obstacle:
 
 
 @pytest.mark.parametrize(
-    ("t", "place"),
+    ("t", "center"),
     [
         (0.0, (0.0, 2.0)),
         (-1.0, (-1.0, 2.0)),
@@ -246,8 +246,8 @@ def turner() -> Obstacle:
         (6.5, (0.5, 4.0)),
     ],
 )
-def test_turns_by_hand(t: float, place: Point) -> None:
-    assert center_at(turner(), t) == pytest.approx(place)
+def test_turns_by_hand(t: float, center: Point) -> None:
+    assert center_at(turner(), t) == pytest.approx(center)
     assert turner().top_speed_mps == 2.0
 
 
@@ -354,7 +354,7 @@ def test_no_obstacles_no_gaps() -> None:
     assert step_clearances(world(), 0.0, 1.0, (0.0, 0.0), (4.0, 0.0)) == []
 
 
-@given(walled(), TIMES, st.floats(0.01, 6.0), PLACES, PLACES, st.booleans())
+@given(walled(), TIMES, st.floats(0.01, 6.0), POINTS, POINTS, st.booleans())
 def test_clearance_against_dense_sampling(
     obstacle: Obstacle, t0: float, duration: float, start: Point, end: Point, closed: bool
 ) -> None:
@@ -367,9 +367,9 @@ def test_clearance_against_dense_sampling(
         samples.append(math.dist(robot, center_at(obstacle, t0 + s * duration, walls)))
     enlarged = obstacle.radius_m + 0.3
     (gap,) = step_clearances(world(obstacle, walls=walls), t0, t0 + duration, start, end)
-    way = math.dist(start, end) + obstacle.speed_mps * duration
+    travel_m = math.dist(start, end) + obstacle.speed_mps * duration
     assert gap <= min(samples) - enlarged + 1e-6
-    assert gap >= min(samples) - enlarged - way / n - 1e-6
+    assert gap >= min(samples) - enlarged - travel_m / n - 1e-6
 
 
 # --- scenarios ------------------------------------------------------------------------------

@@ -38,29 +38,29 @@ angles = st.floats(-math.pi, math.pi)
 SENSOR = SensorParams(sensing_range_m=2.0)
 
 
-def seen(scan: Any, k: int) -> float:
+def range_at(scan: Any, k: int) -> float:
     return float(scan.ranges_m[k])
 
 
-@pytest.mark.parametrize(("away_m", "there"), [(0.49, True), (0.51, False)])
-def test_who_errs_may_miss_the_goal_by_four_deviations_more(away_m: float, there: bool) -> None:
+@pytest.mark.parametrize(("away_m", "reached"), [(0.49, True), (0.51, False)])
+def test_who_errs_may_miss_the_goal_by_four_deviations_more(away_m: float, reached: bool) -> None:
     scenario = Scenario(
         name="x",
         start_m=(0.0, 0.0),
         goal_m=(away_m, 0.0),
         robot=Robot(noise=Noise(odom_m=0.1)),
     )
-    assert World(scenario, TICK_NS, 0.1).outcome() is (Outcome.GOAL_REACHED if there else None)
+    assert World(scenario, TICK_NS, 0.1).outcome() is (Outcome.GOAL_REACHED if reached else None)
 
 
 def test_ranges_are_those_of_real_surfaces() -> None:
     lidar = Lidar(beams=360, range_min_m=0.2, range_max_m=3.0)
     circles = [(2.0, 0.0, 0.5), (0.0, -5.0, 0.5), (-0.4, 0.0, 0.3)]
     scan = scan_at(Pose2D(0.0, 0.0), lidar, circles, None)
-    assert seen(scan, 0) == pytest.approx(1.5, abs=1e-3)  # half a degree beside the middle
-    assert seen(scan, 270) == math.inf
-    assert seen(scan, 180) == -math.inf  # nearer than range_min
-    assert seen(scan, 90) == math.inf
+    assert range_at(scan, 0) == pytest.approx(1.5, abs=1e-3)  # half a degree beside the middle
+    assert range_at(scan, 270) == math.inf
+    assert range_at(scan, 180) == -math.inf  # nearer than range_min
+    assert range_at(scan, 90) == math.inf
     assert (scan.range_min_m, scan.range_max_m) == pytest.approx((0.2, 3.0))
 
 
@@ -92,7 +92,7 @@ def test_walls_are_seen_only_where_asked() -> None:
     pose = Pose2D(0.0, 0.0)
     assert np.isinf(scan_at(pose, Lidar(beams=12), [], ROOM).ranges_m).all()
     scan = scan_at(pose, Lidar(beams=360, walls=True, range_max_m=9.0), [], ROOM)
-    assert [seen(scan, k) for k in (0, 90, 180, 270)] == pytest.approx(
+    assert [range_at(scan, k) for k in (0, 90, 180, 270)] == pytest.approx(
         [3.0, 4.0, 2.0, 1.0], abs=2e-3
     )
 
@@ -117,18 +117,18 @@ def instruments(seed: int = 0, **noise: float) -> NoisySensors:
     return NoisySensors(robot, None, TICK_NS, seed)
 
 
-WAY = [Pose2D(0.1 * k, 0.0, 0.1 * k) for k in range(200)]
+POSES = [Pose2D(0.1 * k, 0.0, 0.1 * k) for k in range(200)]
 POST = [(9.0, 2.0, 0.5)]
 
 
 def readings(seed: int = 0, **noise: float) -> list[Any]:
     of = instruments(seed, **noise)
-    return [of.read((k + 1) * TICK_NS, pose, POST) for k, pose in enumerate(WAY)]
+    return [of.read((k + 1) * TICK_NS, pose, POST) for k, pose in enumerate(POSES)]
 
 
 def test_without_noise_the_truth_is_told() -> None:
-    assert [reading.pose for reading in readings()] == WAY
-    clean = scan_at(WAY[90], Lidar(beams=360), POST, None)
+    assert [reading.pose for reading in readings()] == POSES
+    clean = scan_at(POSES[90], Lidar(beams=360), POST, None)
     assert (readings()[90].scan.ranges_m == clean.ranges_m).all()
 
 
@@ -146,8 +146,8 @@ def test_noise_of_one_instrument_leaves_the_other_alone() -> None:
 
 def test_noise_is_as_large_as_it_is_said_to_be() -> None:
     noisy = readings(odom_m=0.1, odom_rad=0.02)
-    off = np.array([[r.pose.x - p.x, r.pose.y - p.y] for r, p in zip(noisy, WAY)])
-    turned = np.array([r.pose.yaw - p.yaw for r, p in zip(noisy, WAY)])
+    off = np.array([[r.pose.x - p.x, r.pose.y - p.y] for r, p in zip(noisy, POSES)])
+    turned = np.array([r.pose.yaw - p.yaw for r, p in zip(noisy, POSES)])
     assert off.std() == pytest.approx(0.1, rel=0.15)
     assert turned.std() == pytest.approx(0.02, rel=0.2)
     errors = []
@@ -161,7 +161,7 @@ def test_what_is_lost() -> None:
     poses = [reading.pose for reading in readings(odom_loss=0.3)]
     repeated = sum(a == b for a, b in zip(poses, poses[1:]))
     assert 40 <= repeated <= 80
-    assert all(pose in WAY for pose in poses)
+    assert all(pose in POSES for pose in poses)
     lost = np.mean([np.isnan(r.scan.ranges_m).mean() for r in readings(scan_dropout=0.2)])
     assert lost == pytest.approx(0.2, abs=0.01)
     blind = sum(bool(np.isnan(r.scan.ranges_m).all()) for r in readings(scan_loss=0.1))
@@ -170,7 +170,7 @@ def test_what_is_lost() -> None:
 
 def test_latency_is_an_earlier_reading_under_a_later_stamp() -> None:
     late = readings(odom_latency_s=0.3)
-    assert [reading.pose for reading in late] == [WAY[0]] * 3 + WAY[:-3]
+    assert [reading.pose for reading in late] == [POSES[0]] * 3 + POSES[:-3]
     clean, scans = readings(), readings(scan_latency_s=0.2)
     for k in (0, 1, 2, 50, 120):
         expected = clean[max(k - 2, 0)].scan.ranges_m
@@ -193,10 +193,10 @@ def test_a_robot_that_sees_nothing_stops_until_it_does() -> None:
     planner = Algorithm1(PlannerParams(), seed=0)
     modes = set()
     for _ in range(20):
-        seen = observe_sectors(world, SensorParams())
-        decision = planner.plan(seen)
-        assert (decision.mode is Mode.STOPPED) == bool(seen.refused)
-        assert (decision.velocity == (0.0, 0.0)) == bool(seen.refused)
+        obs = observe_sectors(world, SensorParams())
+        decision = planner.plan(obs)
+        assert (decision.mode is Mode.STOPPED) == bool(obs.refused)
+        assert (decision.velocity == (0.0, 0.0)) == bool(obs.refused)
         modes.add(decision.mode)
         world.step(decision.velocity)
     assert modes == {Mode.STOPPED, Mode.PATH_GENERATION}
