@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts anywhere: any executor, workers that die, and what is left when it ends early."""
+"""Chunks on any executor: workers that die, and the chunks kept after an early end."""
 
 import os
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from mfba_planner.evaluation.study.compute_chunks import TRIES, compute
 
 @dataclass(frozen=True)
 class Square:
-    """A part that computes a square; it may die first, as often as a file says."""
+    """A chunk that computes a square; first it kills its worker as often as a file says."""
 
     number: int
     deaths: Path | None = None
@@ -68,7 +68,7 @@ def test_any_executor_which_is_left_open() -> None:
         assert executor.submit(int, "3").result() == 3
 
 
-def test_a_part_whose_worker_dies_is_named_and_tried_again(tmp_path: Path) -> None:
+def test_a_chunk_whose_worker_dies_is_named_and_run_again(tmp_path: Path) -> None:
     deaths = tmp_path / "deaths"
     deaths.write_text("2")
     messages: list[str] = []
@@ -78,7 +78,7 @@ def test_a_part_whose_worker_dies_is_named_and_tried_again(tmp_path: Path) -> No
     assert deaths.read_text() == "-1"
 
 
-def test_one_that_kills_every_worker_costs_one_line_and_the_rest_is_kept(tmp_path: Path) -> None:
+def test_a_chunk_that_kills_every_worker_raises_and_the_rest_is_kept(tmp_path: Path) -> None:
     deaths = tmp_path / "deaths"
     deaths.write_text("1000")
     chunks = [Square(k, deaths if k == 3 else None) for k in range(7)]
@@ -95,7 +95,7 @@ def test_one_that_kills_every_worker_costs_one_line_and_the_rest_is_kept(tmp_pat
 
 
 class Unlucky(Executor):
-    """A cluster that loses the first worker that it gives a part to."""
+    """A cluster that loses the worker of its first chunk."""
 
     def __init__(self, error: Exception) -> None:
         self.error: Exception | None = error
@@ -111,7 +111,7 @@ class Unlucky(Executor):
 
 
 class KilledWorker(Exception):  # noqa: N818
-    """Named as dask names it."""
+    """Has the name of dask's exception."""
 
 
 @pytest.mark.parametrize("error", [BrokenProcessPool(), KilledWorker()])
@@ -122,11 +122,11 @@ def test_a_cluster_that_loses_a_worker(error: Exception) -> None:
     assert len(messages) == 1
 
 
-def test_an_error_of_a_part_arrives_as_it_was() -> None:
+def test_an_exception_of_a_chunk_is_raised_unchanged() -> None:
     with pytest.raises(ZeroDivisionError):
         compute([Square(1)], executor=Unlucky(ZeroDivisionError()))
 
 
-def test_workers_that_cannot_be() -> None:
+def test_numbers_of_workers_out_of_range() -> None:
     with pytest.raises(ConfigError, match=r"--workers=0: out of range; give 1 to 256"):
         compute([], workers=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Suites: the same world whatever else is made, fit for every other command, as hard as told."""
+"""Suites: reproducible worlds, valid scenarios, difficulty."""
 
 import math
 import pickle
@@ -44,7 +44,7 @@ def task(*obstacles: Obstacle, walls: Walls | None = None) -> Scenario:
     )
 
 
-# --- names ----------------------------------------------------------------------------------
+# --- names ------------------------------------------------------------------------------------
 
 
 def test_the_suites_of_the_benchmark_exist() -> None:
@@ -79,7 +79,7 @@ def test_numbers_that_make_no_sense_are_refused() -> None:
         assert "no speed; give a number above 0" in refusal(lambda s=speed: entry.world(0, s))
 
 
-# --- the same world, always -----------------------------------------------------------------
+# --- reproducibility --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", suite_names())
@@ -98,7 +98,7 @@ def test_worlds_differ_in_k_and_seed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", suite_names())
-def test_suites_travel_between_processes(name: str) -> None:
+def test_suites_can_be_pickled(name: str) -> None:
     entry = suite(name, seed=3)
     again = pickle.loads(pickle.dumps(entry))
     assert (again.name, again.seed) == (entry.name, 3)
@@ -110,7 +110,7 @@ def test_suites_do_not_share_their_obstacles() -> None:
     assert not set(three.obstacles) & set(ten.obstacles)
 
 
-def test_a_published_world_stays_as_it_was() -> None:
+def test_a_published_world_does_not_change() -> None:
     first = suite("random-10").world(0).obstacles[0]
     again = (*first.center_m, first.speed_mps, first.heading_rad)
     assert again == pytest.approx(GOLDEN, abs=1e-12)
@@ -131,11 +131,11 @@ def test_every_world_is_an_ordinary_scenario(name: str) -> None:
         assert load_scenario(scenario_to_json(world)) == world
 
 
-# --- what is in them ------------------------------------------------------------------------
+# --- contents ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", GENERATED)
-def test_nobody_stands_at_start_or_goal(name: str) -> None:
+def test_start_and_goal_are_free(name: str) -> None:
     for k in range(40):
         world = suite(name).world(k)
         for obstacle in world.obstacles:
@@ -174,7 +174,7 @@ def test_kinds_of_crowds() -> None:
         assert all(0.1 <= turn.speed_mps <= 0.3 for turn in obstacle.turns)
 
 
-def test_crowds_that_cannot_be_are_refused() -> None:
+def test_invalid_crowds_are_refused() -> None:
     assert refusal(lambda: CrowdParams(speed_min_mps=0.5)) == (
         "speed_min_mps=0.5: above speed_max_mps=0.3; give the smaller one first"
     )
@@ -182,10 +182,10 @@ def test_crowds_that_cannot_be_are_refused() -> None:
     assert CrowdParams(obstacles=36).density == 0.25
 
 
-# --- hostile worlds -------------------------------------------------------------------------
+# --- adversarial worlds -----------------------------------------------------------------------
 
 
-def test_hostile_families_take_turns() -> None:
+def test_adversarial_families_alternate() -> None:
     names = [suite("adversarial").world(k).name for k in range(6)]
     assert names == [
         "adversarial-0-pincers",
@@ -199,7 +199,9 @@ def test_hostile_families_take_turns() -> None:
 
 @pytest.mark.parametrize("speed", [0.4, 0.8, 1.6])
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_straight_trip_is_in_danger_but_never_outrun(family: str, speed: float) -> None:
+def test_adversarial_obstacles_hit_the_straight_trip_but_are_slower(
+    family: str, speed: float
+) -> None:
     trip = Trip(speed_mps=speed)
     struck = 0
     for seed in range(30):
@@ -208,10 +210,10 @@ def test_the_straight_trip_is_in_danger_but_never_outrun(family: str, speed: flo
         assert all(o.top_speed_mps <= 0.6 * speed for o in obstacles)
         gaps = step_clearances(world, 0.0, trip.time_s, trip.at(0.0), trip.at(trip.time_s))
         struck += min(gaps) < 0.0
-    assert struck >= 15, "less than half of the worlds would harm anybody"
+    assert struck >= 15, "fewer than half of the worlds hit the straight trip"
 
 
-def test_chasers_end_up_nearer_to_the_trip_than_they_began() -> None:
+def test_chasers_come_nearer_to_the_trip() -> None:
     trip = Trip(speed_mps=0.8)
     world = suite("adversarial").world(2, 0.8)
     for obstacle in world.obstacles:
@@ -222,7 +224,7 @@ def test_chasers_end_up_nearer_to_the_trip_than_they_began() -> None:
         assert len(obstacle.turns) >= 10
 
 
-# --- difficulty -----------------------------------------------------------------------------
+# --- difficulty -------------------------------------------------------------------------------
 
 
 def test_an_empty_world_is_survived() -> None:
@@ -232,14 +234,14 @@ def test_an_empty_world_is_survived() -> None:
 
 
 def test_survival_by_hand() -> None:
-    # sweeps the rows of places within 0.6 m of y = 6: 5.4 (on the edge, by rounding) and 6.6
+    # sweeps the rows of positions within 0.6 m of y = 6: 5.4 (on the edge, by rounding) and 6.6
     sweeper = Obstacle(center_m=(-1.0, 6.1), radius_m=0.3, speed_mps=10.0)
     found = survivability(task(sweeper), 0.8)
     assert found.share == pytest.approx(0.9)
     assert found.positions == 100
 
 
-def test_places_inside_an_obstacle_do_not_count() -> None:
+def test_positions_inside_an_obstacle_do_not_count() -> None:
     post = Obstacle(center_m=(6.6, 6.6), radius_m=0.3)
     found = survivability(task(post), 0.8)
     assert (found.share, found.positions) == (1.0, 99)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many obstacles at many moments at once: bit by bit what world.py says of each alone."""
+"""batched_motion equals obstacle_motion and contact, bit for bit."""
 
 import math
 from itertools import pairwise
@@ -19,7 +19,7 @@ SPEEDS, HEADINGS = st.floats(0.0, 3.0), st.floats(-10.0, 10.0)
 
 @st.composite
 def obstacles(draw: st.DrawFn) -> Obstacle:
-    """One that fits into ROOM, with or without turns."""
+    """An obstacle that fits into ROOM, with or without turns."""
     radius = draw(st.sampled_from([0.05, 0.3, 0.999]))
     times = sorted(draw(st.sets(st.floats(0.1, 20.0), max_size=3)))
     return Obstacle(
@@ -52,9 +52,7 @@ def scenario(crowd: list[Obstacle], walled: bool) -> Scenario:
     walled=st.booleans(),
     times=st.lists(st.floats(0.0, 100.0), min_size=1, max_size=5),
 )
-def test_centres_are_those_of_center_at(
-    crowd: list[Obstacle], walled: bool, times: list[float]
-) -> None:
+def test_centers_equal_center_at(crowd: list[Obstacle], walled: bool, times: list[float]) -> None:
     world = scenario(crowd, walled)
     found = Motion(world).centers(np.array(times))
     assert found.shape == (2, len(times), len(crowd))
@@ -71,7 +69,7 @@ def test_centres_are_those_of_center_at(
     durations=st.lists(st.floats(1e-3, 5.0), min_size=1, max_size=5),
     data=st.data(),
 )
-def test_gaps_are_those_of_step_clearances(
+def test_gaps_equal_step_clearances(
     crowd: list[Obstacle],
     walled: bool,
     start: float,
@@ -109,6 +107,6 @@ def test_a_room_without_room_to_move() -> None:
     assert steps.gap_m[:1].tolist() == expected
 
 
-def test_nobody_is_nowhere() -> None:
+def test_a_scenario_without_obstacles() -> None:
     found = Motion(scenario([], True)).steps(np.array([0.0, 1.0]), np.zeros((2, 2)))
     assert found.gap_m.shape == (1, 0)

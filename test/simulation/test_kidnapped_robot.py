@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kidnapped robot: noticed, said, forgotten what no longer holds, and at the goal at last."""
+"""The kidnapped robot: detection, report, reset of the planner, arrival."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -58,7 +58,7 @@ def simulated(scenario: Scenario, planner: PlannerParams) -> Episode:
 
 
 @pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS)
-def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams) -> None:
+def test_both_kidnappings_are_detected_and_the_goal_is_reached(planner: PlannerParams) -> None:
     episode = simulated(KIDNAPPED, planner)
     assert evaluate(episode).success
     noticed = carried(episode)
@@ -73,8 +73,8 @@ def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams
 
 
 @pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS)
-def test_afterwards_it_decides_as_one_that_knows_of_nothing(planner: PlannerParams) -> None:
-    """What a planner remembers must not outlive the jump: a fresh one decides the same."""
+def test_after_a_kidnapping_it_decides_as_a_fresh_planner(planner: PlannerParams) -> None:
+    """The planner resets its memory at an odometry jump: a new planner decides the same."""
     episode = simulated(KIDNAPPED, planner)
     first, second = carried(episode)
     fresh = make_planner(planner, SensorParams(), seed=1)
@@ -84,8 +84,8 @@ def test_afterwards_it_decides_as_one_that_knows_of_nothing(planner: PlannerPara
         assert (own.waypoint, own.velocity, own.mode) == (tick.waypoint, tick.velocity, tick.mode)
 
 
-def test_being_carried_is_no_way_driven_and_no_contact() -> None:
-    post = Obstacle(center_m=(2.0, 3.0), radius_m=0.5)  # on the straight way of the carriers
+def test_a_kidnapping_adds_no_length_and_no_contact() -> None:
+    post = Obstacle(center_m=(2.0, 3.0), radius_m=0.5)  # on the straight line to the new position
     scenario = Scenario(
         name="x",
         start_m=(0.0, 0.0),
@@ -114,7 +114,7 @@ def observe_sectors(stamp_ns: int, x: float) -> Any:
     jump_m=st.floats(0.05, 3.0),
 )
 @settings(max_examples=60)
-def test_only_what_cannot_have_been_driven_is_a_jump(
+def test_only_impossible_moves_are_an_odometry_jump(
     stretch: float, took_s: float, jump_m: float
 ) -> None:
     planner = Algorithm1(PlannerParams(jump_m=jump_m), seed=0)
@@ -127,7 +127,7 @@ def test_only_what_cannot_have_been_driven_is_a_jump(
         assert is_jump_reason(decision.reason) is (stretch > 1.0)
 
 
-def test_a_pose_that_was_refused_says_nothing_about_jumps() -> None:
+def test_a_refused_pose_is_no_odometry_jump() -> None:
     planner = Algorithm1(PlannerParams(), seed=0)
     planner.plan(observe_sectors(1, 0.0))
     refused = observe(2, "odom holds nan", FREE, (100.0, 0.0), Pose2D(50.0, 0.0))
@@ -157,7 +157,7 @@ def start(graph: Graph, scenario: Scenario) -> WorldSim:
 
 
 @pytest.mark.parametrize("drive", list(Drive))
-def test_initialpose_carries_the_robot_off_and_the_planner_says_so(
+def test_initialpose_moves_the_robot_and_the_planner_reports_it(
     graph: Graph, drive: Drive
 ) -> None:
     decisions = graph.hear(topics.DECISION)
@@ -181,12 +181,12 @@ def test_initialpose_carries_the_robot_off_and_the_planner_says_so(
         ("[{at_s: 1.0, to_m: [4, 4]}]", r"kidnapping to_m=\[4.0, 4.0\]: 0.6 m inside obstacle 1"),
         ("[{at_s: 0.0, to_m: [1, 1]}]", r"kidnappings.1.at_s=0.0: refused; give a number "),
         ("[{at_s: 2.0, to_m: [1, 1]}, {at_s: 2.0, to_m: [1, 1]}]",
-         r"kidnappings: at_s=2 does not come after 2; give the kidnappings in order of time"),
+         r"kidnappings: at_s=2 does not come after 2; sort the kidnappings by time"),
         ("[{at_s: 2.0, to: [1, 1]}]", r"kidnappings.1.to: unknown key; did you mean 'to_m'\?"),
         ("[{at_s: 2.0}]", r"kidnappings.1.to_m: missing"),
     ],
 )  # fmt: skip
-def test_kidnappings_that_cannot_be_are_refused(kidnappings: str, reason: str) -> None:
+def test_invalid_kidnappings_are_refused(kidnappings: str, reason: str) -> None:
     text = (
         "{name: x, start_m: [0, 0], goal_m: [9, 9], "
         f"obstacles: [{{center_m: [4, 4], radius_m: 0.3}}], kidnappings: {kidnappings}}}"
@@ -195,7 +195,7 @@ def test_kidnappings_that_cannot_be_are_refused(kidnappings: str, reason: str) -
         parse_scenario(text, "it")
 
 
-def test_kidnappings_are_written_and_read_again() -> None:
+def test_kidnappings_survive_a_round_trip() -> None:
     assert parse_scenario(scenario_to_json(KIDNAPPED), "again") == KIDNAPPED
 
 
@@ -206,7 +206,7 @@ def free_point(rng: np.random.Generator, scenario: Scenario, t_s: float) -> Poin
             return (x, y)
 
 
-def test_wherever_and_whenever_it_arrives() -> None:
+def test_the_goal_is_reached_from_any_kidnapping() -> None:
     rng = np.random.default_rng(5)
     case = load_scenario("case1")
     for seed in range(10):
