@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.geometry import Point, bearing, distance, wrap_angle
-from ..simulation.batched_motion import Array, Steps
+from ..simulation.batched_motion import Array, StepClearances
 
 CONTACT_SLACK_M = 1e-9  # rounding of a tangential pass is not a collision
 STANDSTILL_M = 1e-9  # of a step: shorter ones are rounding
@@ -107,7 +107,7 @@ class ObstaclePasses:
         self._count = 0
         self._touching: Array | None = None
 
-    def add(self, steps: Steps, times_s: Array, moved_m: Array) -> None:
+    def add(self, steps: StepClearances, times_s: Array, moved_m: Array) -> None:
         """Add K steps that start at times_s (K,) and move the robot by moved_m (K,)."""
         if not steps.gap_m.size:
             return

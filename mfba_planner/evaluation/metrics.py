@@ -14,7 +14,7 @@ import numpy as np
 from ..core.geometry import Pose2D, distance
 from ..core.types import NANO, Decision, Mode
 from ..planning.odometry_jump import is_jump_reason
-from ..simulation.batched_motion import Array, Motion, Steps
+from ..simulation.batched_motion import Array, Motion, StepClearances
 from ..simulation.episode import Episode, Outcome
 from .contacts_and_clearances import DrivenPath, ObstaclePasses, RunMotion
 
@@ -170,7 +170,7 @@ class MetricsAccumulator:
             not driven.all()
         ):  # a step in which the robot was moved by hand has no length and no contact
             starts_s, moved_m = starts_s[driven], moved_m[driven]
-            steps = Steps(steps.gap_m[driven], steps.contact_s[driven], steps.distance_m)
+            steps = StepClearances(steps.gap_m[driven], steps.contact_s[driven], steps.distance_m)
         self._steps_m.extend(moved_m.tolist())
         self._passes.add(steps, starts_s, moved_m)
         self._block, self._evaluated = [ticks[-1]], 1

@@ -16,7 +16,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
-class Steps:
+class StepClearances:
     """K robot steps among N obstacles.
 
     gap_m (K, N): smallest distance between robot and obstacle edges during a step, as in
@@ -57,7 +57,7 @@ class Motion:
         """Centres (2, K, N) in metres at times (K,), bit for bit those of center_at."""
         return self._folded(self._unfolded(times_s, self._rows(times_s)))
 
-    def steps(self, times_s: Array, positions_m: Array) -> Steps:
+    def steps(self, times_s: Array, positions_m: Array) -> StepClearances:
         """Steps of a robot at positions (2, K + 1) at times (K + 1,), uniform between them."""
         rows = self._rows(times_s)
         unfolded = self._unfolded(times_s, rows)
@@ -82,7 +82,7 @@ class Motion:
             t0, t1 = times_s[k : k + 2].tolist()
             obstacle = self._scenario.obstacles[i]
             gap[k, i] = clearance(self._scenario, obstacle, t0, t1, (x0, y0), (x1, y1))
-        return Steps(gap, contact, distance)
+        return StepClearances(gap, contact, distance)
 
     def _rows(self, times_s: Array, side: Literal["left", "right"] = "right") -> Array:
         """Row number of each obstacle's stretch at each time, (K, N) or (1, N).

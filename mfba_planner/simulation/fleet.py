@@ -17,7 +17,7 @@ from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import supervised_algorithm_1
 from .differential_drive import command
 from .episode import Episode, Outcome
-from .nearby_obstacles import Found
+from .nearby_obstacles import Nearby
 from .obstacle_motion import Obstacle, Turn
 from .planner_observations import Observe, observe_sectors
 from .scenario import Scenario
@@ -67,7 +67,7 @@ class RobotWorld(World):
         """The worlds of the other robots, in scenario order."""
         return [p for p in self._fleet.robot_worlds if p is not self]
 
-    def near(self, reach_m: float, position: Point | None = None) -> Found:
+    def near(self, reach_m: float, position: Point | None = None) -> Nearby:
         """As World.near(); includes all other robots."""
         names, circles = super().near(reach_m, position)
         enlarged_m = 2.0 * self.scenario.robot_radius_m

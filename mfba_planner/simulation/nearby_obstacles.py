@@ -16,7 +16,7 @@ PICKED_TICKS = 24  # of these, for which near obstacles are preselected at once
 FEW = 16  # obstacles: up to so many all count as near, which is cheaper than a test
 ROAM_M = 2.0  # least distance the robot may move before they are selected again
 
-Found = tuple[list[int], list[tuple[Point, float]]]
+Nearby = tuple[list[int], list[tuple[Point, float]]]
 
 
 class NearbyObstacles:
@@ -35,7 +35,7 @@ class NearbyObstacles:
         self._picked_at: Point = (math.nan, math.nan)
         self._reach_m, self._roam_m = math.nan, ROAM_M
 
-    def at(self, tick: int, position: Point, reach_m: float) -> Found:
+    def at(self, tick: int, position: Point, reach_m: float) -> Nearby:
         """Indices, and (centre, enlarged radius), of all obstacles whose edge is within reach.
 
         Ascending indices. May hold others too; none is missing. A position that is not finite

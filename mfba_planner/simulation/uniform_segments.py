@@ -24,7 +24,7 @@ class UniformSegments(NamedTuple):
     radius: np.ndarray  # m, enlarged
     obstacle: np.ndarray  # index into Scenario.obstacles
 
-    def of(self, obstacles: list[int]) -> UniformSegments:
+    def select(self, obstacles: list[int]) -> UniformSegments:
         """The segments of some obstacles only."""
         keep = np.isin(self.obstacle, obstacles)
         return UniformSegments(*(column[keep] for column in self))

@@ -9,7 +9,7 @@ from ..core.types import NANO
 from .batched_motion import Motion
 from .differential_drive import Speeds, apply_command
 from .episode import Outcome, stamp_of
-from .nearby_obstacles import Found, NearbyObstacles
+from .nearby_obstacles import Nearby, NearbyObstacles
 from .obstacle_motion import velocity_at
 from .scenario import Scenario
 from .sensor_noise import NoisySensors, Reading
@@ -48,7 +48,7 @@ class World:
         self._read: tuple[int, Reading] | None = None
         self._nearby = NearbyObstacles(Motion(scenario), tick_ns)
 
-    def near(self, reach_m: float, position: Point | None = None) -> Found:
+    def near(self, reach_m: float, position: Point | None = None) -> Nearby:
         """Indices, and (centre, enlarged radius), of the obstacles that may be within reach now.
 
         Reach is measured to the enlarged edge. In scenario order; none within reach is missing.

@@ -280,7 +280,7 @@ def test_the_lattice_search_finds_nothing_shorter(name: str, k: int) -> None:
     segments = uniform_segments(world, limit_s + 1.0)
     params = LatticeParams(step_s=0.6, headings=64, cell_m=0.1, max_paths=12)
     paths = lattice_paths(world.start_m, world.goal_m, V, segments, limit_s, params)
-    refined = [path for one in paths if (path := refine(one, V, segments)) is not None]
+    refined = [path for rough in paths if (path := refine(rough, V, segments)) is not None]
     assert refined
     shortest = min(float(lengths(path[None])[0]) for path in refined)
     assert best.length_m <= shortest + 2e-3

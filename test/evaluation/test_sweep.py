@@ -468,7 +468,7 @@ def test_workers_compute_with_one_thread(
         monkeypatch.setenv(name, "2")
     child = Worker()
     try:
-        assert list(child.ask(environment, tuple(names), None, 60.0)) == ["1", "1", "1"]
+        assert list(child.run(environment, tuple(names), None, 60.0)) == ["1", "1", "1"]
     finally:
         child.end()
 

@@ -122,8 +122,8 @@ POST = [(9.0, 2.0, 0.5)]
 
 
 def readings(seed: int = 0, **noise: float) -> list[Any]:
-    of = sensors(seed, **noise)
-    return [of.read((k + 1) * TICK_NS, pose, POST) for k, pose in enumerate(POSES)]
+    noisy = sensors(seed, **noise)
+    return [noisy.read((k + 1) * TICK_NS, pose, POST) for k, pose in enumerate(POSES)]
 
 
 def test_without_noise_readings_are_exact() -> None:

@@ -150,7 +150,7 @@ class _Task:
         """
         start, goal = self.scenario.start_m, self.scenario.goal_m
         while True:
-            subset = segments.of(sorted(self.active))
+            subset = segments.select(sorted(self.active))
             paths = Search(start, goal, self.v, subset, self.params, self.inside).paths()
             if not paths:
                 return []

@@ -76,17 +76,17 @@ def _computed(
         yield from ((chunk, chunk.run()) for chunk in chunks)
         return
     died: Counter[str] = Counter()
-    left = {chunk.name: chunk for chunk in chunks}
-    while left:
-        suspects = [chunk for chunk in left.values() if died[chunk.name]]
+    remaining = {chunk.name: chunk for chunk in chunks}
+    while remaining:
+        suspects = [chunk for chunk in remaining.values() if died[chunk.name]]
         # Chunks that ran when a worker died are tried again one by one, to find the cause.
-        batch = suspects[:1] or list(left.values())
+        batch = suspects[:1] or list(remaining.values())
         for chunk, outcome in _batch(batch, workers, executor):
             if isinstance(outcome, WorkerDied):
                 died[chunk.name] += 1
                 _report(chunk, died[chunk.name], single=len(batch) == 1, say=say)
             else:
-                del left[chunk.name]
+                del remaining[chunk.name]
                 yield chunk, outcome
 
 

@@ -85,16 +85,16 @@ def _paper(_: Suite, k: int, __: float) -> Scenario:
 def _crowd(params: CrowdParams) -> _Make:
     walls = ROOM if params.walled else None
 
-    def make(of: Suite, k: int, _: float) -> Scenario:
-        return scenario(f"{of.name}-{k}", crowd(params, of.stream(k)), walls)
+    def make(source: Suite, k: int, _: float) -> Scenario:
+        return scenario(f"{source.name}-{k}", crowd(params, source.stream(k)), walls)
 
     return make
 
 
-def _adversarial(of: Suite, k: int, speed_mps: float) -> Scenario:
+def _adversarial(source: Suite, k: int, speed_mps: float) -> Scenario:
     family = list(FAMILIES)[k % len(FAMILIES)]
-    obstacles = adversarial_obstacles(family, Trip(speed_mps=speed_mps), of.stream(k))
-    return scenario(f"{of.name}-{k}-{family}", obstacles)
+    obstacles = adversarial_obstacles(family, Trip(speed_mps=speed_mps), source.stream(k))
+    return scenario(f"{source.name}-{k}-{family}", obstacles)
 
 
 _DENSE = CrowdParams(

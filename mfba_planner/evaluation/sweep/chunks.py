@@ -117,15 +117,15 @@ class Optima:
         return {name: [row[name] for row in found] for name in found[0]}
 
 
-def solve_world(world: int, of: Optima) -> Row:
+def solve_world(world: int, optima: Optima) -> Row:
     """The oracle's columns of one world."""
-    scenario = suite(of.suite, of.suite_seed).world(world, of.speed_mps)
-    solution = solve(scenario, of.speed_mps)
+    scenario = suite(optima.suite, optima.suite_seed).world(world, optima.speed_mps)
+    solution = solve(scenario, optima.speed_mps)
     return {
         "world": world,
         "certificate": solution.certificate.value,
         "optimum_m": round(solution.length_m, DIGITS),
-        "survivability": survivability(scenario, of.speed_mps).share,
+        "survivability": survivability(scenario, optima.speed_mps).share,
     }
 
 

@@ -34,8 +34,8 @@ def _headline(completed: PlayedRun, result: Result, run_motion: RunMotion) -> st
         return f"the robot {did} obstacle {number} at {run_motion.first_contact_s:.2f} s{more}"
     if result.outcome is Outcome.GOAL_REACHED:
         return f"goal reached without collision after {result.length_m:.3f} m"
-    left = distance(episode.ticks[-1].pose.position, episode.scenario.goal_m)
-    return f"{left:.2f} m left to the goal when time was up ({result.time_s:.1f} s)"
+    remaining_m = distance(episode.ticks[-1].pose.position, episode.scenario.goal_m)
+    return f"{remaining_m:.2f} m left to the goal when time was up ({result.time_s:.1f} s)"
 
 
 def contact_index(episode: Episode) -> int | None:

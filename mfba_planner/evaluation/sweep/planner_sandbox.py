@@ -35,7 +35,7 @@ class PlannerSandbox:
         self.decisions: list[Decision] = []
         self.times_ns: list[int] = []
 
-    def take(self, make: Callable[[], PathPlanner]) -> PathPlanner:
+    def make_planner(self, make: Callable[[], PathPlanner]) -> PathPlanner:
         """Make and return the planner. Raises PlannerFault; MfbaError is passed on."""
         try:
             self.planner = made = make()

@@ -88,7 +88,7 @@ def _decision_by_decision(
     """A run as a generator: yields the observation before every decision."""
     scenario, fault = setting.scenario(run), ""
     try:
-        path_planner = sandbox.take(lambda: setting.make_planner(run))
+        path_planner = sandbox.make_planner(lambda: setting.make_planner(run))
         episode = yield from episode_generator(
             scenario,
             setting.params,

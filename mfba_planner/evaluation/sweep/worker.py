@@ -37,10 +37,10 @@ def each(
     An exception in the child is raised here; an item that takes longer than patience_s, or ends
     its process, is Lost.
     """
-    left = list(items)
-    while left:
-        for result in _thread_worker().ask(work, tuple(left), shared, patience_s):
-            del left[0]
+    remaining = list(items)
+    while remaining:
+        for result in _thread_worker().run(work, tuple(remaining), shared, patience_s):
+            del remaining[0]
             yield result
 
 
@@ -80,7 +80,7 @@ class Worker:
         """Whether the child can take work."""
         return self._child.poll() is None and not self._pipe.closed
 
-    def ask(
+    def run(
         self, work: Work[T], items: tuple[Any, ...], shared: Any, patience_s: float
     ) -> Iterator[T | Lost]:
         """Yield the result of each item; ends after Lost, when the child hung or died.
