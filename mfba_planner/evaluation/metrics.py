@@ -166,9 +166,7 @@ class MetricsAccumulator:
         dx, dy = np.diff(positions_m)
         moved_m = np.sqrt(dx * dx + dy * dy)
         starts_s = times_s[:-1]
-        if (
-            not driven.all()
-        ):  # a step in which the robot was moved by hand has no length and no contact
+        if not driven.all():  # a kidnapping adds no length and no contact
             starts_s, moved_m = starts_s[driven], moved_m[driven]
             steps = StepClearances(steps.gap_m[driven], steps.contact_s[driven], steps.distance_m)
         self._steps_m.extend(moved_m.tolist())
@@ -176,7 +174,7 @@ class MetricsAccumulator:
         self._block, self._evaluated = [ticks[-1]], 1
 
     def _extend_path(self, ticks: list[Decision]) -> None:
-        """Add ticks to the path; where the robot was moved by hand, a new path starts."""
+        """Add ticks to the path; a new path starts where the robot was kidnapped."""
         first = 0
         for number, tick in enumerate(ticks):
             if is_jump_reason(tick.reason):
@@ -195,7 +193,7 @@ class MetricsAccumulator:
 def steps_driven(episode: Episode) -> list[tuple[Decision, Decision]]:
     """Pairs of successive ticks with true poses; a single tick is paired with itself.
 
-    A robot that is moved by hand counts as at rest until the tick that detects the jump.
+    A kidnapped robot counts as at rest until the tick that detects the odometry jump.
     """
     ticks = [
         tick if pose is None else replace(tick, pose=pose)

@@ -32,9 +32,7 @@ class Episode:
     driver: str
     ticks: tuple[Decision, ...]
     outcome: Outcome
-    truth: tuple[
-        Pose2D, ...
-    ] = ()  # true pose at each tick; (): equal to the poses of the decisions
+    truth: tuple[Pose2D, ...] = ()  # true pose at each tick; (): those of the decisions
     planner_name: str = ""  # the planner, where `planner` (its parameters) does not name it
 
     @property

@@ -20,7 +20,7 @@ from .tangent_search import CLEAR_M
 
 _CHUNK = 20_000  # (edge, segment) pairs evaluated at once: what a cache holds
 _PAIR_CHUNK = 300  # (point, segment) pairs evaluated at once; each has many headings
-_SLACK_M = 1e-6  # rounding of what is in reach
+_SLACK_M = 1e-6  # added to the reach, for rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -112,9 +112,8 @@ class _Problem:
     ) -> None:
         self.points, self.v, self.margin = points, speed_mps, margin
         self.rows, columns = np.nonzero(pairs)
-        self.segments = UniformSegments(
-            *(values[columns] for values in segments)
-        )  # one for each pair
+        # One segment for each pair.
+        self.segments = UniformSegments(*(values[columns] for values in segments))
         first, last = self.points[0].tolist(), self.points[-1].tolist()
         self._ends = [tuple(first)], [tuple(last)]
         self._plain = (

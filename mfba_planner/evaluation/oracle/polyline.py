@@ -13,9 +13,7 @@ from ...core.geometry import Point
 from ...simulation.obstacle_motion import Walls
 from ...simulation.uniform_segments import UniformSegments
 
-Segment = tuple[
-    float, float, float, float, float, float, float
-]  # UniformSegments, without obstacle
+Segment = tuple[float, float, float, float, float, float, float]  # UniformSegments[:7]
 FAR_M = 9.0  # gap reported for a pair that never moves at the same time
 
 

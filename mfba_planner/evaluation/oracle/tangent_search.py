@@ -103,7 +103,7 @@ class Search:
             while heap and len(batch) < self.params.batch and heap[0][0] <= limit:
                 f, node = heapq.heappop(heap)
                 if graph.segment[node] >= 0 and best[self._key(graph, node)] < f:
-                    continue  # overtaken since
+                    continue  # a better node was found since
                 batch.append(node)
             if not batch:
                 break

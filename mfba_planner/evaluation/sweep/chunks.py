@@ -47,11 +47,11 @@ class Runs:
         if generates_paths_together(self.runs[0].planner, self.setting):
             # The first run on its own, to time its decisions.
             batches = [batch for batch in (self.runs[:1], self.runs[1:]) if batch]
-        found = list(self._made(batches))
+        found = list(self._rows(batches))
         names = dict.fromkeys(name for row in found for name in row)
         return {name: [row.get(name) for row in found] for name in names}
 
-    def _made(self, batches: Sequence[tuple[Run, ...]]) -> Iterator[Row]:
+    def _rows(self, batches: Sequence[tuple[Run, ...]]) -> Iterator[Row]:
         """The rows, one per run; runs of a batch that hung or died are run again one by one."""
         # Collect all results first: a hung child is only ended when its generator is exhausted.
         results = list(each(make, batches, self.setting, self.setting.patience_s))
@@ -61,20 +61,15 @@ class Runs:
             elif len(batch) == 1:
                 yield lost_row(batch[0], result.why)
             else:
-                yield from self._made([(run,) for run in batch])
+                yield from self._rows([(run,) for run in batch])
 
 
 def make(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
     """Compute runs in this process, several together; their rows with timings."""
     started = perf_counter()
     single = len(runs) == 1
-    all_completed = (
-        [run_one(runs[0], setting, whole=False)] if single else run_together(runs, setting)
-    )
-    made = [
-        (completed.times_ns, made_row(run, completed))
-        for run, completed in zip(runs, all_completed)
-    ]
+    done = [run_one(runs[0], setting, whole=False)] if single else run_together(runs, setting)
+    made = [(completed.times_ns, made_row(run, completed)) for run, completed in zip(runs, done)]
     wall_ms = 1e3 * (perf_counter() - started) / len(runs)
     return [{**timing_row(times_ns, wall_ms), **row} for times_ns, row in made]
 
