@@ -88,7 +88,7 @@ def used() -> dict[str, set[str]]:
 
 
 @pytest.mark.parametrize("word", REPLACED)
-def test_a_word_that_was_replaced_is_in_no_identifier(word: str, used: dict[str, set[str]]) -> None:
+def test_a_replaced_word_is_in_no_identifier(word: str, used: dict[str, set[str]]) -> None:
     assert not used.get(word), f"{word}: say {REPLACED[word]}"
 
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run was worth: metrics and statistics; the oracle, suites of worlds, sweeps, studies."""
+"""Evaluation of runs: metrics and statistics; the oracle, suites of worlds, sweeps, studies."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a run went on its way: who ran into whom, how near it was, how smooth; streamed."""
+"""Contacts, clearances, time to collision and smoothness of a run, computed as a stream."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.geometry import Point, bearing, distance, wrap_angle
-from ..simulation.batched_motion import Array, Steps
+from ..simulation.batched_motion import Array, StepClearances
 
 CONTACT_SLACK_M = 1e-9  # rounding of a tangential pass is not a collision
 STANDSTILL_M = 1e-9  # of a step: shorter ones are rounding
@@ -20,17 +20,17 @@ HEADING_CHANGE_RAD = math.radians(15.0)  # half a sector of Fig. 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunMotion:
-    """Figures of one run beyond evaluation.metrics.Result; one value each, over all K steps.
+    """Figures of one run beyond evaluation.metrics.Result, over all K steps.
 
     hits_moving, hits_standing: the collisions of Result, by whether the robot moved (more than
-        STANDSTILL_M) in the step in which the contact began: it ran into the obstacle, or the
-        obstacle into it.
+        STANDSTILL_M) in the step in which the contact started: the robot hit the obstacle, or
+        the obstacle hit the standing robot.
     first_contact_with, first_contact_s: the obstacle (from 1; 0 for none) of the first contact,
-        and the time at which the step begins that leads to it (inf for none).
+        and the start time of the step in which it occurs (inf for none).
     mean_clearance_m: (1/K) sum_k min_i gap_ki, the smallest gap of each step on average; inf
         without obstacles.
     min_ttc_s: time to collision, min over k and i of the time until contact if robot and
-        obstacle both went on as in step k; 0 in contact, inf if never on a collision course.
+        obstacle both keep their velocity of step k; 0 in contact, inf if never.
     turning_rad: sum_k |h_(k+1) - h_k| over the headings h of all steps longer than STANDSTILL_M.
     curvature_radpm: turning_rad / length, the path's mean absolute curvature; 0 without a step.
     heading_changes: how many of these turns are larger than HEADING_CHANGE_RAD.
@@ -53,7 +53,7 @@ class RunMotion:
 
 
 class DrivenPath:
-    """The shape of a path, point by point: turning, heading changes, jerk."""
+    """Turning, heading changes and jerk of a path, added point by point."""
 
     def __init__(self) -> None:
         """Start before the first point."""
@@ -65,10 +65,10 @@ class DrivenPath:
         self.heading_changes = 0
 
     def add(self, points: Sequence[Point]) -> None:
-        """Take the next points, at least one."""
+        """Add the next points, at least one."""
         whole = [*self._last, *points]
-        begin = max(0, len(self._last) - 1)
-        for a, b in zip(whole[begin:], whole[begin + 1 :]):
+        first = max(0, len(self._last) - 1)
+        for a, b in zip(whole[first:], whole[first + 1 :]):
             if distance(a, b) > STANDSTILL_M:
                 heading = bearing(a, b)
                 if self._heading is not None:
@@ -83,7 +83,7 @@ class DrivenPath:
         self._last = whole[-3:]
 
     def interrupt(self) -> None:
-        """The next point does not follow from the last: no turn, no jerk between them."""
+        """Start a new path: no turn and no jerk between the last and the next point."""
         self._last, self._heading = [], None
 
     @property
@@ -97,7 +97,7 @@ class DrivenPath:
 
 
 class ObstaclePasses:
-    """What the obstacles of a run did to the robot, step by step."""
+    """Contacts, gaps and times to collision of a run, added step by step."""
 
     def __init__(self) -> None:
         """Start before the first step."""
@@ -107,8 +107,8 @@ class ObstaclePasses:
         self._count = 0
         self._touching: Array | None = None
 
-    def add(self, steps: Steps, times_s: Array, moved_m: Array) -> None:
-        """Take K more steps that begin at times (K,) and move the robot by moved_m (K,)."""
+    def add(self, steps: StepClearances, times_s: Array, moved_m: Array) -> None:
+        """Add K steps that start at times_s (K,) and move the robot by moved_m (K,)."""
         if not steps.gap_m.size:
             return
         nearest = steps.gap_m.min(axis=1)
@@ -118,11 +118,11 @@ class ObstaclePasses:
         self._count += len(nearest)
         touching = steps.gap_m < -CONTACT_SLACK_M
         if self._touching is not None or touching.any():
-            self._meet(touching, times_s, moved_m)
+            self._count_contacts(touching, times_s, moved_m)
         self._touching = touching[-1] if touching[-1].any() else None
 
-    def _meet(self, touching: Array, times_s: Array, moved_m: Array) -> None:
-        """A contact counts when it begins."""
+    def _count_contacts(self, touching: Array, times_s: Array, moved_m: Array) -> None:
+        """Count the contacts that start in these steps."""
         before = np.zeros_like(touching)
         before[1:] = touching[:-1]
         if self._touching is not None:

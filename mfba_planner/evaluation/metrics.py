@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run was worth: each figure defined once, computed from an Episode and nothing else."""
+"""Metrics of a run from its Episode: length, time, clearance, collisions, success."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from ..core.geometry import Pose2D, distance
 from ..core.types import NANO, Decision, Mode
 from ..planning.odometry_jump import is_jump_reason
-from ..simulation.batched_motion import Array, Motion, Steps
+from ..simulation.batched_motion import Array, Motion, StepClearances
 from ..simulation.episode import Episode, Outcome
 from .contacts_and_clearances import DrivenPath, ObstaclePasses, RunMotion
 
@@ -47,49 +47,49 @@ def evaluate(episode: Episode) -> Result:
     use it (no epsilon; inf for a robot that never moved). min_clearance_m is the smallest
     gap between robot and obstacle edges, continuous in time, negative in contact (inf without
     obstacles); collisions counts contacts, one per obstacle and unbroken run of ticks.
-    encounters lists, in order of time, the obstacles (from 1) that came within SR of the
-    enlarged edge at some tick. mode_switches counts every change of mode, the one to ARRIVED
-    included. success is: goal reached, no collision.
+    encounters lists the obstacles (from 1) whose enlarged edge came within SR at a tick, sorted by
+    time. mode_switches counts every change of mode, including that to ARRIVED. success: goal
+    reached without collision.
     """
     return assess(episode)[0]
 
 
 def run_motion(episode: Episode) -> RunMotion:
-    """How the run went on its way."""
+    """Compute the RunMotion of an episode."""
     return assess(episode)[1]
 
 
 def assess(episode: Episode) -> tuple[Result, RunMotion]:
-    """evaluate() and conduct() in one go."""
-    tally = MetricsAccumulator(episode)
+    """evaluate() and run_motion() in one pass."""
+    accumulator = MetricsAccumulator(episode)
     for tick, pose in zip_longest(episode.ticks, episode.truth):
-        tally.add(tick, pose)
-    return tally.result(episode.outcome), tally.run_motion()
+        accumulator.add(tick, pose)
+    return accumulator.result(episode.outcome), accumulator.run_motion()
 
 
 class MetricsAccumulator:
-    """The figures of evaluate(), tick by tick: holds BLOCK ticks, however long the run is.
+    """The figures of assess(), added tick by tick; holds at most BLOCK ticks.
 
-    Obstacles are looked at a block at a time, which is what makes it fast.
+    Obstacles are evaluated one block at a time, for speed.
     """
 
     def __init__(self, run: Episode) -> None:
-        """Start before the first tick; of run, only what was run counts, not its ticks."""
+        """Start before the first tick. Uses scenario and parameters of run, not its ticks."""
         self._run = run
         self._motion = Motion(run.scenario)
         self._block: list[Decision] = []
-        self._looked = 0  # how many of the block have been looked at before: the first, or none
+        self._evaluated = 0  # ticks of the block already evaluated: 1 or 0
         self._first: Decision | None = None
-        # fsum of all at the end: sum() itself rounds differently before and after Python 3.12
+        # summed by fsum at the end: sum() rounds differently before and after Python 3.12
         self._steps_m = array("d")
         self._modes: Counter[Mode] = Counter()
         self._switches = 0
         self._passes = ObstaclePasses()
-        self._course = DrivenPath()
+        self._path = DrivenPath()
         self._encounters: dict[int, None] = {}
 
     def add(self, tick: Decision, pose: Pose2D | None = None) -> None:
-        """Take the next tick, and where the robot was if it saw itself elsewhere."""
+        """Add the next tick, with the true pose where it differs from the decision's."""
         if pose is not None:
             tick = replace(tick, pose=pose)
         if self._first is None:
@@ -99,11 +99,11 @@ class MetricsAccumulator:
         self._modes[tick.mode] += 1
         self._block.append(tick)
         if len(self._block) == BLOCK:
-            self._look()
+            self._evaluate_block()
 
     def result(self, outcome: Outcome) -> Result:
-        """The figures of the ticks so far; a single tick has the clearance of standing there."""
-        passes = self._told()
+        """The Result of the ticks so far; for a single tick, that of a robot at rest."""
+        passes = self._all_passes()
         first, last = self._first, self._block[-1] if self._block else None
         length = math.fsum(self._steps_m)
         collisions = passes.hits_moving + passes.hits_standing
@@ -124,10 +124,10 @@ class MetricsAccumulator:
         )
 
     def run_motion(self) -> RunMotion:
-        """How it went on its way so far."""
-        passes = self._told()
+        """The RunMotion of the ticks so far."""
+        passes = self._all_passes()
         tick_s = self._run.planner.tick_ns * NANO
-        length, turning = math.fsum(self._steps_m), self._course.turning_rad
+        length, turning = math.fsum(self._steps_m), self._path.turning_rad
         return RunMotion(
             hits_moving=passes.hits_moving,
             hits_standing=passes.hits_standing,
@@ -137,63 +137,63 @@ class MetricsAccumulator:
             min_ttc_s=passes.min_ttc_s,
             turning_rad=turning,
             curvature_radpm=turning / length if length > 0.0 else 0.0,
-            heading_changes=self._course.heading_changes,
-            jerk_mps3=self._course.jerk(tick_s),
+            heading_changes=self._path.heading_changes,
+            jerk_mps3=self._path.jerk(tick_s),
             avoidance_s=self._modes[Mode.OBSTACLE_AVOIDANCE] * tick_s,
         )
 
-    def _told(self) -> ObstaclePasses:
-        """What the obstacles did so far; to a single tick, what they do while it stands."""
-        self._look()
+    def _all_passes(self) -> ObstaclePasses:
+        """The passes so far; for a single tick, those of a robot at rest."""
+        self._evaluate_block()
         if self._modes.total() != 1:
             return self._passes
-        standing = ObstaclePasses()
-        times_s, positions_m = self._course_of([self._block[0]] * 2)
-        standing.add(self._motion.steps(times_s, positions_m), times_s, np.zeros(1))
-        return standing
+        at_rest = ObstaclePasses()
+        times_s, positions_m = self._times_and_positions([self._block[0]] * 2)
+        at_rest.add(self._motion.steps(times_s, positions_m), times_s, np.zeros(1))
+        return at_rest
 
-    def _look(self) -> None:
-        """Look at the ticks that were added since the last look; keep the last one."""
+    def _evaluate_block(self) -> None:
+        """Evaluate the ticks added since the last call; keep the last one."""
         ticks = self._block
-        if len(ticks) == self._looked:
+        if len(ticks) == self._evaluated:
             return
         driven = np.array([not is_jump_reason(tick.reason) for tick in ticks[1:]], dtype=bool)
-        self._course_on(ticks[self._looked :])
-        times_s, positions_m = self._course_of(ticks)
+        self._extend_path(ticks[self._evaluated :])
+        times_s, positions_m = self._times_and_positions(ticks)
         steps = self._motion.steps(times_s, positions_m)
         near = steps.distance_m - self._motion.radius_m <= self._run.sensor.sensing_range_m
         self._encounters.update(dict.fromkeys(np.argwhere(near)[:, 1].tolist()))
         dx, dy = np.diff(positions_m)
         moved_m = np.sqrt(dx * dx + dy * dy)
-        begins_s = times_s[:-1]
-        if not driven.all():  # who is carried drives no way and runs into nobody
-            begins_s, moved_m = begins_s[driven], moved_m[driven]
-            steps = Steps(steps.gap_m[driven], steps.contact_s[driven], steps.distance_m)
+        starts_s = times_s[:-1]
+        if not driven.all():  # a kidnapping adds no length and no contact
+            starts_s, moved_m = starts_s[driven], moved_m[driven]
+            steps = StepClearances(steps.gap_m[driven], steps.contact_s[driven], steps.distance_m)
         self._steps_m.extend(moved_m.tolist())
-        self._passes.add(steps, begins_s, moved_m)
-        self._block, self._looked = [ticks[-1]], 1
+        self._passes.add(steps, starts_s, moved_m)
+        self._block, self._evaluated = [ticks[-1]], 1
 
-    def _course_on(self, ticks: list[Decision]) -> None:
-        """Draw the path on; where the robot was carried, a new one begins."""
+    def _extend_path(self, ticks: list[Decision]) -> None:
+        """Add ticks to the path; a new path starts where the robot was kidnapped."""
         first = 0
         for number, tick in enumerate(ticks):
             if is_jump_reason(tick.reason):
                 if number > first:
-                    self._course.add([tick.pose.position for tick in ticks[first:number]])
-                self._course.interrupt()
+                    self._path.add([tick.pose.position for tick in ticks[first:number]])
+                self._path.interrupt()
                 first = number
-        self._course.add([tick.pose.position for tick in ticks[first:]])
+        self._path.add([tick.pose.position for tick in ticks[first:]])
 
-    def _course_of(self, ticks: list[Decision]) -> tuple[Array, Array]:
-        """Times (K,) and positions (2, K) of some ticks."""
+    def _times_and_positions(self, ticks: list[Decision]) -> tuple[Array, Array]:
+        """Times (K,) and positions (2, K) of ticks."""
         times_s = [self._run.time_s(tick.stamp_ns) for tick in ticks]
         return np.array(times_s), np.array([tick.pose.position for tick in ticks]).T
 
 
 def steps_driven(episode: Episode) -> list[tuple[Decision, Decision]]:
-    """Each tick and the next, where the robot really was; of a single tick it twice.
+    """Pairs of successive ticks with true poses; a single tick is paired with itself.
 
-    Who is carried off drives nowhere: it stands until the tick at which it finds itself elsewhere.
+    A kidnapped robot counts as at rest until the tick that detects the odometry jump.
     """
     ticks = [
         tick if pose is None else replace(tick, pose=pose)
@@ -211,9 +211,9 @@ def tick_clearances(episode: Episode) -> list[list[float]]:
     positions_m = np.array([tick.pose.position for tick in moments]).T
     gaps_m = motion.steps(times_s, positions_m).gap_m
     for k, (_, b) in enumerate(steps):
-        if is_jump_reason(b.reason):  # the next step begins elsewhere
-            standing_m = positions_m[:, [k, k]]
-            gaps_m[k] = motion.steps(times_s[k : k + 2], standing_m).gap_m[0]
+        if is_jump_reason(b.reason):  # the next step starts elsewhere
+            at_rest_m = positions_m[:, [k, k]]
+            gaps_m[k] = motion.steps(times_s[k : k + 2], at_rest_m).gap_m[0]
     return [[float(gap) for gap in row] for row in gaps_m]
 
 

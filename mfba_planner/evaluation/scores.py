@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run is worth against an optimum: the gap to it, SPL, the BARN score."""
+"""Scores of a run against an optimum: optimality gap, SPL, BARN score."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ def time_to_goal_s(result: Result) -> float:
 
 
 def optimality_gap(length_m: float, optimum_m: float) -> float:
-    """Gap to the optimum, length / optimum - 1; it means something where the goal was reached.
+    """Gap to the optimum, length / optimum - 1; valid where the goal was reached.
 
-    Negative where the run got round without what the optimum had to keep: it ended within the
-    goal tolerance, or collided.
+    Negative for a run that ended within the goal tolerance, or that collided.
     """
     return length_m / optimum_m - 1.0
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What samples of runs say: intervals, comparisons, and whether a printed row can be one of them.
+"""Statistics of samples of runs: intervals, comparisons, consistency of printed rows.
 
-scipy is imported where it is used: it takes longer to load than most commands take.
+scipy is imported where it is used: its import takes longer than most commands.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ Array = NDArray[np.float64]
 LEVEL = 0.95
 RESAMPLES = 10_000
 RIDGE = 1e-6
-DRAWN = 2**20  # resampled values held at once
+DRAWN = 2**20  # resampled values in memory at once
 
 
 def generator(*key: int) -> np.random.Generator:
-    """The random stream of one resampling, named by numbers: the same in every run."""
+    """The random generator of one resampling, named by numbers; reproducible."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(0, spawn_key=key)))
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An estimate between the ends of its 95 % interval."""
+    """An estimate with its 95 % interval."""
 
     middle: float
     low: float
@@ -40,7 +40,7 @@ class Interval:
 
 
 def interval(values: Array, middle: float | None = None) -> Interval:
-    """Median (unless given another middle) and central 95 % of resampled values."""
+    """Median (or the middle given) and central 95 % of resampled values."""
     tail = 50.0 * (1.0 - LEVEL)
     low, half, high = np.percentile(values, [tail, 50.0, 100.0 - tail])
     return Interval(float(half if middle is None else middle), float(low), float(high))
@@ -71,24 +71,24 @@ def estimate(
 
 
 def rate(count: int, n: int) -> Interval:
-    """A share of n independent cases with Wilson's 95 % interval; n >= 1."""
+    """Share count / n of independent cases with Wilson's 95 % interval; n >= 1."""
     return Interval(count / n, *share_interval(count, n))
 
 
 def mean(sample: Array, rng: np.random.Generator, count: int = 2000) -> Interval:
-    """Mean with its bootstrap interval (percentiles); memory does not grow with the sample."""
+    """Mean with its percentile bootstrap interval; memory is bounded."""
     values = np.asarray(sample, dtype=float)
     batch = max(1, DRAWN // len(values))
     means = [
-        resample(values, len(values), rng, min(batch, count - begin)).mean(1)
-        for begin in range(0, count, batch)
+        resample(values, len(values), rng, min(batch, count - start)).mean(1)
+        for start in range(0, count, batch)
     ]
     return interval(np.concatenate(means), float(values.mean()))
 
 
 @dataclass(frozen=True, slots=True)
 class Paired:
-    """Two planners on the same cases, lower is better: who wins how often, and by how much.
+    """Paired comparison of two planners on the same cases, lower is better.
 
     difference is the mean of ours - other with its bootstrap interval over the cases; sign_p is
     the exact sign test's p (ties left out), rank_p Wilcoxon's, both two-sided.
@@ -108,7 +108,7 @@ class Paired:
 
 
 def paired(ours: Array, other: Array, rng: np.random.Generator) -> Paired:
-    """Compare values of the same cases in the same order, at least one."""
+    """Compare values of the same cases, paired by index; at least one case."""
     from scipy.stats import binomtest, wilcoxon
 
     difference = np.asarray(ours, dtype=float) - np.asarray(other, dtype=float)
@@ -134,24 +134,23 @@ def mean_difference(
 
 @dataclass(frozen=True, slots=True)
 class Consistency:
-    """How well a printed row fits; p is joint, outside names what no single interval holds."""
+    """Fit of a printed row: joint p; outside names the statistics beyond their own interval."""
 
     p: float
     outside: tuple[str, ...]
 
     @property
     def consistent(self) -> bool:
-        """Whether the row is an ordinary one, at 95 %."""
+        """Whether the row fits at the 95 % level."""
         return self.p >= 1.0 - LEVEL
 
 
 def consistency(draws: Array, printed: Sequence[float], names: Sequence[str]) -> Consistency:
-    """Whether printed statistics, taken together, could be a row of draws (count, k).
+    """Whether printed statistics, jointly, could be a row of draws (count, k).
 
     Each statistic becomes a normal score by its rank among the draws; the distance is
-    Mahalanobis's, so that statistics which move together must do so in print as well, and p is
-    the share of draws that lie at least as far out. A value beyond all draws gets the score of
-    the outermost rank.
+    Mahalanobis's, so that correlated statistics must agree in print too, and p is the share of
+    draws at least as far out. A value beyond all draws gets the score of the outermost rank.
     """
     from scipy.special import ndtri
 
@@ -163,7 +162,7 @@ def consistency(draws: Array, printed: Sequence[float], names: Sequence[str]) ->
             below = np.searchsorted(column, x, "left")
             not_above = np.searchsorted(column, x, "right")
             scores[rows, j] = ndtri((0.5 * (below + not_above) + 0.5) / (count + 1))
-    # Without the ridge a column that never varies would forgive any printed value.
+    # Without the ridge a constant column would accept any printed value.
     spread = np.cov(scores[:count].T) + RIDGE * np.eye(k)
     squared = np.einsum("ij,jk,ik->i", scores, np.linalg.inv(spread), scores)
     p = (1 + np.count_nonzero(squared[:count] >= squared[count])) / (count + 1)
@@ -200,7 +199,7 @@ def compare(ours: Array, other: Array) -> Comparison:
 
 
 def _placements(x: Array, y: Array) -> Array:
-    """For each x the share of y above it, ties half."""
+    """For each x the share of y above it; ties count half."""
     ordered = np.sort(y)
     below = np.searchsorted(ordered, x, "left") + np.searchsorted(ordered, x, "right")
     return 1.0 - 0.5 * below / len(y)
@@ -224,7 +223,7 @@ def compare_pairs(ours: Array, other: Array) -> Comparison:
 def share_interval(count: int, n: int) -> tuple[float, float]:
     """Wilson's 95 % interval of a share count / n (Wilson 1927).
 
-    Written down here, since loading scipy.stats takes longer than many a sweep.
+    Implemented here, since the import of scipy.stats takes longer than many sweeps.
     """
     z = NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
     share, scale = count / n, 2.0 * (n + z * z)
@@ -234,7 +233,7 @@ def share_interval(count: int, n: int) -> tuple[float, float]:
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Holm's corrected p-values, in the order given."""
+    """Holm's corrected p-values, in the sequence given."""
     corrected = [0.0] * len(p)
     worst = 0.0
     for rank, index in enumerate(sorted(range(len(p)), key=lambda i: p[i])):
@@ -251,5 +250,5 @@ def _normal(middle: float, deviation: float) -> Interval:
 
 
 def _probability(p: float) -> float:
-    """A p-value; NaN (two constant samples) says nothing against equality."""
+    """A p-value; 1 for NaN (two constant samples)."""
     return 1.0 if np.isnan(p) else float(p)

@@ -84,7 +84,9 @@ def run_in_process(
         world: WorldSim = nodes[topics.WORLD_SIM]
         if bag:
             recorder: Recorder = nodes[topics.RECORDER]
-            recorder.attach_parameters({name: parameters.values(nodes[name]) for name in recorded_nodes})
+            recorder.attach_parameters(
+                {name: parameters.values(nodes[name]) for name in recorded_nodes}
+            )
         _spin(
             executor,
             lambda: not _missing(nodes),

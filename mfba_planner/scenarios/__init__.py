@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is to be run: scenario files and run configurations, checked when they are read."""
+"""Scenario files and run configurations, checked when they are read."""

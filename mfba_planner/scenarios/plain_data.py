@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scenario as plain data and as JSON, and back; what programs and bags hand over."""
+"""Scenario to plain data and JSON, and back: the form that nodes and bags use."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ LIMIT = 1e6  # no number in a scenario is larger
 
 
 def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain data that load_scenario accepts and turns into an equal one."""
+    """The scenario as plain data; load_scenario makes an equal one of it."""
     plain: dict[str, Any] = json.loads(json.dumps(asdict(scenario), default=lambda e: e.value))
-    # What a scenario does not use is left out: recordings compare scenarios as text.
+    # Unused keys are left out, as recordings compare scenarios as text.
     if scenario.robot == Robot():
         del plain["robot"]
     if not scenario.kidnappings:
@@ -39,23 +39,23 @@ def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
 
 
 def scenario_to_json(scenario: Scenario) -> str:
-    """One line of JSON that load_scenario accepts; the same scenario always gives the same."""
+    """One line of JSON for load_scenario; equal scenarios give equal text."""
     return json.dumps(scenario_to_dict(scenario), sort_keys=True)
 
 
-def robot_of(told: dict[str, Any]) -> Robot:
-    """The robot of a scenario: simulation.robot_model's options, nested or with dots.
+def parse_robot(options: dict[str, Any]) -> Robot:
+    """The robot from options of simulation.robot_model, nested or dotted.
 
-    Raises ConfigError for a bad one.
+    Raises ConfigError for an unknown option or a bad value.
     """
     try:
-        return override(Robot(), dict(_dotted(told)))
+        return override(Robot(), dict(_dotted(options)))
     except ConfigError as error:
         raise ConfigError(f"robot.{error}") from None
 
 
-def _dotted(told: dict[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in told.items():
+def _dotted(options: dict[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in options.items():
         if isinstance(value, dict):
             yield from _dotted(value, f"{prefix}{name}.")
         else:
@@ -63,14 +63,13 @@ def _dotted(told: dict[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
 
 
 class UnusualError(Exception):
-    """Not what scenario_to_dict writes: maybe wrong, maybe only written by hand."""
+    """Data that scenario_to_dict would not write: invalid, or written by hand."""
 
 
 def as_written(data: dict[str, Any]) -> Scenario:
-    """The scenario that scenario_to_dict wrote, without loading what explains mistakes.
+    """The scenario from data that scenario_to_dict wrote, without the slow import of yaml_schema.
 
-    Nodes and bags hand scenarios over in this form. Whatever looks unusual raises UnusualError
-    and is left to `scenario_model`, which accepts all that this accepts.
+    Raises UnusualError for any other data; yaml_schema.checked accepts all that this accepts.
     """
     name, description, walls = data.get("name"), data.get("description"), data.get("walls")
     if not isinstance(name, str) or not re.fullmatch(r"\w[\w .+-]{0,99}", name, re.ASCII):
@@ -90,7 +89,7 @@ def as_written(data: dict[str, Any]) -> Scenario:
         obstacles=tuple(_obstacle(entry) for entry in _list(data["obstacles"])),
         walls=None if walls is None else _walls(walls),
         time_limit_s=_positive(data["time_limit_s"]),
-        robot=robot_of(robot),
+        robot=parse_robot(robot),
         kidnappings=tuple(_kidnapping(entry) for entry in _list(data.get("kidnappings", []))),
         robots=tuple(_member(entry) for entry in _list(data.get("robots", []))),
     )

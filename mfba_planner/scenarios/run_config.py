@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One run, whatever drives it: what each node is told, and what explains it afterwards."""
+"""RunConfig, the configuration of one run; parameters of each node, recorded run facts."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from .plain_data import scenario_to_json
 
 Parameters = dict[str, dict[str, Any]]
 
-READY_TIMEOUT_S = 30.0  # until nodes have found each other, on a busy machine too
+READY_TIMEOUT_S = 30.0  # for node discovery, on a busy machine too
 NODES = ("world_sim", "virtual_sensor", "planner")
-OF_ROBOT = NODES[1:]  # of a fleet, each robot has its own
+OF_ROBOT = NODES[1:]  # nodes that each robot of a fleet has
 
 
 class Driver(Enum):
-    """Who turns the loop; the decisions are the same."""
+    """How the nodes are run; the decisions are the same."""
 
     CORE = "core"
     IN_PROCESS = "in-process"
@@ -40,20 +40,20 @@ class Driver(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunConfig:
-    """Everything that decides how a run goes."""
+    """All that determines a run."""
 
     scenario: Scenario
     planner: PlannerParams = field(default_factory=PlannerParams)
     sensor: SensorParams = field(default_factory=SensorParams)
     seed: int = option(0, "seed of all randomness", minimum=0, maximum=2**63 - 1)
-    driver: Driver = option(Driver.MULTI_PROCESS, "who turns the loop")
+    driver: Driver = option(Driver.MULTI_PROCESS, "how the nodes are run")
     real_time: bool = option(False, "tick on a wall timer; false: lockstep")
     speed_factor: float = option(
         1.0, "simulated seconds per wall second in real time", minimum=0.01, maximum=1000.0
     )
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range, or a planner that would stop every tick."""
+        """Raise ConfigError for a value out of range, or an input timeout shorter than a tick."""
         check(self)
         if self.planner.tracks_scan and not self.scenario.robot.lidar.beams:
             raise ConfigError(
@@ -64,12 +64,12 @@ class RunConfig:
         if self.real_time and timeout_s <= tick_s:
             raise ConfigError(
                 f"planner.input_timeout_s={timeout_s:g}: a tick takes {tick_s:g} s, so in real "
-                "time the robot would stop before each; give more, or a shorter step_length_m"
+                "time the robot would stop before each tick; give more, or a shorter step_length_m"
             )
 
 
 def run_facts(config: RunConfig) -> dict[str, Scalar]:
-    """What explains a run besides parameters: driver, mode of time, versions."""
+    """Facts recorded with a run besides parameters: driver, real time or lockstep, versions."""
     return {
         "driver": config.driver.value,
         "real_time": config.real_time,
@@ -80,14 +80,14 @@ def run_facts(config: RunConfig) -> dict[str, Scalar]:
 
 
 def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
-    """What each node is told: {node: {parameter: value}}.
+    """Parameters of each node: {node: {parameter: value}}.
 
-    peers names all nodes that must be matched before the first tick.
+    peers names the nodes that must be discovered before the first tick.
     """
     lockstep = not config.real_time
-    # What lasts a second must last longer in slow motion; never less than on a real robot.
+    # In slow motion timeouts are longer; never shorter than on a real robot.
     timeout_s = min(config.planner.input_timeout_s / min(config.speed_factor, 1.0), 3600.0)
-    # In lockstep nobody watches, and markers cost more than the decisions.
+    # Lockstep is rarely watched, and markers cost more than the decisions.
     common = {"lockstep": lockstep, "wait_for": ",".join(peers)}
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
     robot = config.scenario.robot
@@ -118,24 +118,24 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
 
 
 def graph_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
-    """node_parameters(); of a scenario that names robots NAME/planner, NAME/virtual_sensor."""
+    """node_parameters(); for a fleet also NAME/planner and NAME/virtual_sensor of each robot."""
     scenario = config.scenario
     if not scenario.robots:
         return node_parameters(config, peers)
-    wholes = {"world_sim": node_parameters(config, peers)["world_sim"]}
+    parameters = {"world_sim": node_parameters(config, peers)["world_sim"]}
     starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
     worlds = scenarios_with_others(scenario, starts, config.planner.tick_ns)
     for number, (member, world) in enumerate(zip(scenario.robots, worlds)):
-        one = replace(config, scenario=world, seed=robot_seed(config.seed, number))
-        told = node_parameters(one, peers)
-        wholes |= {f"{member.name}/{name}": told[name] for name in OF_ROBOT}
-    return wholes
+        robot_config = replace(config, scenario=world, seed=robot_seed(config.seed, number))
+        own = node_parameters(robot_config, peers)
+        parameters |= {f"{member.name}/{name}": own[name] for name in OF_ROBOT}
+    return parameters
 
 
 def recorder_parameters(
     config: RunConfig, output: str, nodes: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """What the recorder is told; nodes are those it asks for their parameters."""
+    """Parameters of the recorder; it records the parameters of the nodes named."""
     return {
         "output": output,
         "nodes": ",".join(nodes),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenarios by name, from a file or a text, checked at the door; and back to plain data."""
+"""Load scenarios: by name, from a YAML or JSON file, or from a text; checked on loading."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .plain_data import EXAMPLE, UnusualError, as_written
 def load_scenario(source: str) -> Scenario:
     """Load a scenario by the name of a shipped one, by file, or from YAML/JSON text ('{...').
 
-    Raises ConfigError in one line for whatever cannot be a scenario.
+    Raises ConfigError, in one line, for anything that is no scenario.
     """
     if source.lstrip().startswith("{"):
         return parse_scenario(source, "inline scenario")
@@ -38,7 +38,7 @@ def load_scenario(source: str) -> Scenario:
 def _read(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a path with a NUL
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a path with a NUL byte
         reason = getattr(error, "strerror", None) or "not a text file"
         raise ConfigError(f"{path}: {reason}; give a readable scenario .yaml") from None
 
@@ -64,7 +64,7 @@ def parse_scenario(text: str, origin: str) -> Scenario:
 
 
 def _plain(text: str, origin: str) -> Any:
-    """What the text holds; JSON first, since YAML reads some of JSON's escapes differently."""
+    """The parsed text; JSON first, since YAML reads some JSON escapes differently."""
     with suppress(ValueError, RecursionError):
         return json.loads(text)
     from .yaml_schema import from_yaml

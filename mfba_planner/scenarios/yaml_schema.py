@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenarios as people write them: YAML, degrees or radians, defaults, every fault explained.
+"""Schema of scenario files written by hand: YAML, degrees or radians, defaults, error messages.
 
-Apart from `scenarios`, because what it takes to explain a fault takes 0.15 s to import, and what
-programs write has none.
+A module of its own, because pydantic and yaml take 0.15 s to import and files written by programs
+do not need them.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from ..core.errors import ConfigError
 from ..core.options import did_you_mean
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.scenario import Kidnapping, Member, Scenario
-from .plain_data import EXAMPLE, LIMIT, robot_of
+from .plain_data import EXAMPLE, LIMIT, parse_robot
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
 _Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=LIMIT)]
 _NotNegative = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=0.0, le=LIMIT)]
 _Point = tuple[_Number, _Number]
-# Names end up in messages and in file names.
+# Names appear in messages and file names.
 _Name = Annotated[str, Field(max_length=100, pattern=r"^\w[\w .+-]*$")]
 
 
 def _default(kind: type, name: str) -> Any:
-    """The core's default; it is written down there and only there."""
+    """The default of a dataclass field, so that it is defined only once."""
     return kind.__dataclass_fields__[name].default  # type: ignore[attr-defined]
 
 
@@ -39,7 +39,7 @@ class _Strict(BaseModel):
 
 class _Heading(_Strict):
     heading_deg: _Number | None = None
-    heading_rad: _Number | None = None  # what programs write: degrees would lose the last bit
+    heading_rad: _Number | None = None  # written by programs: degrees would lose the last bit
 
     def heading(self) -> float:
         if self.heading_deg is not None and self.heading_rad is not None:
@@ -122,48 +122,48 @@ class _Scenario(_Strict):
             obstacles=tuple(obstacle.build() for obstacle in self.obstacles),
             walls=Walls(lower_m=walls.lower_m, upper_m=walls.upper_m) if walls else None,
             time_limit_s=self.time_limit_s,
-            robot=robot_of(self.robot),
+            robot=parse_robot(self.robot),
             kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
             robots=tuple(member.build() for member in self.robots),
         )
 
 
 _MEANINGS = {
-    "name": "letters, digits, spaces and _ . + -; what pictures and bags call it",
-    "description": "what it is about, in a sentence",
-    "start_m": "where the robot begins, m",
-    "goal_m": "where it shall go, m",
+    "name": "name in figures and bags: letters, digits, spaces and _ . + -",
+    "description": "purpose, in a sentence",
+    "start_m": "start of the robot, m",
+    "goal_m": "goal of the robot, m",
     "robot_radius_m": "added to every obstacle (Fig. 4), m",
-    "obstacles": "circles that stand or move",
-    "walls": "a rectangle that obstacles bounce from; the robot may cross it",
-    "time_limit_s": "simulated time after which the run has failed, s",
-    "center_m": "its centre at the beginning, m",
-    "radius_m": "its own radius, m",
-    "speed_mps": "how fast it moves, m/s",
-    "heading_deg": "where it moves, degrees from +x, counter-clockwise",
-    "heading_rad": "the same in radians, instead",
-    "robots": "several robots in one world; start_m and goal_m above are left out then",
-    "turns": "moments from which on it moves otherwise, in order of time",
-    "at_s": "when, in simulated time from the beginning, s",
-    "robot": "its base, lidar and noise, where they are not those of the paper",
-    "kidnappings": "moments at which the robot is carried elsewhere, in order of time",
-    "to_m": "where it is put, m",
-    "lower_m": "its corner with the smaller x and y, m",
-    "upper_m": "its corner with the larger x and y, m",
+    "obstacles": "circles at rest or moving",
+    "walls": "a rectangle that reflects obstacles; the robot may cross it",
+    "time_limit_s": "simulated time after which the run fails, s",
+    "center_m": "centre at t = 0, m",
+    "radius_m": "radius, m",
+    "speed_mps": "speed, m/s",
+    "heading_deg": "heading, degrees from +x, counter-clockwise",
+    "heading_rad": "heading in radians, instead",
+    "robots": "several robots in one world; leave out start_m and goal_m above",
+    "turns": "changes of speed and heading, sorted by time",
+    "at_s": "simulated time since the start, s",
+    "robot": "base, lidar and noise, where they differ from the paper",
+    "kidnappings": "times at which the robot is moved elsewhere, sorted by time",
+    "to_m": "position it is moved to, m",
+    "lower_m": "corner with the smaller x and y, m",
+    "upper_m": "corner with the larger x and y, m",
 }
 
 
 def schema() -> dict[str, Any]:
-    """The JSON schema of a scenario file, each key with what it means."""
+    """The JSON schema of a scenario file, with a description of each key."""
     found = _Scenario.model_json_schema()
-    for part in (found, *found["$defs"].values()):
-        for key, entry in part["properties"].items():
+    for model in (found, *found["$defs"].values()):
+        for key, entry in model["properties"].items():
             entry["description"] = _MEANINGS[key]
     return found
 
 
 def checked(data: dict[Any, Any]) -> Scenario:
-    """The scenario plain data describes. Raises ConfigError: place, value, reason, remedy."""
+    """The scenario from plain data. Raises ConfigError: key, value, reason, remedy."""
     try:
         return _Scenario.model_validate(_with_ends(data)).build()
     except ValidationError as error:
@@ -171,7 +171,7 @@ def checked(data: dict[Any, Any]) -> Scenario:
 
 
 def _with_ends(data: dict[Any, Any]) -> dict[Any, Any]:
-    """A fleet's start and goal, where not given, are its first robot's."""
+    """Fill in start and goal of a fleet from its first robot."""
     robots = data.get("robots")
     if not (isinstance(robots, list) and robots and isinstance(robots[0], dict)):
         return data
@@ -180,10 +180,10 @@ def _with_ends(data: dict[Any, Any]) -> dict[Any, Any]:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML as people expect it: 1e-3 is a number, and a key given twice is a mistake."""
+    """YAML with two fixes: 1e-3 is a number, and a key given twice is an error."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
-        """Refuse what SafeLoader would settle in silence: the last of two equal keys."""
+        """Refuse duplicate keys; SafeLoader would keep the last one silently."""
         keys = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode):
@@ -202,7 +202,7 @@ _Loader.add_implicit_resolver(
 
 
 def from_yaml(text: str, origin: str) -> Any:
-    """What a YAML text holds. Raises ConfigError naming origin, line and reason."""
+    """The parsed YAML text. Raises ConfigError naming origin, line and reason."""
     try:
         return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
@@ -211,7 +211,7 @@ def from_yaml(text: str, origin: str) -> Any:
         problem = getattr(error, "problem", None) or "unreadable characters"
         raise ConfigError(f"{origin}{where}: not YAML ({problem}); {EXAMPLE}") from None
     except (ValueError, LookupError, AttributeError, RecursionError):
-        # what PyYAML raises for an impossible date, a misused tag, a bottomless nesting
+        # raised by PyYAML for an invalid date, a misused tag, too deep nesting
         raise ConfigError(f"{origin}: not YAML (unreadable value); {EXAMPLE}") from None
 
 
@@ -231,24 +231,24 @@ _REMEDIES = {
 
 
 def _explain(error: ValidationError) -> str:
-    """One fault in one line: place, value, reason, remedy.
+    """One fault in one line: key, value, reason, remedy.
 
-    An unknown key goes first: misspelt, it is why another one is missing.
+    An unknown key is reported first: misspelt, it is why another key is missing.
     """
     faults = error.errors(include_url=False)
     fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
     kind, location = fault["type"], fault["loc"]
     if kind == "invalid_key":
         return f"key {location[-1]}: not a word; remove it ({EXAMPLE})"
-    place = ".".join(str(part + 1 if isinstance(part, int) else part) for part in location)
+    path = ".".join(str(item + 1 if isinstance(item, int) else item) for item in location)
     if kind == "extra_forbidden":
-        return f"{place}: unknown key; {did_you_mean(str(location[-1]), _keys_at(location))}"
+        return f"{path}: unknown key; {did_you_mean(str(location[-1]), _keys_at(location))}"
     if kind == "missing":
-        return f"{place}: missing; {_REMEDIES[kind]}"
+        return f"{path}: missing; {_REMEDIES[kind]}"
     remedy = _REMEDIES.get(kind) or fault["msg"].replace("Input should be", "give a number")
     value = repr(fault["input"])
     shown = value if len(value) <= 60 else f"{value[:57]}..."
-    return f"{place}={shown}: refused; {remedy}"
+    return f"{path}={shown}: refused; {remedy}"
 
 
 def _keys_at(location: tuple[Any, ...]) -> list[str]:
@@ -259,5 +259,5 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
         "robots": _Member,
         "walls": _Walls,
     }
-    within = [models[part] for part in location[:-1] if part in models]
+    within = [models[item] for item in location[:-1] if item in models]
     return list((within or [_Scenario])[-1].model_fields)

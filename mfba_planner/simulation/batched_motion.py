@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All obstacles of a scenario at many moments at once: world.py's motion on arrays, same bits."""
+"""All obstacles of a scenario at many times at once: obstacle_motion.py on arrays, same bits."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
-class Steps:
-    """K steps past N obstacles.
+class StepClearances:
+    """K robot steps among N obstacles.
 
-    gap_m (K, N) is the smallest distance of robot and obstacle edges during a step, as
-    step_clearances gives it; contact_s (K, N) the time from its begin until contact if both
-    went on as during the step, 0 in contact, inf for never; distance_m (K + 1, N) is the
-    distance of the centres before each step and after the last.
+    gap_m (K, N): smallest distance between robot and obstacle edges during a step, as in
+    step_clearances. contact_s (K, N): time from the start of the step to contact if both keep
+    the velocity of that step; 0 in contact, inf for never. distance_m (K + 1, N): distance
+    between the centres before each step and after the last.
     """
 
     gap_m: Array
@@ -31,10 +31,10 @@ class Steps:
 
 
 class Motion:
-    """The obstacles of one scenario, ready to be asked for many moments."""
+    """The motion of all obstacles of one scenario, evaluated at many times."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Take the scenario's numbers apart, once: a row for each stretch between two turns."""
+        """Build the arrays once: a row for each stretch between two turns."""
         self._scenario = scenario
         obstacles, walls = scenario.obstacles, scenario.walls
         self.radius_m = np.array([scenario.enlarged_radius(o) for o in obstacles])
@@ -54,11 +54,11 @@ class Motion:
             self._box = low, np.array(walls.upper_m)[:, None, None] - radius
 
     def centers(self, times_s: Array) -> Array:
-        """Centres (2, K, N) in metres at times (K,), bit by bit as center_at gives them."""
+        """Centres (2, K, N) in metres at times (K,), bit for bit those of center_at."""
         return self._folded(self._unfolded(times_s, self._rows(times_s)))
 
-    def steps(self, times_s: Array, positions_m: Array) -> Steps:
-        """The robot at positions (2, K + 1) at times (K + 1,), uniform between them."""
+    def steps(self, times_s: Array, positions_m: Array) -> StepClearances:
+        """Steps of a robot at positions (2, K + 1) at times (K + 1,), uniform between them."""
         rows = self._rows(times_s)
         unfolded = self._unfolded(times_s, rows)
         centers = self._folded(unfolded)
@@ -75,19 +75,19 @@ class Motion:
             dx, dy = centers - positions_m[:, :, None]
             distance = np.sqrt(dx * dx + dy * dy)
             contact = self._contact(square, along, distance[:-1], np.diff(times_s)[:, None])
-        # A pose that is not finite was refused; it has no gap.
+        # A pose that is not finite was refused and has no gap.
         gap = np.where(np.isnan(nearest), np.inf, nearest) - self.radius_m
         for k, i in np.argwhere(self._may_kink(unfolded, rows, times_s)).tolist():
             (x0, x1), (y0, y1) = positions_m[:, k : k + 2].tolist()
             t0, t1 = times_s[k : k + 2].tolist()
             obstacle = self._scenario.obstacles[i]
             gap[k, i] = clearance(self._scenario, obstacle, t0, t1, (x0, y0), (x1, y1))
-        return Steps(gap, contact, distance)
+        return StepClearances(gap, contact, distance)
 
     def _rows(self, times_s: Array, side: Literal["left", "right"] = "right") -> Array:
-        """The stretch that each obstacle is in at each time, (K, N) or (1, N) row numbers.
+        """Row number of each obstacle's stretch at each time, (K, N) or (1, N).
 
-        A turn's own moment belongs to what follows, on the left side to what was before.
+        At the time of a turn it is the later stretch; with side="left", the earlier one.
         """
         if not self._turning:
             return self._first[None, :]
@@ -97,17 +97,17 @@ class Motion:
         return rows
 
     def _unfolded(self, times_s: Array, rows: Array) -> Array:
-        """Where they would be without walls, (2, K, N)."""
+        """Centres as if there were no walls, (2, K, N)."""
         times = times_s[:, None] - self._since[rows]
         return self._center[:, rows] + self._velocity[:, rows] * times
 
     def _folded(self, x: Array) -> Array:
-        """Reflect unbounded coordinates (2, K, N) into the walls, as world.py does."""
+        """Reflect unbounded coordinates (2, K, N) into the walls, as obstacle_motion does."""
         if self._box is None:
             return x
         low, high = self._box
         length = high - low
-        with np.errstate(invalid="ignore"):  # a room without room: dealt with below
+        with np.errstate(invalid="ignore"):  # no room between the walls: handled below
             offset = np.fmod(x - low, 2.0 * length)
         offset = np.where(offset < 0.0, offset + 2.0 * length, offset)
         folded = np.minimum(high, low + np.where(offset <= length, offset, 2.0 * length - offset))
@@ -115,10 +115,10 @@ class Motion:
         return np.where((low <= x) & (x <= high), x, folded)
 
     def _may_kink(self, unfolded: Array, rows: Array, times_s: Array) -> Array:
-        """Who may meet a wall or turn between two successive times, (K, N)."""
+        """Which obstacles may meet a wall or turn between two successive times, (K, N)."""
         kinks = np.zeros((unfolded.shape[1] - 1, unfolded.shape[2]), dtype=bool)
         if len(rows) > 1:
-            # Without walls a turn at the end of a step is none within it.
+            # Without walls a turn at the end of a step is not within it.
             ends = rows if self._box is not None else self._rows(times_s, "left")
             kinks |= rows[:-1] != ends[1:]
         if self._box is not None:
@@ -130,7 +130,7 @@ class Motion:
         return kinks
 
     def _contact(self, square: Array, along: Array, distance: Array, duration_s: Array) -> Array:
-        """Seconds until |p + s q| is the enlarged radius: 0 inside, inf when it never is."""
+        """Seconds until |p + s q| is the enlarged radius; 0 inside, inf for never."""
         excess = distance * distance - self.radius_m * self.radius_m
         root = along * along - square * excess
         s = (-along - np.sqrt(root)) / square

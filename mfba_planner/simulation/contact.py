@@ -16,8 +16,8 @@ def step_clearances(
 ) -> list[float]:
     """Smallest gap (m) to each obstacle while the robot moves uniformly from start to end.
 
-    Continuous in time, not only at the ends, and exact through bounces and turns: between two
-    of them both motions are uniform. Negative means contact.
+    Continuous in time, and exact through bounces and turns: between two of them both motions
+    are uniform. Negative means contact.
     """
     return [
         clearance(scenario, obstacle, t0_s, t1_s, start, end) for obstacle in scenario.obstacles

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 r"""The decision digest: SHA-256 over one canonical form of the decisions of an episode.
 
-Equal digests mean equal decisions, bit for bit, whatever drove the run. The form, version 1,
-is the ASCII line "mfba decisions 1\n" and then, tick by tick, little-endian and unpadded:
+Equal digests mean equal decisions, bit for bit, whichever driver made the run. The form,
+version 1, is the ASCII line "mfba decisions 1\n" and then, per tick, little-endian and unpadded:
 
     u64 tick (0, 1, ...), i64 stamp_ns, f64 x, y, yaw of the pose,
     u8 1 and f64 x, y of the goal (u8 0 without a goal),
@@ -10,7 +10,7 @@ is the ASCII line "mfba decisions 1\n" and then, tick by tick, little-endian and
     i32 gap, text mode, text reason, f64 x, y of the waypoint, f64 x, y of the velocity.
 
 A text is u32 bytes and UTF-8. An f64 is its IEEE-754 bytes, zeros with their sign; every NaN
-is the quiet one without payload. Raw CDR is not used: its padding is uninitialised memory.
+is the quiet NaN without payload. Raw CDR is not used: its padding is uninitialised memory.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _NAN = struct.pack("<d", math.nan)
 
 
 class Digest:
-    """The digest of decisions that come one by one."""
+    """The digest of a sequence of decisions, added one by one."""
 
     def __init__(self) -> None:
         """Start before tick 0."""
@@ -38,7 +38,7 @@ class Digest:
         self._tick = 0
 
     def add(self, decision: Decision) -> None:
-        """Take the next tick."""
+        """Add the decision of the next tick."""
         self._hashed.update(canonical(self._tick, decision))
         self._tick += 1
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one currency: a run as scenario, parameters, seed and ticks; and the core driver."""
+"""Episode, the record of a run: scenario, parameters, seed, one decision per tick, outcome."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Episode:
-    """A run, whatever drove it: one Decision per tick, the first at tick 0."""
+    """A run under any driver: one Decision per tick, the first at tick 0."""
 
     scenario: Scenario
     sensor: SensorParams = field(default_factory=SensorParams)
@@ -32,16 +32,16 @@ class Episode:
     driver: str
     ticks: tuple[Decision, ...]
     outcome: Outcome
-    truth: tuple[Pose2D, ...] = ()  # where the robot was at each tick; (): where it saw itself
-    planner_name: str = ""  # who decided, where that is not what planner's own options name
+    truth: tuple[Pose2D, ...] = ()  # true pose at each tick; (): those of the decisions
+    planner_name: str = ""  # the planner, where `planner` (its parameters) does not name it
 
     @property
     def label(self) -> str:
-        """Who decided, for people."""
+        """Name of the planner, for display."""
         return self.planner_name or self.planner.label
 
     def time_s(self, stamp_ns: int) -> float:
-        """Time since the first tick in seconds, the t of the obstacles' motion."""
+        """Time since the first tick in seconds: t of the obstacles' motion."""
         return (stamp_ns - self.planner.tick_ns) * NANO
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several robots in one world: each sees the others as circles that move; an Episode of each."""
+"""Fleet: several robots in one world, each a moving circle to the others."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import supervised_algorithm_1
 from .differential_drive import command
 from .episode import Episode, Outcome
-from .nearby_obstacles import Found
+from .nearby_obstacles import Nearby
 from .obstacle_motion import Obstacle, Turn
 from .planner_observations import Observe, observe_sectors
 from .scenario import Scenario
 from .world import World
 
 FLEET_STREAM = 6  # spawn key of the robots' SeedSequence children; one number per purpose
-DRIFT_M = 1e-12  # by which a way of straight stretches may miss a pose
+DRIFT_M = 1e-12  # by which a path of straight stretches may miss a pose
 
 MakePlanner = Callable[[int], PathPlanner]  # from a robot's seed
 
 
 def robot_seed(seed: int, number: int) -> int:
-    """The seed of a fleet's robot (from 0) for its planner and its instruments."""
+    """Seed of one robot of a fleet (number from 0), for its planner and its sensors."""
     child = np.random.SeedSequence(seed, spawn_key=(FLEET_STREAM, number))
     return int(child.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
-def alone(scenario: Scenario, number: int) -> Scenario:
-    """The scenario of one robot (from 0) of a fleet, without the others."""
+def single_robot_scenario(scenario: Scenario, number: int) -> Scenario:
+    """The scenario of one robot of a fleet (number from 0), without the other robots."""
     member = scenario.robots[number]
     return replace(
         scenario,
@@ -48,12 +48,14 @@ def alone(scenario: Scenario, number: int) -> Scenario:
 
 
 class RobotWorld(World):
-    """The world as one robot of a fleet has it: the scenario's obstacles, then the others."""
+    """The world of one robot of a fleet: the scenario's obstacles, then the other robots."""
 
     def __init__(self, fleet: Fleet, number: int, tolerance_m: float) -> None:
         """Put the robot at its start, at tick 0."""
         seed = robot_seed(fleet.seed, number)
-        super().__init__(alone(fleet.scenario, number), fleet.tick_ns, tolerance_m, seed)
+        super().__init__(
+            single_robot_scenario(fleet.scenario, number), fleet.tick_ns, tolerance_m, seed
+        )
         self.name = fleet.scenario.robots[number].name
         self.poses = [self.pose]  # one per tick of the fleet
         self.seed = seed
@@ -62,14 +64,14 @@ class RobotWorld(World):
 
     @property
     def others(self) -> list[RobotWorld]:
-        """The other robots' places, in the scenario's order."""
+        """The worlds of the other robots, in scenario order."""
         return [p for p in self._fleet.robot_worlds if p is not self]
 
-    def near(self, reach_m: float, position: Point | None = None) -> Found:
-        """As World.near(); all other robots are in it."""
+    def near(self, reach_m: float, position: Point | None = None) -> Nearby:
+        """As World.near(); includes all other robots."""
         names, circles = super().near(reach_m, position)
-        wide = 2.0 * self.scenario.robot_radius_m
-        others = [(place.pose.position, wide) for place in self.others]
+        enlarged_m = 2.0 * self.scenario.robot_radius_m
+        others = [(robot_world.pose.position, enlarged_m) for robot_world in self.others]
         return [*names, *range(self._own, self._own + len(others))], [*circles, *others]
 
     def radius_m(self, index: int) -> float:
@@ -79,82 +81,84 @@ class RobotWorld(World):
         return self.scenario.robot_radius_m
 
     def velocity(self, index: int) -> Point:
-        """As World.velocity(); a robot's is that of its last tick: the next is not decided yet."""
+        """As World.velocity(); a robot's is that of its last tick, as the next is not decided."""
         if index < self._own:
             return super().velocity(index)
-        return self.others[index - self._own].moved
+        return self.others[index - self._own].last_velocity
 
     @property
-    def moved(self) -> Point:
+    def last_velocity(self) -> Point:
         """Mean velocity (m/s) during the last tick."""
         (x0, y0, _), (x1, y1, _) = self.poses[-2:] if len(self.poses) > 1 else self.poses * 2
         dt = self.tick_ns * NANO
         return ((x1 - x0) / dt, (y1 - y0) / dt)
 
     def centers(self) -> list[Point]:
-        """The scenario's obstacles, then the other robots, in near()'s order."""
-        return [*super().centers(), *(place.pose.position for place in self.others)]
+        """Centres of the scenario's obstacles, then of the other robots, as near() counts them."""
+        return [*super().centers(), *(robot_world.pose.position for robot_world in self.others)]
 
 
 class Fleet:
-    """All robots of a scenario, one tick for all; who has ended stands where it is."""
+    """All robots of a scenario at one tick; a robot whose run has ended stands still."""
 
     def __init__(
         self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float, seed: int = 0
     ) -> None:
-        """Put every robot at its start. ConfigError for a scenario that names no robots."""
+        """Put every robot at its start. Raises ConfigError for a scenario without robots."""
         if not scenario.robots:
             raise ConfigError(f"scenario {scenario.name!r}: names no robots; add robots to it")
         self.scenario, self.tick_ns, self.seed = scenario, tick_ns, seed
         self.tick = 0
         count = len(scenario.robots)
         self.robot_worlds = [RobotWorld(self, number, goal_tolerance_m) for number in range(count)]
-        self.outcomes: list[Outcome | None] = [place.outcome() for place in self.robot_worlds]
+        self.outcomes: list[Outcome | None] = [
+            robot_world.outcome() for robot_world in self.robot_worlds
+        ]
 
     @property
     def running(self) -> list[int]:
-        """Who has not ended yet, as numbers from 0."""
+        """Numbers (from 0) of the robots whose run has not ended."""
         return [number for number, outcome in enumerate(self.outcomes) if outcome is None]
 
     @property
     def distance_to_goal_m(self) -> float:
-        """How far the farthest robot is from its goal."""
-        return max(place.distance_to_goal_m for place in self.robot_worlds)
+        """Largest distance of a robot to its goal."""
+        return max(robot_world.distance_to_goal_m for robot_world in self.robot_worlds)
 
-    def step(self, told: dict[int, Point]) -> None:
-        """Move everybody who is under way and time on by one tick; told as for World.step()."""
-        going = self.running
-        for number, place in enumerate(self.robot_worlds):
-            if number in going:
-                place.step(told[number])
+    def step(self, commands: dict[int, Point]) -> None:
+        """Advance by one tick: move each running robot by its command, as World.step()."""
+        running = self.running
+        for number, robot_world in enumerate(self.robot_worlds):
+            if number in running:
+                robot_world.step(commands[number])
             else:
-                place.tick += 1  # the obstacles around it go on
-            place.poses.append(place.pose)
+                robot_world.tick += 1  # its obstacles keep moving
+            robot_world.poses.append(robot_world.pose)
         self.tick += 1
-        for number in going:
+        for number in running:
             self.outcomes[number] = self.robot_worlds[number].outcome()
 
 
 def scenarios_with_others(
     scenario: Scenario, poses: Sequence[Sequence[Pose2D]], tick_ns: int
 ) -> list[Scenario]:
-    """The scenario of each robot with all others as obstacles that went as they did.
+    """The scenario of each robot, with the other robots as obstacles that move along their poses.
 
-    poses holds those of each robot, one per tick until it ended.
+    poses holds the poses of each robot, one per tick until its run ended.
     """
-    ways = [way(went, tick_ns, scenario.robot_radius_m) for went in poses]
+    paths = [path_as_obstacle(path, tick_ns, scenario.robot_radius_m) for path in poses]
     found = []
-    for number in range(len(ways)):
-        own, others = alone(scenario, number), ways[:number] + ways[number + 1 :]
+    for number in range(len(paths)):
+        own, others = single_robot_scenario(scenario, number), paths[:number] + paths[number + 1 :]
         found.append(replace(own, obstacles=(*own.obstacles, *others)))
     return found
 
 
-def way(poses: Sequence[Pose2D], tick_ns: int, radius_m: float) -> Obstacle:
-    """A robot that was at these poses, one per tick, as an obstacle that moves and turns.
+def path_as_obstacle(poses: Sequence[Pose2D], tick_ns: int, radius_m: float) -> Obstacle:
+    """A robot's path (one pose per tick) as an obstacle that moves and turns.
 
-    Between two ticks it is uniform, as for all metrics; ticks that lie on one straight way at
-    one speed are one stretch.
+    Motion is uniform between two ticks, as for all metrics; ticks on one straight line at one
+    speed are one stretch.
     """
     dt = tick_ns * NANO
     stretches: list[tuple[int, float, float]] = []  # first tick, speed, heading
@@ -173,7 +177,7 @@ def way(poses: Sequence[Pose2D], tick_ns: int, radius_m: float) -> Obstacle:
         stretches.append((tick, speed, heading))
     (_, speed, heading), *turns = stretches or [(0, 0.0, 0.0)]
     if len(poses) > 1 and stretches[-1][1] > 0.0:
-        turns.append((len(poses) - 1, 0.0, 0.0))  # what came later nobody knows
+        turns.append((len(poses) - 1, 0.0, 0.0))  # its later motion is unknown
     return Obstacle(
         center_m=poses[0].position,
         radius_m=radius_m,
@@ -196,15 +200,15 @@ def run_fleet(
     path_planner: MakePlanner | None = None,
     observe: Observe = observe_sectors,
 ) -> tuple[Episode, ...]:
-    """run_episode.run for every robot of a scenario at once: an Episode each, in its order.
+    """run_episode.run for all robots of a scenario at once: an Episode each, in scenario order.
 
-    brain makes the planner of a robot from its seed. The obstacles of an episode's scenario are
-    the scenario's own, then the other robots as they went.
+    path_planner makes the planner of a robot from its seed. The obstacles of an episode's
+    scenario are the original ones, then the other robots along their paths.
     """
     planner, sensor = planner or PlannerParams(), sensor or SensorParams()
     make = path_planner or (lambda seed: supervised_algorithm_1(planner, seed))
     fleet = Fleet(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
-    path_planners = [make(place.seed) for place in fleet.robot_worlds]
+    path_planners = [make(robot_world.seed) for robot_world in fleet.robot_worlds]
     ticks: list[list[Decision]] = [[] for _ in path_planners]
 
     def decide(numbers: Sequence[int]) -> dict[int, Point]:
@@ -214,10 +218,10 @@ def run_fleet(
             )
         return {n: command(ticks[n][-1], scenario.robot, planner.tick_ns) for n in numbers}
 
-    told = decide(range(len(path_planners)))
-    while (going := fleet.running) and go_on(fleet):
-        fleet.step(told)
-        told = decide(going)
+    commands = decide(range(len(path_planners)))
+    while (running := fleet.running) and go_on(fleet):
+        fleet.step(commands)
+        commands = decide(running)
     return episodes(fleet, ticks, planner, sensor, "core")
 
 
@@ -228,21 +232,21 @@ def episodes(
     sensor: SensorParams,
     driver: str,
 ) -> tuple[Episode, ...]:
-    """What came of a fleet: an Episode of each robot."""
+    """The Episode of each robot of a fleet."""
     errs = fleet.scenario.robot.noise.of_odometry
     worlds = scenarios_with_others(
-        fleet.scenario, [place.poses for place in fleet.robot_worlds], fleet.tick_ns
+        fleet.scenario, [robot_world.poses for robot_world in fleet.robot_worlds], fleet.tick_ns
     )
     return tuple(
         Episode(
             scenario=worlds[number],
             sensor=sensor,
             planner=planner,
-            seed=place.seed,
+            seed=robot_world.seed,
             driver=driver,
             ticks=tuple(ticks[number]),
             outcome=fleet.outcomes[number] or Outcome.INTERRUPTED,
-            truth=tuple(place.poses[: len(ticks[number])]) if errs else (),
+            truth=tuple(robot_world.poses[: len(ticks[number])]) if errs else (),
         )
-        for number, place in enumerate(fleet.robot_worlds)
+        for number, robot_world in enumerate(fleet.robot_worlds)
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who may be near the robot at a tick: worked out for many ticks, and all that it may roam."""
+"""Which obstacles may be near the robot: preselected for many ticks ahead, for speed."""
 
 from __future__ import annotations
 
@@ -11,35 +11,35 @@ from ..core.geometry import Point, distance
 from ..core.types import NANO
 from .batched_motion import Array, Motion
 
-AHEAD_TICKS = 64  # whose centres are worked out at once; the paper's trip of 17 m is 57
-PICKED_TICKS = 24  # of these, for which the near ones are picked at once
-FEW = 16  # obstacles: so few are all taken for near, which costs less than to find out
-ROAM_M = 2.0  # how far the robot may at least go before they are picked again
+AHEAD_TICKS = 64  # whose centres are computed at once; the paper's trip of 17 m has 57
+PICKED_TICKS = 24  # of these, for which near obstacles are preselected at once
+FEW = 16  # obstacles: up to so many all count as near, which is cheaper than a test
+ROAM_M = 2.0  # least distance the robot may move before they are selected again
 
-Found = tuple[list[int], list[tuple[Point, float]]]
+Nearby = tuple[list[int], list[tuple[Point, float]]]
 
 
 class NearbyObstacles:
-    """The obstacles of one scenario, of which most are far away most of the time."""
+    """Preselects the obstacles near the robot, as most are far away most of the time."""
 
     def __init__(self, motion: Motion, tick_ns: int) -> None:
-        """Start without any; tick k is at time k tick_ns."""
+        """Start without a selection; tick k is at time k tick_ns."""
         self._motion, self._tick_ns = motion, tick_ns
         self._centers = np.zeros((2, 0, 0))
         self._centers_from = 0
         self._which: list[int] = []
         self._radii: list[float] = []
-        self._xs: list[list[float]] = []  # of them, a row per tick
+        self._xs: list[list[float]] = []  # of the selected, a row per tick
         self._ys: list[list[float]] = []
         self._picked_from = 0
         self._picked_at: Point = (math.nan, math.nan)
         self._reach_m, self._roam_m = math.nan, ROAM_M
 
-    def at(self, tick: int, position: Point, reach_m: float) -> Found:
-        """Indices, and (centre, enlarged radius), of all whose edge is within reach, in order.
+    def at(self, tick: int, position: Point, reach_m: float) -> Nearby:
+        """Indices, and (centre, enlarged radius), of all obstacles whose edge is within reach.
 
-        There may be others among them; none is missing. A position that is not finite is near
-        to all.
+        Ascending indices. May hold others too; none is missing. A position that is not finite
+        counts as near to all.
         """
         k = tick - self._picked_from
         dx, dy = position[0] - self._picked_at[0], position[1] - self._picked_at[1]
@@ -68,8 +68,8 @@ class NearbyObstacles:
         self._picked_from, self._picked_at, self._reach_m = tick, position, reach_m
 
     def _near(self, centers: Array, tick: int, position: Point, reach_m: float) -> Array:
-        """Indices of those near to wherever the robot may roam, while their centres are these."""
-        # As far as it went last time, so that those with long steps are not picked all the time.
+        """Indices of the obstacles in reach of any point the robot may roam to meanwhile."""
+        # As far as it moved last time: a fast robot would need a new selection at every tick.
         per_tick = distance(self._picked_at, position) / max(1, abs(tick - self._picked_from))
         roam_m = 1.1 * PICKED_TICKS * per_tick
         self._roam_m = roam_m if ROAM_M < roam_m < math.inf else ROAM_M

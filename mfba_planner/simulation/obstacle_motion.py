@@ -26,7 +26,7 @@ class Turn:
 class Obstacle:
     """A row of Table 4 or 6: centre at t = 0 (m), radius (m), speed (m/s), heading (rad).
 
-    turns change speed and heading on the way, in order of time; the paper has none.
+    turns change speed and heading, sorted by time; the paper has none.
     """
 
     center_m: Point
@@ -36,7 +36,7 @@ class Obstacle:
     turns: tuple[Turn, ...] = ()
 
     def __hash__(self) -> int:
-        """Quick however many turns there are: motions are looked up by obstacle all the time."""
+        """Hash without the turns, for speed: stretches_of caches by obstacle."""
         return hash((self.center_m, self.radius_m, self.speed_mps, self.heading_rad))
 
     @property
@@ -46,7 +46,7 @@ class Obstacle:
 
     @property
     def velocity(self) -> Point:
-        """(vx, vy) in m/s until a wall is met or the first turn is due."""
+        """(vx, vy) in m/s until the first wall or turn."""
         return (
             self.speed_mps * math.cos(self.heading_rad),
             self.speed_mps * math.sin(self.heading_rad),
@@ -71,7 +71,7 @@ class Walls:
 
 @lru_cache(maxsize=4096)
 def stretches_of(obstacle: Obstacle, walls: Walls | None) -> tuple[tuple[float, Obstacle], ...]:
-    """The motion cut at its turns: since when (s), and an obstacle that starts there then."""
+    """The motion cut at its turns: start time (s), and an obstacle that starts then and there."""
     at_s, now = 0.0, replace(obstacle, turns=())
     stretches = [(at_s, now)]
     for turn in obstacle.turns:
@@ -87,13 +87,13 @@ def stretches_of(obstacle: Obstacle, walls: Walls | None) -> tuple[tuple[float, 
 
 
 def _stretch(obstacle: Obstacle, t_s: float, walls: Walls | None) -> tuple[float, Obstacle]:
-    """The stretch under way at time t; a turn's own moment belongs to what follows."""
+    """The stretch at time t; at the time of a turn, the later one."""
     number = bisect_right(obstacle.turns, t_s, key=attrgetter("at_s"))
     return stretches_of(obstacle, walls)[number]
 
 
 def center_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
-    """Centre at time t in metres: straight, or folded back into the walls; no drift with t."""
+    """Centre at time t in metres, closed form: straight, or reflected by the walls."""
     if obstacle.turns:
         since_s, obstacle = _stretch(obstacle, t_s, walls)
         t_s -= since_s
@@ -124,7 +124,7 @@ def _fold(value: float, low: float, high: float) -> float:
 
 
 def velocity_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
-    """(vx, vy) at time t in m/s; at a wall or a turn, the one that follows."""
+    """(vx, vy) at time t in m/s; at a wall or a turn, the velocity after it."""
     if obstacle.turns:
         since_s, obstacle = _stretch(obstacle, t_s, walls)
         t_s -= since_s
@@ -139,7 +139,7 @@ def velocity_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> P
 
 
 def _folded_speed(position: float, speed: float, t_s: float, low: float, high: float) -> float:
-    """The slope of _fold: it changes its sign with every reflection."""
+    """The slope of _fold; every reflection changes its sign."""
     if not high > low:
         return 0.0
     reached = (position + speed * t_s - low) / (high - low)
@@ -170,14 +170,14 @@ def bounce_times(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | No
 
 def _kinks(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:
     stretches = stretches_of(obstacle, walls)
-    begins = [turn.at_s for turn in obstacle.turns]
-    first, last = bisect_right(begins, t0_s), bisect_left(begins, t1_s)
-    times = set(begins[first:last])
-    # before t = 0 the first stretch goes on backwards
+    turn_times = [turn.at_s for turn in obstacle.turns]
+    first, last = bisect_right(turn_times, t0_s), bisect_left(turn_times, t1_s)
+    times = set(turn_times[first:last])
+    # before t = 0 the first stretch is extended backwards
     for number in range(first, last + 1):
         since_s, plain = stretches[number]
         a = max(t0_s, since_s) if number else t0_s
-        b = min(t1_s, begins[number]) if number < len(begins) else t1_s
+        b = min(t1_s, turn_times[number]) if number < len(turn_times) else t1_s
         if a < b:
             bounces = bounce_times(plain, a - since_s, b - since_s, walls)
             times.update(t for t in (since_s + t for t in bounces) if t0_s < t < t1_s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a planner gets to see: circles with true velocities, or a scan of real surfaces."""
+"""Observations of the simulated world: sectors, circles with velocities, or a scan."""
 
 from __future__ import annotations
 
@@ -28,20 +28,18 @@ Sensed = tuple[tuple[Circle, ...] | None, Scan | None]
 
 
 class Perception:
-    """A look for simulation.run_episode.run, by name.
+    """Builds the Observations of simulation.run_episode.run, by name of the perception.
 
-    sectors: the bits' ranges alone. known: the circles whose enlarged edge is within SR, with
-    their true velocities of that moment. scan-12, scan-360: beams from the robot's centre along
-    the middles of equal sectors to the real circles, up to SR + robot radius: there a surface
-    is exactly where its enlarged edge is SR away, so both sense the same region. Walls stop
-    obstacles only; no beam sees them.
+    sectors: sector ranges only. known: the circles whose enlarged edge is within SR, with their
+    true velocities. scan-12, scan-360: beams from the robot's centre along the middles of equal
+    sectors to the real circles, up to SR + robot radius. A surface at that range has its
+    enlarged edge at SR, so all sense the same region. Beams do not detect walls.
 
-    noise_m is the standard deviation of ranges (of centres when known), drawn from a child of
-    the seed named by the stamp. With a latency circles and scan are that many ticks old (the
-    first ticks see tick 0's), and Observation.sensed tells stamp and pose they belong to; the
-    pose itself is the present one. The paper's sector ranges come with all of them, without
-    noise and latency where circles are known, from the scan where there is one; sectors=False
-    spares that cost for planners that do not read them.
+    noise_m is the standard deviation of ranges (of centres for known), drawn from a child of the
+    seed named by the stamp. With a latency, circles and scan are that many ticks old (the first
+    ticks get those of tick 0); Observation.sensed holds their stamp and pose, and the pose is the
+    present one. Sector ranges come with every perception: from the scan where there is one, else
+    without noise and latency. sectors=False saves their cost for planners that do not read them.
     """
 
     def __init__(
@@ -53,7 +51,7 @@ class Perception:
         seed: int = 0,
         sectors: bool = True,
     ) -> None:
-        """Start before tick 0; ConfigError for an unknown name or a number out of range."""
+        """Start before tick 0. Raises ConfigError for an unknown name or a number out of range."""
         if name not in NAMES:
             raise ConfigError(f"perception {name!r}: unknown; {did_you_mean(name, list(NAMES))}")
         if not (math.isfinite(noise_m) and noise_m >= 0.0):
@@ -70,7 +68,7 @@ class Perception:
         self._past: deque[tuple[int, Pose2D, Sensed]] = deque(maxlen=latency_ticks + 1)
 
     def __call__(self, world: World, sensor: SensorParams) -> Observation:
-        """Look at the world at its present tick; ticks that do not rise begin anew."""
+        """Observe the world at its present tick; a tick that is not later resets the latency."""
         now_ns = world.stamp_ns
         if self._past and now_ns <= self._past[-1][0]:
             self._past.clear()
@@ -143,36 +141,36 @@ class Perception:
 
 
 def sense(world: World, params: SensorParams) -> Ranges:
-    """What the ring of virtual sensors measures at the present tick, of circles or of a scan.
+    """Sector ranges of the virtual sensors at the present tick, from circles or a scan.
 
     Raises InputError for a scan that cannot be used.
     """
     return _sensed(world, world.read(), params)
 
 
-def _sensed(world: World, seen: Reading, params: SensorParams) -> Ranges:
-    if seen.scan is None:
-        position = seen.received.position
+def _sensed(world: World, reading: Reading, params: SensorParams) -> Ranges:
+    if reading.scan is None:
+        position = reading.received.position
         _, circles = world.near(params.sensing_range_m, position)
         return sense_circles(position, circles, params)
-    yaw = seen.received.yaw + world.scenario.robot.lidar.yaw_rad
-    return sense_scan(seen.scan, yaw, world.scenario.robot_radius_m, params)
+    yaw = reading.received.yaw + world.scenario.robot.lidar.yaw_rad
+    return sense_scan(reading.scan, yaw, world.scenario.robot_radius_m, params)
 
 
 def observe_sectors(world: World, sensor: SensorParams) -> Observation:
-    """What the paper's planner gets to know at the present tick: pose, sectors, goal."""
-    seen = world.read()
+    """Observation of the paper's planner at the present tick: pose, sectors, goal."""
+    reading = world.read()
     ranges: Ranges | Refused
     try:
-        ranges = _sensed(world, seen, sensor)
+        ranges = _sensed(world, reading, sensor)
     except InputError:
-        ranges = blind(1, math.nan)  # the sensor says so by sectors of NaN
-    pose = seen.received
+        ranges = blind(1, math.nan)  # NaN sectors: the sensor refused the scan
+    pose = reading.received
     return observe(world.stamp_ns, pose, ranges, world.scenario.goal_m, pose)
 
 
 def observe_scan(world: World, sensor: SensorParams) -> Observation:
-    """look(), and the scan itself, in a frame aligned with odom."""
+    """observe_sectors(), with the scan itself in a frame aligned with odom."""
     obs, scan = observe_sectors(world, sensor), world.read().scan
     if scan is None or obs.refused:
         return obs

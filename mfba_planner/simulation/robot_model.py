@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What kind of robot drives: its base and limits, its lidar, how much its sensors err."""
+"""The simulated robot: drive and its limits, lidar, sensor noise."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Drive(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Base:
-    """The robot's base; the limits are a differential one's, Nav2's defaults where it has any."""
+    """The robot's base; limits of a differential drive, Nav2's defaults where it has any."""
 
     drive: Drive = option(Drive.OMNIDIRECTIONAL, "omnidirectional (the paper), or differential")
     max_speed_mps: float = option(
@@ -48,13 +48,13 @@ class Base:
 
     @property
     def turns(self) -> bool:
-        """Whether it has a heading of its own."""
+        """Whether the base has to turn to drive elsewhere: a differential drive."""
         return self.drive is Drive.DIFFERENTIAL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lidar:
-    """A simulated lidar that sees all around, in a frame turned by yaw_rad against base_link."""
+    """A simulated 360 degree lidar, its frame turned by yaw_rad against base_link."""
 
     beams: int = option(
         0, "number of beams; 0: none, the sectors come from obstacles", minimum=0, maximum=1080
@@ -86,7 +86,7 @@ class Lidar:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """What is wrong with odometry and scan, all of it 0 unless asked for."""
+    """Noise, loss and latency of odometry and scan; 0 by default."""
 
     odom_m: float = option(
         0.0, "deviation of the position, per axis", unit="m", minimum=0.0, maximum=10.0
@@ -110,18 +110,18 @@ class Noise:
 
     @property
     def of_odometry(self) -> bool:
-        """Whether the robot may be elsewhere than its odometry says."""
+        """Whether odometry may differ from the true pose."""
         return any((self.odom_m, self.odom_rad, self.odom_loss, self.odom_latency_s))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot(Base):
-    """A base with its instruments."""
+    """A base with its sensors."""
 
     lidar: Lidar = field(default_factory=Lidar)
     noise: Noise = field(default_factory=Noise)
 
     @property
     def base(self) -> Base:
-        """The base alone: all that a planner must know."""
+        """The base without sensors: what a planner needs."""
         return Base(**{name: getattr(self, name) for name in Base.__dataclass_fields__})

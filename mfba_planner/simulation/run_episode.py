@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core driver: one episode from start to end, without ROS."""
+"""The core driver: run one episode from start to end, without ROS."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GoOn = Callable[[World], bool]
 
 
 def always_continue(_: World) -> bool:
-    """Go on, whatever the world is like."""
+    """The default of go_on: never stop a run early."""
     return True
 
 
@@ -34,7 +34,7 @@ def episode_generator(
     path_planner: PathPlanner,
     observe: Observe,
 ) -> Generator[Observation, None, Episode]:
-    """run(), pausing before every decision: yields what is about to be decided upon."""
+    """run() as a generator: yields the observation before every decision."""
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
     obs = observe(world, sensor)
     yield obs
@@ -69,9 +69,9 @@ def run(
 ) -> Episode:
     """The core driver: Algorithm 1 from start to goal or time limit, without ROS.
 
-    go_on sees the world after every decision and ends the run by returning False. brain takes
-    the decisions instead of Algorithm 1, with planner's speed, step and tolerance; look is what
-    it gets to know.
+    go_on is called with the world after every decision; False ends the run. path_planner
+    replaces Algorithm 1 but keeps speed, step length and tolerance of `planner`; observe makes
+    its observations.
     """
     planner = planner or PlannerParams()
     path_planner = path_planner or supervised_algorithm_1(planner, seed)
@@ -82,11 +82,11 @@ def run(
     )
 
 
-def run_to_end(under_way: Generator[object, None, T]) -> T:
-    """Go on to the end, and return what comes of it."""
+def run_to_end(generator: Generator[object, None, T]) -> T:
+    """Exhaust a generator and return its result."""
     while True:
         try:
-            next(under_way)
+            next(generator)
         except StopIteration as end:
             result: T = end.value
             return result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Circles that move as closed-form functions of time, walls they bounce from, and contact."""
+"""Scenario: start, goal, robot, obstacles, walls, time limit, kidnappings, fleet; checked."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .robot_model import Robot
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kidnapping:
-    """At the first tick at or after at_s (s) the robot stands at to_m (m), its heading kept."""
+    """At the first tick from at_s (s) on, the robot is moved to to_m (m); its heading is kept."""
 
     at_s: float
     to_m: Point
@@ -31,7 +31,7 @@ class Member:
     goal_m: Point
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a name that cannot be a namespace, or nothing to do."""
+        """Raise ConfigError for a name that is no ROS namespace, or a goal equal to the start."""
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", self.name):
             raise ConfigError(
                 f"robot {self.name!r}: not a ROS namespace; give letters, digits and single _, "
@@ -47,7 +47,7 @@ class Member:
 class Scenario:
     """A task: start, goal, robot, obstacles, walls and a limit of simulated time.
 
-    robots makes it the task of a fleet (fleet.py); start_m and goal_m are its first robot's.
+    With robots it is the task of a fleet (fleet.py); start_m and goal_m are its first robot's.
     """
 
     name: str
@@ -64,11 +64,11 @@ class Scenario:
 
     @property
     def robot_names(self) -> tuple[str, ...]:
-        """What the robots of a fleet are called; empty of one that is alone."""
+        """Names of the robots of a fleet; empty for a single robot."""
         return tuple(member.name for member in self.robots)
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a task that makes no sense from the first moment."""
+        """Raise ConfigError for a task that is invalid at t = 0."""
         if self.start_m == self.goal_m:
             raise ConfigError(f"goal_m={list(self.goal_m)}: equal to start_m; move one of them")
         for number, obstacle in enumerate(self.obstacles, start=1):
@@ -113,40 +113,42 @@ def _check_inside(number: int, obstacle: Obstacle, walls: Walls) -> None:
 
 
 def _check_turns(number: int, obstacle: Obstacle) -> None:
-    _check_order(f"obstacle {number} turns", [turn.at_s for turn in obstacle.turns])
+    _check_ascending(f"obstacle {number} turns", [turn.at_s for turn in obstacle.turns])
 
 
-def _check_order(what: str, times_s: list[float]) -> None:
+def _check_ascending(what: str, times_s: list[float]) -> None:
     for before, at_s in pairwise([0.0, *times_s]):
         if not before < at_s:
             raise ConfigError(
                 f"{what}: at_s={at_s:g} does not come after {before:g}; "
-                f"give the {what.split()[-1]} in order of time, the first after 0"
+                f"sort the {what.split()[-1]} by time, the first after 0"
             )
 
 
 def _check_kidnappings(scenario: Scenario) -> None:
-    _check_order("kidnappings", [kidnapping.at_s for kidnapping in scenario.kidnappings])
+    _check_ascending("kidnappings", [kidnapping.at_s for kidnapping in scenario.kidnappings])
     for kidnapping in scenario.kidnappings:
         for number, (center, radius) in enumerate(scenario.enlarged(kidnapping.at_s), start=1):
             gap = distance(kidnapping.to_m, center) - radius
             if gap < 0.0:
                 raise ConfigError(
                     f"kidnapping to_m={list(kidnapping.to_m)}: {-gap:.3g} m inside obstacle "
-                    f"{number} at {kidnapping.at_s:g} s (radii added); choose a free place"
+                    f"{number} at {kidnapping.at_s:g} s (radii added); choose a free point"
                 )
 
 
 def _check_fleet(scenario: Scenario) -> None:
     first, wide = scenario.robots[0], 2.0 * scenario.robot_radius_m
     if (scenario.start_m, scenario.goal_m) != (first.start_m, first.goal_m):
-        raise ConfigError("robots: start_m and goal_m say something else; leave those two out")
+        raise ConfigError(
+            "robots: start_m and goal_m differ from those of the first robot; leave those two out"
+        )
     for what in ("walls", "kidnappings"):
         if getattr(scenario, what):
-            raise ConfigError(f"robots: together with {what} not supported; leave one of them out")
+            raise ConfigError(f"robots: a fleet with {what} not supported; leave one of them out")
     for one, other in combinations(scenario.robots, 2):
         if one.name == other.name:
-            raise ConfigError(f"robot {one.name}: named twice; give each a name of its own")
+            raise ConfigError(f"robot {one.name}: named twice; give each robot its own name")
         for what in ("start_m", "goal_m"):
             gap = distance(getattr(one, what), getattr(other, what)) - wide
             if gap < 0.0:
@@ -154,5 +156,5 @@ def _check_fleet(scenario: Scenario) -> None:
                     f"robots {one.name} and {other.name} {what}: {-gap:.3g} m into each other "
                     "(radii added); move them apart"
                 )
-    for member in scenario.robots:  # each as the only one
+    for member in scenario.robots:  # check each as a single robot
         replace(scenario, start_m=member.start_m, goal_m=member.goal_m, robots=())

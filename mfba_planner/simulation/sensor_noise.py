@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the robot's instruments tell it: odometry and scan, as good as they are said to be."""
+"""Simulated odometry and scan with the noise, loss and latency of robot_model.Noise."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ class Reading:
 
     @property
     def received(self) -> Pose2D:
-        """The pose as whoever reads the odometry gets it."""
+        """The pose as a subscriber to the odometry receives it."""
         return carried(self.pose)
 
 
 class NoisySensors:
-    """Odometry and lidar of one robot over a run, asked once per tick, stamps rising.
+    """Odometry and lidar of one robot over a run; call read() once per tick, stamps ascending.
 
-    A latency is a delay that the stamp hides: the reading of an earlier tick under this one's
-    stamp. Before there is one that old, tick 0's is given. All draws of a tick come from
-    children of the seed named by purpose and stamp.
+    With a latency the reading of an earlier tick carries the present stamp; the first ticks get
+    the reading of tick 0. All draws of a tick come from children of the seed named by purpose
+    and stamp.
     """
 
     def __init__(self, robot: Robot, walls: Walls | None, tick_ns: int, seed: int) -> None:
@@ -50,7 +50,7 @@ class NoisySensors:
         self._last: Pose2D | None = None
 
     def read(self, stamp_ns: int, pose: Pose2D, surfaces: Surfaces) -> Reading:
-        """Read all instruments at the true pose among circles (x, y, radius)."""
+        """Odometry and scan at the true pose among circles (x, y, radius)."""
         self._poses.append(pose)
         scan = None
         if self._robot.lidar.beams:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An episode with the planner that the parameters name, for one robot or a fleet, without ROS."""
+"""Simulate an episode, of one robot or a fleet, with the planner its parameters name; no ROS."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A lidar among circles and walls: rays from one point, and the scan they make."""
+"""Simulated lidar: ray casting against circles and walls, and the resulting scan."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def cast_rays(
 ) -> np.ndarray:
     """Range of each beam to the nearest circle (x, y, radius), inf beyond longest_m; (n,), m.
 
-    From within a circle every beam starts at its surface: 0.
+    Inside a circle every range is 0.
     """
     if not circles:
         return np.full(beams, np.inf)
@@ -56,14 +56,14 @@ def cast_rays(
 
 
 def cast_walls(position: Point, walls: Walls, beams: int, turned_rad: float = 0.0) -> np.ndarray:
-    """Range of each beam to the walls' rectangle, from within or without; inf beside it; (n,)."""
+    """Range of each beam to the walls, from inside or outside; inf for a miss; (n,), m."""
     enter, leave = np.full(beams, -np.inf), np.full(beams, np.inf)
-    for here, low, high, slope in zip(
+    for origin, low, high, slope in zip(
         position, walls.lower_m, walls.upper_m, rays(beams, turned_rad)
     ):
         with np.errstate(divide="ignore", invalid="ignore"):
-            a, b = (low - here) / slope, (high - here) / slope
-        enter = np.fmax(enter, np.fmin(a, b))  # fmin passes over 0/0, a ray along the wall
+            a, b = (low - origin) / slope, (high - origin) / slope
+        enter = np.fmax(enter, np.fmin(a, b))  # fmin ignores 0/0: a ray along the wall
         leave = np.fmin(leave, np.fmax(a, b))
     met = np.where(enter > 0.0, enter, leave)
     return np.where((enter <= leave) & (leave > 0.0), met, np.inf)
@@ -77,8 +77,8 @@ def scan_at(
 ) -> Scan:
     """The scan of real surfaces from this pose, in the lidar's own frame.
 
-    As in REP-117: +inf beyond range_max, -inf nearer than range_min. All numbers are what a
-    LaserScan can carry, single precision.
+    REP-117: +inf beyond range_max, -inf below range_min. All numbers in single precision, as in
+    a LaserScan.
     """
     turned = pose.yaw + lidar.yaw_rad
     ranges = cast_rays(pose.position, circles, lidar.beams, math.inf, turned)
@@ -95,10 +95,10 @@ def scan_at(
 
 
 def limited(ranges_m: np.ndarray, lidar: Lidar) -> np.ndarray:
-    """What a lidar says of these ranges: too far is +inf, too near -inf; single precision."""
+    """Ranges as a lidar reports them: too far is +inf, too near -inf; single precision."""
     far, near = ranges_m > lidar.range_max_m, ranges_m < lidar.range_min_m
-    said = np.where(far, np.inf, np.where(near, -np.inf, ranges_m))
-    return said.astype(np.float32).astype(np.float64)
+    measured = np.where(far, np.inf, np.where(near, -np.inf, ranges_m))
+    return measured.astype(np.float32).astype(np.float64)
 
 
 def _single(value: float) -> float:

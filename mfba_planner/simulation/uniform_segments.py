@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The motion of all obstacles as arrays of uniform legs, for whoever computes with many."""
+"""The motion of all obstacles as arrays of segments of uniform motion."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .scenario import Scenario
 
 
 class UniformSegments(NamedTuple):
-    """m legs of uniform motion; every field is an array of m numbers."""
+    """m segments of uniform motion; every field is an array of m numbers."""
 
-    t0: np.ndarray  # s, when the leg begins
-    t1: np.ndarray  # s, when it ends
+    t0: np.ndarray  # s, start of the segment
+    t1: np.ndarray  # s, its end
     x: np.ndarray  # m, centre at t0
     y: np.ndarray
     vx: np.ndarray  # m/s
@@ -24,8 +24,8 @@ class UniformSegments(NamedTuple):
     radius: np.ndarray  # m, enlarged
     obstacle: np.ndarray  # index into Scenario.obstacles
 
-    def of(self, obstacles: list[int]) -> UniformSegments:
-        """The legs of some obstacles only."""
+    def select(self, obstacles: list[int]) -> UniformSegments:
+        """The segments of some obstacles only."""
         keep = np.isin(self.obstacle, obstacles)
         return UniformSegments(*(column[keep] for column in self))
 
@@ -42,5 +42,5 @@ def uniform_segments(scenario: Scenario, until_s: float) -> UniformSegments:
             vx, vy = (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
             rows.append((t0, t1, x0, y0, vx, vy, radius, index))
     table = np.array(rows, dtype=np.float64).reshape(-1, 8)
-    begin, end, x, y, speed_x, speed_y, radii, which = table.T
-    return UniformSegments(begin, end, x, y, speed_x, speed_y, radii, which.astype(np.intp))
+    start, end, x, y, speed_x, speed_y, radii, which = table.T
+    return UniformSegments(start, end, x, y, speed_x, speed_y, radii, which.astype(np.intp))

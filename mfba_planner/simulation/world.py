@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated world between two ticks: robot, obstacles, sensors, outcome; without ROS."""
+"""The simulated world of one robot, tick by tick: robot, obstacles, sensors, outcome; no ROS."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from ..core.types import NANO
 from .batched_motion import Motion
 from .differential_drive import Speeds, apply_command
 from .episode import Outcome, stamp_of
-from .nearby_obstacles import Found, NearbyObstacles
+from .nearby_obstacles import Nearby, NearbyObstacles
 from .obstacle_motion import velocity_at
 from .scenario import Scenario
 from .sensor_noise import NoisySensors, Reading
 
-DOUBTS = 4.0  # deviations of odometry by which the goal may be missed
+GOAL_SIGMAS = 4.0  # standard deviations of odometry by which the goal may be missed
 
 
 def advance(pose: Pose2D, velocity: Point, tick_ns: int) -> Pose2D:
-    """The omnidirectional robot after one tick at constant velocity (m/s); yaw is kept."""
+    """Pose of the omnidirectional robot after one tick at constant velocity (m/s); yaw is kept."""
     dt = tick_ns * NANO
     return Pose2D(pose.x + velocity[0] * dt, pose.y + velocity[1] * dt, pose.yaw)
 
 
 class World:
-    """The simulated world between two ticks: all that world_sim knows, without ROS."""
+    """State of the simulated world at one tick; the node world_sim wraps it."""
 
     def __init__(
         self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float, seed: int = 0
     ) -> None:
-        """Put the robot at the start, at tick 0; the seed is its instruments'.
+        """Put the robot at the start, at tick 0; seed is that of the sensor noise.
 
         Raises ConfigError for a scenario of several robots.
         """
         if scenario.robots:
             raise ConfigError(
-                f"scenario {scenario.name!r}: names {len(scenario.robots)} robots, which share a "
-                "world; use simulation.fleet"
+                f"scenario {scenario.name!r}: names {len(scenario.robots)} robots, not "
+                "one; use simulation.fleet"
             )
         self.scenario = scenario
         self.tick_ns = tick_ns
@@ -48,28 +48,28 @@ class World:
         self._read: tuple[int, Reading] | None = None
         self._nearby = NearbyObstacles(Motion(scenario), tick_ns)
 
-    def near(self, reach_m: float, position: Point | None = None) -> Found:
-        """Indices, and (centre, enlarged radius), of whoever may be within reach of its edge now.
+    def near(self, reach_m: float, position: Point | None = None) -> Nearby:
+        """Indices, and (centre, enlarged radius), of the obstacles that may be within reach now.
 
-        In the scenario's order; nobody who is within reach is missing.
+        Reach is measured to the enlarged edge. In scenario order; none within reach is missing.
         """
         return self._nearby.at(self.tick, position or self.pose.position, reach_m)
 
     def centers(self) -> list[Point]:
-        """Centres of all that is around, now: the scenario's obstacles in its order."""
+        """Present centres of all obstacles, in scenario order."""
         return self.scenario.centers(self.time_s)
 
     @property
     def distance_to_goal_m(self) -> float:
-        """How far the goal is."""
+        """Distance to the goal."""
         return distance(self.pose.position, self.scenario.goal_m)
 
     def radius_m(self, index: int) -> float:
-        """Radius of whoever near() calls by that index, not enlarged."""
+        """Radius of the obstacle with this index in near(), not enlarged."""
         return self.scenario.obstacles[index].radius_m
 
     def velocity(self, index: int) -> Point:
-        """(vx, vy) in m/s, now, of whoever near() calls by that index."""
+        """Present (vx, vy) in m/s of the obstacle with this index in near()."""
         return velocity_at(self.scenario.obstacles[index], self.time_s, self.scenario.walls)
 
     @property
@@ -83,24 +83,24 @@ class World:
         return self.tick * self.tick_ns * NANO
 
     def outcome(self) -> Outcome | None:
-        """How the run has ended by the present tick, None while it goes on."""
-        # Who sees itself there need not be: the robot stops where its odometry says so.
-        doubt_m = DOUBTS * self.scenario.robot.noise.odom_m
-        if self.distance_to_goal_m <= self.goal_tolerance_m + doubt_m:
+        """How the run has ended by the present tick; None while it runs."""
+        # The robot stops where its odometry is at the goal; its true pose may be off by the noise.
+        slack_m = GOAL_SIGMAS * self.scenario.robot.noise.odom_m
+        if self.distance_to_goal_m <= self.goal_tolerance_m + slack_m:
             return Outcome.GOAL_REACHED
         if self.time_s >= self.scenario.time_limit_s:
             return Outcome.TIME_LIMIT
         return None
 
-    def step(self, told: Point) -> None:
-        """Move robot and time on by one tick; told is what differential_drive.command gives."""
+    def step(self, command: Point) -> None:
+        """Advance by one tick with a command as from differential_drive.command."""
         robot = self.scenario.robot
         if robot.turns:
             self.pose, self.speeds = apply_command(
-                self.pose, self.speeds, told, robot, self.tick_ns
+                self.pose, self.speeds, command, robot, self.tick_ns
             )
         else:
-            self.pose = advance(self.pose, told, self.tick_ns)
+            self.pose = advance(self.pose, command, self.tick_ns)
         before_s = self.time_s
         self.tick += 1
         for kidnapping in self.scenario.kidnappings:
@@ -108,11 +108,11 @@ class World:
                 self.put(Pose2D(*kidnapping.to_m, self.pose.yaw))
 
     def put(self, pose: Pose2D) -> None:
-        """Put the robot somewhere else, at rest."""
+        """Place the robot at a pose, at rest."""
         self.pose, self.speeds, self._read = pose, Speeds(), None
 
     def read(self) -> Reading:
-        """What the robot's instruments say at the present tick: the same however often."""
+        """Sensor reading of the present tick; further calls in a tick return the same."""
         robot = self.scenario.robot
         if not (robot.lidar.beams or robot.noise.of_odometry):
             return Reading(self.pose, None)

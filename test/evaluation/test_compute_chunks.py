@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts anywhere: any executor, workers that die, and what is left when it ends early."""
+"""Chunks on any executor: workers that die, and the chunks kept after an early end."""
 
 import os
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from mfba_planner.evaluation.study.compute_chunks import TRIES, compute
 
 @dataclass(frozen=True)
 class Square:
-    """A part that computes a square; it may die first, as often as a file says."""
+    """A chunk that computes a square; first it kills its worker as often as a file says."""
 
     number: int
     deaths: Path | None = None
@@ -52,12 +52,14 @@ EXPECTED = {f"square-{k}": k * k for k in range(7)}
 
 @pytest.mark.parametrize("workers", [1, 2, 3])
 def test_any_number_of_workers(workers: int) -> None:
-    heard: list[str] = []
+    finished: list[str] = []
     found = compute(
-        [Square(k) for k in range(7)], workers=workers, done=lambda chunk: heard.append(chunk.name)
+        [Square(k) for k in range(7)],
+        workers=workers,
+        done=lambda chunk: finished.append(chunk.name),
     )
     assert squares(found) == EXPECTED
-    assert sorted(heard) == sorted(EXPECTED)
+    assert sorted(finished) == sorted(EXPECTED)
 
 
 def test_any_executor_which_is_left_open() -> None:
@@ -66,17 +68,17 @@ def test_any_executor_which_is_left_open() -> None:
         assert executor.submit(int, "3").result() == 3
 
 
-def test_a_part_whose_worker_dies_is_named_and_tried_again(tmp_path: Path) -> None:
+def test_a_chunk_whose_worker_dies_is_named_and_run_again(tmp_path: Path) -> None:
     deaths = tmp_path / "deaths"
     deaths.write_text("2")
-    said: list[str] = []
+    messages: list[str] = []
     chunks = [Square(k, deaths if k == 3 else None) for k in range(7)]
-    assert squares(compute(chunks, workers=2, say=said.append)) == EXPECTED
-    assert "square-3: its worker process may have died; trying it again alone" in said
+    assert squares(compute(chunks, workers=2, say=messages.append)) == EXPECTED
+    assert "square-3: its worker process may have died; running it again alone" in messages
     assert deaths.read_text() == "-1"
 
 
-def test_one_that_kills_every_worker_costs_one_line_and_the_rest_is_kept(tmp_path: Path) -> None:
+def test_a_chunk_that_kills_every_worker_raises_and_the_rest_is_kept(tmp_path: Path) -> None:
     deaths = tmp_path / "deaths"
     deaths.write_text("1000")
     chunks = [Square(k, deaths if k == 3 else None) for k in range(7)]
@@ -93,7 +95,7 @@ def test_one_that_kills_every_worker_costs_one_line_and_the_rest_is_kept(tmp_pat
 
 
 class Unlucky(Executor):
-    """A cluster that loses the first worker that it gives a part to."""
+    """A cluster that loses the worker of its first chunk."""
 
     def __init__(self, error: Exception) -> None:
         self.error: Exception | None = error
@@ -109,22 +111,22 @@ class Unlucky(Executor):
 
 
 class KilledWorker(Exception):  # noqa: N818
-    """Named as dask names it."""
+    """Has the name of dask's exception."""
 
 
 @pytest.mark.parametrize("error", [BrokenProcessPool(), KilledWorker()])
 def test_a_cluster_that_loses_a_worker(error: Exception) -> None:
-    said: list[str] = []
+    messages: list[str] = []
     chunks = [Square(k) for k in range(7)]
-    assert squares(compute(chunks, executor=Unlucky(error), say=said.append)) == EXPECTED
-    assert len(said) == 1
+    assert squares(compute(chunks, executor=Unlucky(error), say=messages.append)) == EXPECTED
+    assert len(messages) == 1
 
 
-def test_an_error_of_a_part_arrives_as_it_was() -> None:
+def test_an_exception_of_a_chunk_is_raised_unchanged() -> None:
     with pytest.raises(ZeroDivisionError):
         compute([Square(1)], executor=Unlucky(ZeroDivisionError()))
 
 
-def test_workers_that_cannot_be() -> None:
+def test_numbers_of_workers_out_of_range() -> None:
     with pytest.raises(ConfigError, match=r"--workers=0: out of range; give 1 to 256"):
         compute([], workers=0)

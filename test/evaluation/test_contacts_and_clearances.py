@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a run went on its way: worked examples, and that it does not matter how it is streamed."""
+"""Contacts, clearances and smoothness: worked examples, and independence of the block size."""
 
 import math
 from dataclasses import replace
@@ -27,15 +27,15 @@ def mover(center: tuple[float, float], degrees: float, speed: float = 1.0) -> Ob
     )
 
 
-def test_a_robot_that_drives_into_a_post_ran_into_it() -> None:
+def test_a_moving_robot_hits_a_post() -> None:
     # enlarged radius 0.8: contact between x = 1 and x = 2
     found = run_motion(trip([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)], obstacles=(post((2.0, 0.0)),)))
     assert (found.hits_moving, found.hits_standing) == (1, 0)
     assert (found.first_contact_with, found.first_contact_s) == (1, 1.0)
 
 
-def test_an_obstacle_that_comes_to_a_standing_robot_ran_into_it() -> None:
-    # 3.8 m away it comes at 1 m/s: after 3 s it touches
+def test_an_obstacle_hits_a_standing_robot() -> None:
+    # 3.8 m away at 1 m/s: contact after 3 s
     far, near = post((9.0, 5.0)), mover((3.8, 0.0), 180.0)
     found = run_motion(trip([(0.0, 0.0)] * 6, obstacles=(far, near)))
     assert (found.hits_moving, found.hits_standing) == (0, 1)
@@ -52,27 +52,29 @@ def test_hits_of_both_kinds_are_all_collisions() -> None:
     assert (found.first_contact_with, found.first_contact_s) == (1, 0.0)
 
 
-def test_without_contact_there_is_no_first_one() -> None:
+def test_no_first_contact_without_contact() -> None:
     found = run_motion(trip([(0.0, 0.0), (1.0, 0.0)], obstacles=(post((0.0, 5.0)),)))
     assert (found.first_contact_with, found.first_contact_s) == (0, math.inf)
 
 
-def test_mean_clearance_is_that_of_the_nearest_in_each_step() -> None:
+def test_mean_clearance_is_to_the_nearest_obstacle_of_each_step() -> None:
     # nearest during the steps: 2.2 (at x = 1, post 3 m off the end) and 1.2 m
     episode = trip([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)], obstacles=(post((4.0, 0.0)),))
     found = run_motion(episode)
     assert found.mean_clearance_m == pytest.approx((2.2 + 1.2) / 2)
     assert evaluate(episode).min_clearance_m == pytest.approx(1.2)
-    nearer = replace(
+    with_second_post = replace(
         episode,
         scenario=replace(
             episode.scenario, obstacles=(*episode.scenario.obstacles, post((0.0, 1.0)))
         ),
     )
-    assert run_motion(nearer).mean_clearance_m == pytest.approx((0.2 + math.sqrt(2.0) - 0.8) / 2)
+    assert run_motion(with_second_post).mean_clearance_m == pytest.approx(
+        (0.2 + math.sqrt(2.0) - 0.8) / 2
+    )
 
 
-def test_time_to_collision_when_both_go_on_as_in_the_step() -> None:
+def test_time_to_collision_at_the_velocities_of_the_step() -> None:
     # 5 m apart, closing at 1 + 0.5 m/s, 0.8 m between centres in contact
     head_on = trip([(0.0, 0.0), (1.0, 0.0)], obstacles=(mover((5.0, 0.0), 180.0, 0.5),))
     assert run_motion(head_on).min_ttc_s == pytest.approx(4.2 / 1.5)
@@ -99,7 +101,7 @@ def test_a_path_with_corners() -> None:
     assert found.curvature_radpm == pytest.approx(math.radians(145.0) / 5.0)
 
 
-def test_turns_are_taken_the_short_way_round() -> None:
+def test_turns_are_at_most_180_degrees() -> None:
     a, b = math.radians(170.0), math.radians(-170.0)
     points = [(0.0, 0.0), (math.cos(a), math.sin(a))]
     points.append((points[1][0] + math.cos(b), points[1][1] + math.sin(b)))
@@ -132,7 +134,7 @@ def test_a_run_without_a_step(count: int) -> None:
 
 
 @pytest.mark.parametrize("block", [2, 3, 7, 64])
-def test_blocks_do_not_show(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_block_size_changes_nothing(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
     episode = run(load_scenario("case2"), planner=PlannerParams(speed_mps=0.5), seed=3)
     result, whole = assess(episode)
     monkeypatch.setattr(metrics, "BLOCK", block)
@@ -142,31 +144,31 @@ def test_blocks_do_not_show(block: int, monkeypatch: pytest.MonkeyPatch) -> None
         assert getattr(cut, name) == pytest.approx(getattr(whole, name), rel=1e-12), name
 
 
-def test_a_contact_over_the_edge_of_a_block_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_contact_across_blocks_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
     episode = trip([(0.1 * k, 0.0) for k in range(40)], obstacles=(post((2.0, 0.0)),))
     for block in range(2, 41):
         monkeypatch.setattr(metrics, "BLOCK", block)
         assert evaluate(episode).collisions == 1, block
 
 
-def test_figures_may_be_asked_for_on_the_way() -> None:
+def test_figures_of_the_ticks_so_far() -> None:
     episode = run(load_scenario("case1"), seed=1)
-    tally = MetricsAccumulator(episode)
+    accumulator = MetricsAccumulator(episode)
     for k, tick in enumerate(episode.ticks):
-        tally.add(tick)
+        accumulator.add(tick)
         if k in (0, 1, 17):
-            part = replace(episode, ticks=episode.ticks[: k + 1])
-            assert tally.result(episode.outcome) == evaluate(part)
-    assert tally.result(episode.outcome) == evaluate(episode)
-    assert tally.run_motion().turning_rad == run_motion(episode).turning_rad
+            prefix = replace(episode, ticks=episode.ticks[: k + 1])
+            assert accumulator.result(episode.outcome) == evaluate(prefix)
+    assert accumulator.result(episode.outcome) == evaluate(episode)
+    assert accumulator.run_motion().turning_rad == run_motion(episode).turning_rad
 
 
-PLACES = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+POINTS = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 
 
 @settings(max_examples=50)
-@given(points=st.lists(PLACES, min_size=2, max_size=8), far=st.floats(10.0, 20.0))
-def test_what_is_turned_and_shifted_is_as_smooth_and_as_near(
+@given(points=st.lists(POINTS, min_size=2, max_size=8), far=st.floats(10.0, 20.0))
+def test_rotation_and_translation_change_nothing(
     points: list[tuple[float, float]], far: float
 ) -> None:
     def turned(episode: Any) -> Episode:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The oracle: free by two independent formulas, shorter than anyone, honest when it gives up."""
+"""The oracle: free by two independent formulas, no planner is shorter, and its proofs."""
 
 import math
 from itertools import pairwise
@@ -19,10 +19,10 @@ from mfba_planner.evaluation.oracle.lattice_search import (
     LatticeParams,
     _free,
     _free_steps,
-    lattice_ways,
+    lattice_paths,
 )
 from mfba_planner.evaluation.oracle.path_refinement import refine
-from mfba_planner.evaluation.oracle.polyline import FAR_M, gaps, lengths, one_way_gaps, pair_gaps
+from mfba_planner.evaluation.oracle.polyline import FAR_M, gaps, lengths, pair_gaps, path_gaps
 from mfba_planner.evaluation.oracle.solution import Waypoint
 from mfba_planner.evaluation.oracle.tangent_search import SearchParams
 from mfba_planner.evaluation.suites import suite
@@ -39,7 +39,7 @@ ROOM = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 12.0))
 V = 0.8
 STRAIGHT_M = 12.0 * math.sqrt(2.0)
 
-PLACES = st.tuples(st.floats(1.0, 11.0), st.floats(1.0, 11.0))
+POINTS = st.tuples(st.floats(1.0, 11.0), st.floats(1.0, 11.0))
 TURNS = st.lists(
     st.tuples(st.floats(0.1, 25.0), st.floats(0.0, 2.0), st.floats(-4.0, 4.0)),
     max_size=5,
@@ -47,7 +47,7 @@ TURNS = st.lists(
 ).map(lambda rows: tuple(Turn(at_s=t, speed_mps=v, heading_rad=h) for t, v, h in sorted(rows)))
 MOTIONS = st.builds(
     Obstacle,
-    center_m=PLACES,
+    center_m=POINTS,
     radius_m=st.floats(0.05, 0.9),
     speed_mps=st.floats(0.0, 2.0),
     heading_rad=st.floats(-4.0, 4.0),
@@ -71,7 +71,7 @@ def post(x: float, y: float, radius: float = 0.3) -> Obstacle:
 
 
 def ring(center: Point, radius: float, inwards_mps: float = 0.0) -> tuple[Obstacle, ...]:
-    """Twelve obstacles that nobody gets between."""
+    """Twelve obstacles without a gap for the robot."""
     angles = [k * math.tau / 12.0 for k in range(12)]
     return tuple(
         Obstacle(
@@ -100,18 +100,18 @@ def core_clearance(world: Scenario, waypoints: list[Waypoint]) -> float:
 
 
 def assert_sound(world: Scenario, found: Solution, speed: float) -> None:
-    """What every trajectory has to be, without the oracle's own check."""
-    way = list(found.waypoints)
-    assert (way[0], way[-1].point) == ((0.0, *world.start_m), world.goal_m)
-    for a, b in pairwise(way):
+    """Check a trajectory without the oracle's own check."""
+    path = list(found.waypoints)
+    assert (path[0], path[-1].point) == ((0.0, *world.start_m), world.goal_m)
+    for a, b in pairwise(path):
         assert math.dist(a.point, b.point) == pytest.approx(speed * (b.t_s - a.t_s), abs=1e-9)
-    assert core_clearance(world, way) >= -1e-9
-    assert found.length_m == pytest.approx(sum(math.dist(a[1:], b[1:]) for a, b in pairwise(way)))
+    assert core_clearance(world, path) >= -1e-9
+    assert found.length_m == pytest.approx(sum(math.dist(a[1:], b[1:]) for a, b in pairwise(path)))
     assert found.length_m >= found.straight_m - 1e-9
     assert found.detour == found.length_m / found.straight_m
 
 
-# --- figures to hold ------------------------------------------------------------------------
+# --- figures to hold --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_an_empty_world_is_a_straight_line() -> None:
     assert found.clearance_m == math.inf
 
 
-def test_a_post_in_the_way_is_passed_on_tangents_and_an_arc() -> None:
+def test_a_post_on_the_straight_line_is_passed_on_tangents_and_an_arc() -> None:
     # two tangents of length sqrt(half^2 - 0.6^2) and the arc between them
     half = STRAIGHT_M / 2.0
     lean = math.asin(0.6 / half)
@@ -161,7 +161,7 @@ def test_the_shorter_side_is_taken() -> None:
         assert (via.y - via.x) * shift > 0.0
 
 
-def test_a_closed_goal_is_waited_for_by_going_a_longer_way() -> None:
+def test_a_covered_goal_is_reached_later_by_a_longer_path() -> None:
     leaving = Obstacle(center_m=(12.0, 11.9), radius_m=0.3, speed_mps=0.02)
     world = task(leaving)
     found = solve(world, V)
@@ -170,11 +170,11 @@ def test_a_closed_goal_is_waited_for_by_going_a_longer_way() -> None:
     assert_sound(world, found, V)
 
 
-# --- soundness ------------------------------------------------------------------------------
+# --- soundness --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["random-10", "random-30", "adversarial", "dynabarn-like"])
-def test_trajectories_are_free_by_core_s_formula_too(name: str) -> None:
+def test_trajectories_are_free_by_the_simulation_s_formula_too(name: str) -> None:
     for k in range(6):
         world = suite(name).world(k, V)
         found = solve(world, V)
@@ -202,10 +202,10 @@ def test_trajectories_through_random_motions(obstacles: list[Obstacle], closed: 
 @given(
     MOTIONS,
     st.booleans(),
-    st.lists(PLACES, min_size=2, max_size=6, unique=True),
+    st.lists(POINTS, min_size=2, max_size=6, unique=True),
     st.floats(0.3, 3.0),
 )
-def test_three_ways_to_compute_clearance_agree(
+def test_three_formulas_of_clearance_agree(
     obstacle: Obstacle, closed: bool, points: list[Point], speed: float
 ) -> None:
     world = Scenario(
@@ -216,10 +216,10 @@ def test_three_ways_to_compute_clearance_agree(
         walls=ROOM if closed else None,
     )
     assume(all(math.dist(a, b) > 1e-3 for a, b in pairwise(points)))
-    way = timed(points, speed)
-    ours = core_clearance(world, way)
-    assert clearance(world, way) == pytest.approx(ours, abs=1e-6)
-    segments = uniform_segments(world, way[-1].t_s + 1.0)
+    path = timed(points, speed)
+    ours = core_clearance(world, path)
+    assert clearance(world, path) == pytest.approx(ours, abs=1e-6)
+    segments = uniform_segments(world, path[-1].t_s + 1.0)
     many = gaps(np.array([points, points[::-1]]), speed, segments)
     back = core_clearance(world, timed(points[::-1], speed))
     for found, core in zip(many, (ours, back)):
@@ -228,26 +228,26 @@ def test_three_ways_to_compute_clearance_agree(
 
 @settings(max_examples=100)
 @given(MOTIONS, st.booleans(), st.floats(0.5, 60.0))
-def test_event_by_event_is_where_core_says(obstacle: Obstacle, closed: bool, until: float) -> None:
+def test_motion_by_events_equals_center_at(obstacle: Obstacle, closed: bool, until: float) -> None:
     walls = ROOM if closed else None
     end = 0.0
-    for begin, stop, x, y, vx, vy in pieces(obstacle, walls, until):
-        assert begin == pytest.approx(end, abs=1e-9)
-        middle = (begin + stop) / 2.0
-        here = (x + vx * (middle - begin), y + vy * (middle - begin))
-        assert here == pytest.approx(center_at(obstacle, middle, walls), abs=1e-6)
+    for start, stop, x, y, vx, vy in pieces(obstacle, walls, until):
+        assert start == pytest.approx(end, abs=1e-9)
+        middle = (start + stop) / 2.0
+        position = (x + vx * (middle - start), y + vy * (middle - start))
+        assert position == pytest.approx(center_at(obstacle, middle, walls), abs=1e-6)
         end = stop
     assert end == pytest.approx(until, abs=1e-9)
 
 
 def test_what_the_independent_check_refuses() -> None:
     world = task(post(6.0, 6.0), limit_s=100.0)
-    way = timed([(0.0, 0.0), (7.0, 5.0), (12.0, 12.0)], V)
-    assert inspect(world, way, V)[1] == ""
-    assert "begin at start_m" in inspect(world, way[1:], V)[1]
-    assert "end at goal_m" in inspect(world, way[:-1], V)[1]
-    assert "in" in inspect(world, way, 0.9)[1]
-    assert "moves" in inspect(world, way, 0.9)[1]
+    path = timed([(0.0, 0.0), (7.0, 5.0), (12.0, 12.0)], V)
+    assert inspect(world, path, V)[1] == ""
+    assert "does not start at start_m at t = 0" in inspect(world, path[1:], V)[1]
+    assert "end at goal_m" in inspect(world, path[:-1], V)[1]
+    assert "in" in inspect(world, path, 0.9)[1]
+    assert "moves" in inspect(world, path, 0.9)[1]
     smallest, fault = inspect(world, timed([(0.0, 0.0), (12.0, 12.0)], V), V)
     assert smallest == pytest.approx(-0.6)
     assert fault == "touches an enlarged circle (0.6 m inside)"
@@ -255,7 +255,7 @@ def test_what_the_independent_check_refuses() -> None:
     assert "ends after the time limit of 100 s" in inspect(world, slow, 0.1)[1]
 
 
-# --- nobody is shorter ----------------------------------------------------------------------
+# --- none is shorter --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["paper", "random-3", "random-10", "random-20"])
@@ -273,27 +273,27 @@ def test_the_paper_s_planner_is_never_earlier(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "k"), [("random-10", 1), ("random-20", 2), ("adversarial", 3)])
-def test_a_search_that_shares_no_idea_finds_nothing_shorter(name: str, k: int) -> None:
+def test_the_lattice_search_finds_nothing_shorter(name: str, k: int) -> None:
     world = suite(name).world(k, V)
     best = solve(world, V)
     limit_s = 1.012 * best.length_m / V
     segments = uniform_segments(world, limit_s + 1.0)
-    params = LatticeParams(step_s=0.6, headings=64, cell_m=0.1, ways=12)
-    ways = lattice_ways(world.start_m, world.goal_m, V, segments, limit_s, params)
-    refined = [way for one in ways if (way := refine(one, V, segments)) is not None]
+    params = LatticeParams(step_s=0.6, headings=64, cell_m=0.1, max_paths=12)
+    paths = lattice_paths(world.start_m, world.goal_m, V, segments, limit_s, params)
+    refined = [path for rough in paths if (path := refine(rough, V, segments)) is not None]
     assert refined
-    shortest = min(float(lengths(way[None])[0]) for way in refined)
+    shortest = min(float(lengths(path[None])[0]) for path in refined)
     assert best.length_m <= shortest + 2e-3
 
 
 def test_a_finer_search_gains_next_to_nothing() -> None:
-    fine = SearchParams(chord_rad=math.radians(6.0), bin_s=0.03, slack_s=0.15, ways=30)
+    fine = SearchParams(chord_rad=math.radians(6.0), bin_s=0.03, slack_s=0.15, max_paths=30)
     for k in range(5):
         world = suite("random-20").world(k, V)
         assert solve(world, V).length_m <= solve(world, V, fine).length_m + 2e-3
 
 
-# --- no way ---------------------------------------------------------------------------------
+# --- no path ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -308,25 +308,25 @@ def test_a_finer_search_gains_next_to_nothing() -> None:
             "goal_m cannot be reached within the time limit of 30 s",
         ),
         (task(*ring((0.0, 0.0), 1.2, 0.1)), "contact cannot be avoided beyond t = "),
-        (task(limit_s=20.0), "the straight way alone takes 21.2132 s of 20 s"),
+        (task(limit_s=20.0), "the straight path alone takes 21.2132 s of 20 s"),
     ],
     ids=["goal enclosed", "goal covered", "crushed", "too far"],
 )
-def test_what_nobody_can_do_is_proven(world: Scenario, reason: str) -> None:
+def test_infeasible_worlds_are_proven(world: Scenario, reason: str) -> None:
     found = solve(world, V)
     assert found.certificate is Certificate.INFEASIBLE
     assert found.reason.startswith(reason)
     assert found.length_m == math.inf
 
 
-def test_a_ring_with_a_door_is_no_prison() -> None:
+def test_a_ring_with_a_gap_is_feasible() -> None:
     world = task(*ring((12.0, 12.0), 1.5)[1:], limit_s=60.0)
     found = solve(world, V)
     assert found.certificate is Certificate.FEASIBLE
     assert_sound(world, found, V)
 
 
-def test_a_prison_that_opens_is_waited_for() -> None:
+def test_a_ring_that_opens_later_is_feasible() -> None:
     angles = [k * math.tau / 12.0 for k in range(12)]
     opening = tuple(
         Obstacle(
@@ -343,7 +343,7 @@ def test_a_prison_that_opens_is_waited_for() -> None:
 
 
 @pytest.mark.parametrize("name", ["random-30", "adversarial"])
-def test_no_proof_against_a_trajectory_at_hand(name: str) -> None:
+def test_no_infeasibility_proof_for_feasible_worlds(name: str) -> None:
     coarse = ReachParams(cell_m=0.15, step_s=0.3)
     for k in range(5):
         world = suite(name).world(k, V)
@@ -352,11 +352,11 @@ def test_no_proof_against_a_trajectory_at_hand(name: str) -> None:
         assert unreachable(world, V, segments, coarse) == ""
 
 
-# --- the rest -------------------------------------------------------------------------------
+# --- the rest ---------------------------------------------------------------------------------
 
 
 def test_the_robot_may_be_kept_inside() -> None:
-    # the way past the post leads out of the room on the shorter side
+    # the shorter side of the post is outside the room
     wall = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 2.0))
     world = Scenario(
         name="x",
@@ -380,7 +380,7 @@ def test_the_same_world_has_the_same_solution() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, math.inf])
-def test_a_speed_that_is_none_is_refused(speed: float) -> None:
+def test_invalid_speeds_are_refused(speed: float) -> None:
     with pytest.raises(ConfigError, match="no speed; give a number above 0"):
         solve(task(), speed)
 
@@ -401,30 +401,30 @@ def test_slow_and_fast_robots(speed: float) -> None:
     assert_sound(world, found, speed)
 
 
-def test_gaps_of_pairs_and_of_one_way_are_those_of_all_to_the_last_bit() -> None:
+def test_pair_gaps_and_path_gaps_equal_gaps_bit_for_bit() -> None:
     rng = np.random.default_rng(5)
     segments = uniform_segments(suite("random-20").world(5), 40.0)
     points = rng.uniform(0.0, 12.0, (6, 9, 2))
-    points[2, 4] = points[2, 3]  # a leg of no length
+    points[2, 4] = points[2, 3]  # an edge of no length
     rows, columns = rng.integers(0, 8, 60), rng.integers(0, segments.t0.size, 60)
-    some = type(segments)(*(values[columns] for values in segments))
-    found = pair_gaps(points, V, rows, some)
+    subset = type(segments)(*(values[columns] for values in segments))
+    found = pair_gaps(points, V, rows, subset)
     assert np.array_equal(found, gaps(points, V, segments)[:, rows, columns])
-    plain = list(zip(*(values.tolist() for values in some[:7])))
-    for way, expected in zip(points, found):
-        ends = [(x, y) for x, y in way.tolist()]
-        assert one_way_gaps(ends, V, rows.tolist(), plain) == expected.tolist()
+    plain = list(zip(*(values.tolist() for values in subset[:7])))
+    for path, expected in zip(points, found):
+        ends = [(x, y) for x, y in path.tolist()]
+        assert path_gaps(ends, V, rows.tolist(), plain) == expected.tolist()
 
 
 @pytest.mark.parametrize("name", ["random-30", "dynabarn-like"])
-def test_the_lattice_leaves_out_only_what_is_too_far_away(name: str) -> None:
+def test_the_lattice_skips_only_segments_out_of_reach(name: str) -> None:
     rng = np.random.default_rng(6)
     segments = uniform_segments(suite(name).world(6), 40.0)
     angles = np.arange(8) * (math.pi / 4.0)
     u = V * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     for t in (0.0, 3.1, 17.0):
-        here, steps = rng.uniform(0.0, 12.0, (80, 2)), rng.permutation(640)[:500]
-        expected = _free(here[steps // 8], u[steps % 8], t, np.full(500, t + 0.6), segments)
-        found = _free_steps(here, u, t, t + 0.6, steps, segments)
+        position, steps = rng.uniform(0.0, 12.0, (80, 2)), rng.permutation(640)[:500]
+        expected = _free(position[steps // 8], u[steps % 8], t, np.full(500, t + 0.6), segments)
+        found = _free_steps(position, u, t, t + 0.6, steps, segments)
         assert np.array_equal(found, expected)
         assert 0 < found.sum() < 500

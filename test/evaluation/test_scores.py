@@ -17,7 +17,7 @@ def test_gap_of_a_run_that_is_a_tenth_too_long() -> None:
     assert optimality_gap(16.99, 17.0) < 0.0
 
 
-def test_spl_counts_the_share_of_the_way_that_was_needed() -> None:
+def test_spl_is_optimum_over_length() -> None:
     assert spl(True, 20.0, 17.0) == pytest.approx(0.85)
     assert spl(True, 16.9, 17.0) == 1.0, "nothing is better than the optimum"
     assert spl(False, 17.0, 17.0) == 0.0
@@ -30,7 +30,7 @@ def test_barn_score_is_clipped_at_twice_and_eight_times_the_optimal_time() -> No
     assert barn_score(False, 10.0, 10.0) == 0.0
 
 
-def test_who_does_not_arrive_takes_for_ever() -> None:
+def test_time_to_goal_is_infinite_without_arrival() -> None:
     points = [(0.0, 0.0), (1.0, 0.0)]
     assert time_to_goal_s(evaluate(trip(points))) == 1.0
     assert time_to_goal_s(evaluate(trip(points, outcome=Outcome.TIME_LIMIT))) == math.inf

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics held against textbook values, exact enumeration and what chance alone gives."""
+"""Statistics against textbook values, exact enumeration and random samples."""
 
 import math
 from itertools import product
@@ -36,7 +36,7 @@ def test_resampling_draws_each_value_equally_and_is_the_same_each_time() -> None
     assert (drawn != stats.resample(sample, 10, stats.generator(2))).any()
 
 
-def test_bootstrap_interval_of_a_mean_is_the_normal_one() -> None:
+def test_bootstrap_interval_of_a_mean_equals_the_normal_one() -> None:
     sample = np.random.default_rng(5).normal(3.0, 2.0, 400)
     found = stats.estimate(sample, lambda x: x.mean(1), stats.generator(1), 4000)
     reach = 1.96 * sample.std(ddof=1) / 20
@@ -62,7 +62,7 @@ def test_mann_whitney_as_in_the_textbook() -> None:
     assert found.p == pytest.approx(2 * 0.0003, abs=1.2e-4)
 
 
-def test_equal_laws_are_found_different_as_seldom_as_promised() -> None:
+def test_the_false_positive_rate_is_as_specified() -> None:
     rng = np.random.default_rng(1)
     found = [stats.compare(rng.random(30), rng.random(40)) for _ in range(400)]
     assert sum(c.p < 0.05 for c in found) < 35  # 20 expected
@@ -98,7 +98,7 @@ def test_holm_as_by_hand() -> None:
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=10))
-def test_holm_never_helps_and_keeps_the_order(p: list[float]) -> None:
+def test_holm_never_lowers_p_and_keeps_the_ranking(p: list[float]) -> None:
     corrected = stats.holm(p)
     assert all(a <= b <= 1.0 for a, b in zip(p, corrected))
     assert all(x <= y for (a, x), (b, y) in product(zip(p, corrected), repeat=2) if a < b)
@@ -108,7 +108,7 @@ def fifteen(rng: np.random.Generator, count: int) -> np.ndarray:
     return stats.four(rng.lognormal(0.0, 1.5, (count, 15)))
 
 
-def test_rows_that_are_such_runs_are_refused_one_time_in_twenty() -> None:
+def test_rows_of_the_same_law_are_refused_one_time_in_twenty() -> None:
     rng = np.random.default_rng(3)
     draws = fifteen(rng, 2000)
     found = [stats.consistency(draws, row, NAMES) for row in fifteen(rng, 300).tolist()]
@@ -146,7 +146,7 @@ def test_joint_p_is_that_of_the_normal_distribution_where_the_rows_are_normal() 
     )
 
 
-def test_a_statistic_that_never_varies_forgives_nothing() -> None:
+def test_a_constant_statistic_accepts_no_other_value() -> None:
     draws = np.zeros((500, 4))
     assert stats.consistency(draws, [0.0] * 4, NAMES).p == 1.0
     found = stats.consistency(draws, [-0.8, 0.0, -0.1, 0.2], NAMES)
@@ -174,7 +174,7 @@ def test_a_mean_s_interval_holds_the_truth_nineteen_times_in_twenty() -> None:
     assert 175 <= held <= 199
 
 
-def test_a_mean_s_resampling_in_pieces_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_resampling_a_mean_in_batches_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     sample = np.random.default_rng(1).normal(size=50)
     whole = stats.mean(sample, stats.generator(3))
     monkeypatch.setattr(stats, "DRAWN", 120)  # two resamples at a time
@@ -188,11 +188,11 @@ def test_pairs_that_are_all_won() -> None:
     assert (found.n, found.wins, found.losses, found.ties) == (10, 10, 0, 0)
     assert found.difference.middle == pytest.approx(-0.55)
     assert found.difference.high < 0.0
-    assert found.sign_p == pytest.approx(2.0 / 2**10), "both tails of ten heads in a row"
+    assert found.sign_p == pytest.approx(2.0 / 2**10), "both tails of ten heads"
     assert found.rank_p < 0.01
 
 
-def test_ties_say_nothing_either_way() -> None:
+def test_ties_count_for_neither() -> None:
     other = np.zeros(6)
     found = stats.paired(np.array([0.0, 0.0, 0.0, -1.0, -1.0, 1.0]), other, stats.generator(1))
     assert (found.wins, found.losses, found.ties) == (2, 1, 3)
@@ -201,7 +201,7 @@ def test_ties_say_nothing_either_way() -> None:
     assert (same.sign_p, same.rank_p, same.difference.low) == (1.0, 1.0, 0.0)
 
 
-def test_chance_alone_is_rarely_significant() -> None:
+def test_equal_samples_are_rarely_significant() -> None:
     rng = np.random.default_rng(2)
     small = [
         stats.paired(rng.normal(size=40), rng.normal(size=40), stats.generator(k))

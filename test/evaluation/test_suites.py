@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Suites: the same world whatever else is made, fit for every other command, as hard as told."""
+"""Suites: reproducible worlds, valid scenarios, difficulty."""
 
 import math
 import pickle
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import distance
 from mfba_planner.evaluation.suites import suite, suite_names
-from mfba_planner.evaluation.suites.adversarial_worlds import FAMILIES, hostile
+from mfba_planner.evaluation.suites.adversarial_worlds import FAMILIES, adversarial_obstacles
 from mfba_planner.evaluation.suites.random_crowds import CrowdParams, Motion, crowd
 from mfba_planner.evaluation.suites.survivability import first_contact_s, survivability
 from mfba_planner.evaluation.suites.trip import Trip
@@ -44,7 +44,7 @@ def task(*obstacles: Obstacle, walls: Walls | None = None) -> Scenario:
     )
 
 
-# --- names ----------------------------------------------------------------------------------
+# --- names ------------------------------------------------------------------------------------
 
 
 def test_the_suites_of_the_benchmark_exist() -> None:
@@ -72,21 +72,21 @@ def test_an_unknown_suite_is_refused_with_the_nearest_name() -> None:
 
 
 def test_numbers_that_make_no_sense_are_refused() -> None:
-    one = suite("random-3")
-    assert refusal(lambda: one.world(-1)) == "k=-1: negative; worlds are counted from 0"
+    entry = suite("random-3")
+    assert refusal(lambda: entry.world(-1)) == "k=-1: negative; worlds are counted from 0"
     assert "seed=-1: negative" in refusal(lambda: suite("random-3", seed=-1))
     for speed in (0.0, -0.8, math.nan, math.inf):
-        assert "no speed; give a number above 0" in refusal(lambda s=speed: one.world(0, s))
+        assert "no speed; give a number above 0" in refusal(lambda s=speed: entry.world(0, s))
 
 
-# --- the same world, always -----------------------------------------------------------------
+# --- reproducibility --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", suite_names())
 def test_world_k_does_not_depend_on_what_was_made_before(name: str) -> None:
     forwards = [suite(name).world(k) for k in range(6)]
-    one = suite(name)
-    backwards = [one.world(k) for k in reversed(range(6))]
+    entry = suite(name)
+    backwards = [entry.world(k) for k in reversed(range(6))]
     assert forwards == backwards[::-1]
 
 
@@ -98,11 +98,11 @@ def test_worlds_differ_in_k_and_seed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", suite_names())
-def test_suites_travel_between_processes(name: str) -> None:
-    one = suite(name, seed=3)
-    again = pickle.loads(pickle.dumps(one))
-    assert (again.name, again.seed) == (one.name, 3)
-    assert again.world(4) == one.world(4)
+def test_suites_can_be_pickled(name: str) -> None:
+    entry = suite(name, seed=3)
+    again = pickle.loads(pickle.dumps(entry))
+    assert (again.name, again.seed) == (entry.name, 3)
+    assert again.world(4) == entry.world(4)
 
 
 def test_suites_do_not_share_their_obstacles() -> None:
@@ -110,7 +110,7 @@ def test_suites_do_not_share_their_obstacles() -> None:
     assert not set(three.obstacles) & set(ten.obstacles)
 
 
-def test_a_published_world_stays_as_it_was() -> None:
+def test_a_published_world_does_not_change() -> None:
     first = suite("random-10").world(0).obstacles[0]
     again = (*first.center_m, first.speed_mps, first.heading_rad)
     assert again == pytest.approx(GOLDEN, abs=1e-12)
@@ -131,11 +131,11 @@ def test_every_world_is_an_ordinary_scenario(name: str) -> None:
         assert load_scenario(scenario_to_json(world)) == world
 
 
-# --- what is in them ------------------------------------------------------------------------
+# --- contents ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", GENERATED)
-def test_nobody_stands_at_start_or_goal(name: str) -> None:
+def test_start_and_goal_are_free(name: str) -> None:
     for k in range(40):
         world = suite(name).world(k)
         for obstacle in world.obstacles:
@@ -174,7 +174,7 @@ def test_kinds_of_crowds() -> None:
         assert all(0.1 <= turn.speed_mps <= 0.3 for turn in obstacle.turns)
 
 
-def test_crowds_that_cannot_be_are_refused() -> None:
+def test_invalid_crowds_are_refused() -> None:
     assert refusal(lambda: CrowdParams(speed_min_mps=0.5)) == (
         "speed_min_mps=0.5: above speed_max_mps=0.3; give the smaller one first"
     )
@@ -182,10 +182,10 @@ def test_crowds_that_cannot_be_are_refused() -> None:
     assert CrowdParams(obstacles=36).density == 0.25
 
 
-# --- hostile worlds -------------------------------------------------------------------------
+# --- adversarial worlds -----------------------------------------------------------------------
 
 
-def test_hostile_families_take_turns() -> None:
+def test_adversarial_families_alternate() -> None:
     names = [suite("adversarial").world(k).name for k in range(6)]
     assert names == [
         "adversarial-0-pincers",
@@ -199,19 +199,21 @@ def test_hostile_families_take_turns() -> None:
 
 @pytest.mark.parametrize("speed", [0.4, 0.8, 1.6])
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_straight_trip_is_in_danger_but_never_outrun(family: str, speed: float) -> None:
+def test_adversarial_obstacles_hit_the_straight_trip_but_are_slower(
+    family: str, speed: float
+) -> None:
     trip = Trip(speed_mps=speed)
     struck = 0
     for seed in range(30):
-        obstacles = hostile(family, trip, np.random.Generator(np.random.PCG64(seed)))
+        obstacles = adversarial_obstacles(family, trip, np.random.Generator(np.random.PCG64(seed)))
         world = task(*obstacles)
         assert all(o.top_speed_mps <= 0.6 * speed for o in obstacles)
         gaps = step_clearances(world, 0.0, trip.time_s, trip.at(0.0), trip.at(trip.time_s))
         struck += min(gaps) < 0.0
-    assert struck >= 15, "less than half of the worlds would harm anybody"
+    assert struck >= 15, "fewer than half of the worlds hit the straight trip"
 
 
-def test_chasers_end_up_nearer_to_the_trip_than_they_began() -> None:
+def test_chasers_come_nearer_to_the_trip() -> None:
     trip = Trip(speed_mps=0.8)
     world = suite("adversarial").world(2, 0.8)
     for obstacle in world.obstacles:
@@ -222,29 +224,29 @@ def test_chasers_end_up_nearer_to_the_trip_than_they_began() -> None:
         assert len(obstacle.turns) >= 10
 
 
-# --- difficulty -----------------------------------------------------------------------------
+# --- difficulty -------------------------------------------------------------------------------
 
 
 def test_an_empty_world_is_survived() -> None:
     found = survivability(task(), 0.8)
-    assert (found.share, found.places) == (1.0, 100)
+    assert (found.share, found.positions) == (1.0, 100)
     assert found.mean_time_s == pytest.approx(12.0 * math.sqrt(2.0) / 0.8)
 
 
 def test_survival_by_hand() -> None:
-    # sweeps the rows of places within 0.6 m of y = 6: 5.4 (on the edge, by rounding) and 6.6
+    # sweeps the rows of positions within 0.6 m of y = 6: 5.4 (on the edge, by rounding) and 6.6
     sweeper = Obstacle(center_m=(-1.0, 6.1), radius_m=0.3, speed_mps=10.0)
     found = survivability(task(sweeper), 0.8)
     assert found.share == pytest.approx(0.9)
-    assert found.places == 100
+    assert found.positions == 100
 
 
-def test_places_inside_an_obstacle_do_not_count() -> None:
+def test_positions_inside_an_obstacle_do_not_count() -> None:
     post = Obstacle(center_m=(6.6, 6.6), radius_m=0.3)
     found = survivability(task(post), 0.8)
-    assert (found.share, found.places) == (1.0, 99)
+    assert (found.share, found.positions) == (1.0, 99)
     full = Obstacle(center_m=(6.0, 6.0), radius_m=8.0)
-    assert survivability(task(full), 0.8).places < 10
+    assert survivability(task(full), 0.8).positions < 10
 
 
 MOTIONS = st.builds(
@@ -266,19 +268,19 @@ MOTIONS = st.builds(
 @settings(max_examples=60)
 @given(MOTIONS, st.tuples(st.floats(0.0, 12.0), st.floats(0.0, 12.0)), st.booleans())
 def test_first_contact_is_where_the_gap_ends(
-    obstacle: Obstacle, place: tuple[float, float], closed: bool
+    obstacle: Obstacle, position: tuple[float, float], closed: bool
 ) -> None:
-    assume(distance(obstacle.center_m, place) > obstacle.radius_m + 0.3)
+    assume(distance(obstacle.center_m, position) > obstacle.radius_m + 0.3)
     walls = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 12.0)) if closed else None
     world = Scenario(
         name="x", start_m=(99.0, 99.0), goal_m=(98.0, 99.0), obstacles=(obstacle,), walls=walls
     )
-    (first,) = first_contact_s(uniform_segments(world, 20.0), np.array([place]))
+    (first,) = first_contact_s(uniform_segments(world, 20.0), np.array([position]))
     until = min(float(first), 20.0)
-    (before,) = step_clearances(world, 0.0, until, place, place)
+    (before,) = step_clearances(world, 0.0, until, position, position)
     assert before >= -1e-6
     if first < 20.0:
-        (at,) = step_clearances(world, until, until, place, place)
+        (at,) = step_clearances(world, until, until, position, position)
         assert at <= 1e-6
 
 

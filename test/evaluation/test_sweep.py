@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sweep: every row is what the core says of its run, whoever made it and whatever went wrong."""
+"""Sweeps: rows equal the metrics of their runs, on any executor and after any failure."""
 
 import csv
 import io
@@ -19,13 +19,19 @@ from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.types import Observation
 from mfba_planner.evaluation.metrics import assess
 from mfba_planner.evaluation.oracle import solve
+from mfba_planner.evaluation.study.chunk_store import code_digest
 from mfba_planner.evaluation.suites import suite
 from mfba_planner.evaluation.suites.survivability import survivability
-from mfba_planner.evaluation.sweep import chunks, worker
-from mfba_planner.evaluation.sweep import single_run as play_module
+from mfba_planner.evaluation.sweep import chunks, single_run, worker
 from mfba_planner.evaluation.sweep.chunks import chunks_of, make
 from mfba_planner.evaluation.sweep.columns import COLUMNS, TIMINGS, Row
-from mfba_planner.evaluation.sweep.run_sweep import Swept, dask_executor, open_store, sweep
+from mfba_planner.evaluation.sweep.run_sweep import (
+    PACKAGES,
+    Swept,
+    dask_executor,
+    open_store,
+    sweep,
+)
 from mfba_planner.evaluation.sweep.single_run import (
     generates_paths_together,
     run_one,
@@ -40,7 +46,7 @@ from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.simulation.run_episode import run
 
 
-def a_request(**changes: Any) -> SweepSpec:
+def spec_of(**changes: Any) -> SweepSpec:
     plain: dict[str, Any] = {
         "suite": "random-3", "planners": ("paper", "straight"), "worlds": 5, "oracle": False,
     }  # fmt: skip
@@ -49,18 +55,18 @@ def a_request(**changes: Any) -> SweepSpec:
 
 @pytest.fixture(scope="module")
 def small() -> Swept:
-    """Ten runs, judged by the oracle."""
-    return sweep(a_request(oracle=True))
+    """Ten runs, with the oracle."""
+    return sweep(spec_of(oracle=True))
 
 
 @pytest.fixture
 def tiny_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many parts of few runs; it is the parent who cuts."""
+    """Many chunks of few runs; they are made in the parent process."""
     monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 2)
     monkeypatch.setattr(chunks, "WORLDS_AT_ONCE", 2)
 
 
-def test_every_run_is_there_once_in_order(small: Swept) -> None:
+def test_every_run_has_one_row_and_rows_are_sorted(small: Swept) -> None:
     keys = [tuple(row[name] for name in Run._fields) for row in small.rows]
     assert keys == [
         ("random-3", world, planner, 0) for world in range(5) for planner in ("paper", "straight")
@@ -70,7 +76,7 @@ def test_every_run_is_there_once_in_order(small: Swept) -> None:
     assert [tuple(row[name] for name in Run._fields) for row in small.timings] == keys
 
 
-def test_a_row_is_what_the_core_says_of_the_run(small: Swept) -> None:
+def test_a_row_equals_the_metrics_of_the_run(small: Swept) -> None:
     row = next(row for row in small.rows if (row["world"], row["planner"]) == (3, "paper"))
     scenario = suite("random-3").world(3)
     params = PlannerParams(speed_mps=0.8)
@@ -89,10 +95,10 @@ def test_a_row_is_what_the_core_says_of_the_run(small: Swept) -> None:
     assert (row["obstacles"], row["encounters"]) == (3, len(result.encounters))
 
 
-def test_timings_are_measured_of_decisions_that_are_taken_alone(small: Swept) -> None:
+def test_only_decisions_of_single_runs_are_timed(small: Swept) -> None:
     for row in small.timings:
         assert row["wall_ms"] > 0.0
-        if row["planner"] == "paper" and row["world"] > 0:  # made at once
+        if row["planner"] == "paper" and row["world"] > 0:  # computed together
             assert math.isnan(row["decision_us"])
             assert math.isnan(row["decision_max_us"])
         else:
@@ -100,35 +106,37 @@ def test_timings_are_measured_of_decisions_that_are_taken_alone(small: Swept) ->
 
 
 @pytest.mark.parametrize("planner", ["paper", "ba", "mfba"])
-def test_runs_made_together_are_the_runs_made_alone(planner: str) -> None:
+def test_runs_computed_together_equal_single_runs(planner: str) -> None:
     runs = [Run("dense", world, planner, seed) for world in range(6) for seed in range(3)]
     setting = Setting(perception="scan-12", noise_m=0.01)
     assert generates_paths_together(planner, setting)
-    for run_alone, together in zip(runs, run_together(runs, setting)):
-        played = run_one(run_alone, setting, whole=False)
-        assert played.episode == together.episode
+    for each_run, together in zip(runs, run_together(runs, setting)):
+        completed = run_one(each_run, setting, whole=False)
+        assert completed.episode == together.episode
         assert (together.fault, together.times_ns) == ("", ())
-        assert len(played.times_ns) == len(played.episode.ticks)
+        assert len(completed.times_ns) == len(completed.episode.ticks)
 
 
-def test_runs_with_many_ticks_are_made_together_in_few(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_with_many_ticks_are_batched_in_few(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [Run("random-3", world, "paper", 0) for world in range(7)]
     running: list[int] = []
 
-    def noted(planners: Sequence[Algorithm1], seen: Sequence[Observation]) -> None:
+    def noted(planners: Sequence[Algorithm1], observations: Sequence[Observation]) -> None:
         running.append(len(planners))
 
-    monkeypatch.setattr(play_module, "fly_together", noted)
+    monkeypatch.setattr(single_run, "generate_paths_together", noted)
     # Of 120 s in ticks of 0.375 s, 320 each.
-    monkeypatch.setattr(play_module, "TICKS_HELD", 1000)
+    monkeypatch.setattr(single_run, "TICKS_HELD", 1000)
     found = list(run_together(runs, Setting()))
     assert max(running) == 3
-    assert [one.episode for one in found] == [run_one(run, Setting()).episode for run in runs]
+    assert [completed.episode for completed in found] == [
+        run_one(run, Setting()).episode for run in runs
+    ]
     assert len(list(run_together(runs, Setting(params=PlannerParams(step_length_m=2.0))))) == 7
     assert max(running) == 7
 
 
-def test_only_fresh_bats_of_ours_fly_together() -> None:
+def test_only_algorithm_1_with_fresh_swarms_is_batched() -> None:
     persistent = Setting(params=PlannerParams(swarm=Swarm.PERSISTENT))
     assert not generates_paths_together("paper", persistent)
     assert not generates_paths_together("predictive", Setting())
@@ -136,34 +144,34 @@ def test_only_fresh_bats_of_ours_fly_together() -> None:
 
 
 def dies_among_others(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
-    """As make(), but a run that is made with others costs the process its life."""
+    """As make(), but the process dies when runs are computed together."""
     if len(runs) > 1:
         os._exit(7)
     return make(runs, setting)
 
 
 def hangs_among_others(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
-    """As make(), but runs that are made together come to no end."""
+    """As make(), but hangs when runs are computed together."""
     if len(runs) > 1:
         signal.pause()
     return make(runs, setting)
 
 
 @pytest.mark.parametrize("lost", [dies_among_others, hangs_among_others])
-def test_runs_that_are_lost_together_are_made_one_by_one(
+def test_runs_of_a_lost_batch_are_run_one_by_one(
     monkeypatch: pytest.MonkeyPatch, lost: Any
 ) -> None:
-    plain = sweep(a_request(planners=("paper",)))
+    plain = sweep(spec_of(planners=("paper",)))
     monkeypatch.setattr(chunks, "make", lost)
-    again = sweep(a_request(planners=("paper",), setting=Setting(patience_s=4.0)))
+    again = sweep(spec_of(planners=("paper",), setting=Setting(patience_s=4.0)))
     assert again.hash == plain.hash
-    assert all(row["decision_us"] > 0.0 for row in again.timings), "each was made alone"
+    assert all(row["decision_us"] > 0.0 for row in again.timings), "each was a single run"
 
 
-@pytest.mark.usefixtures("tiny_parts")
+@pytest.mark.usefixtures("tiny_chunks")
 @pytest.mark.parametrize("workers", [2, 4])
 def test_processes_change_nothing(small: Swept, workers: int) -> None:
-    again = sweep(a_request(oracle=True), workers=workers)
+    again = sweep(spec_of(oracle=True), workers=workers)
     assert again.hash == small.hash
     assert again.rows == small.rows or repr(again.rows) == repr(small.rows)
 
@@ -180,14 +188,14 @@ def scheduler() -> Iterator[str]:
         yield cluster.scheduler_address
 
 
-@pytest.mark.usefixtures("tiny_parts")
-@pytest.mark.filterwarnings("default")  # of dask's own
+@pytest.mark.usefixtures("tiny_chunks")
+@pytest.mark.filterwarnings("default")  # warnings of dask itself
 def test_dask_changes_nothing(small: Swept, scheduler: str) -> None:
     with dask_executor(scheduler) as executor:
-        assert sweep(a_request(oracle=True), executor=executor).hash == small.hash
+        assert sweep(spec_of(oracle=True), executor=executor).hash == small.hash
 
 
-def test_the_hash_tells_every_bit_but_not_the_order(small: Swept) -> None:
+def test_the_hash_covers_every_bit_but_not_the_sequence(small: Swept) -> None:
     rows = small.rows
     assert sorted_hash(rows[::-1]) == small.hash
     last = {**rows[-1], "length_m": np.nextafter(rows[-1]["length_m"], 99.0).item()}
@@ -195,23 +203,25 @@ def test_the_hash_tells_every_bit_but_not_the_order(small: Swept) -> None:
     assert sorted_hash(rows[:-1]) != small.hash
 
 
-def test_worlds_and_seeds_asked_for() -> None:
-    found = sweep(a_request(planners=("paper",), first=2, worlds=2, seeds=3))
+def test_worlds_and_seeds_of_a_sweep() -> None:
+    found = sweep(spec_of(planners=("paper",), first=2, worlds=2, seeds=3))
     assert [(row["world"], row["seed"]) for row in found.rows] == [
         (world, seed) for world in (2, 3) for seed in (0, 1, 2)
     ]
-    whole = sweep(a_request(planners=("paper",), worlds=4, seeds=3))
+    whole = sweep(spec_of(planners=("paper",), worlds=4, seeds=3))
     assert repr(whole.rows[6:]) == repr(found.rows)
 
 
 def test_a_suite_that_repeats_its_worlds_changes_the_seed() -> None:
-    found = sweep(a_request(suite="paper", planners=("paper",), worlds=4))
+    found = sweep(spec_of(suite="paper", planners=("paper",), worlds=4))
     assert [(row["world"], row["seed"]) for row in found.rows] == [(0, 0), (1, 0), (2, 1), (3, 1)]
     assert found.rows[0]["length_m"] != found.rows[2]["length_m"]
     with pytest.raises(ConfigError, match="--seeds=2: paper has 2 worlds, which --worlds repeats"):
-        a_request(suite="paper", seeds=2)
-    judged = sweep(a_request(suite="paper", planners=("paper",), worlds=4, oracle=True)).rows
-    assert judged[0]["optimum_m"] == judged[2]["optimum_m"] != judged[1]["optimum_m"]
+        spec_of(suite="paper", seeds=2)
+    with_oracle = sweep(spec_of(suite="paper", planners=("paper",), worlds=4, oracle=True)).rows
+    assert (
+        with_oracle[0]["optimum_m"] == with_oracle[2]["optimum_m"] != with_oracle[1]["optimum_m"]
+    )
 
 
 # --- planners that go wrong -------------------------------------------------------------------
@@ -230,18 +240,18 @@ def test_a_suite_that_repeats_its_worlds_changes_the_seed() -> None:
 )
 def test_a_faulty_planner_fails_and_the_sweep_goes_on(planner: str, failure: str) -> None:
     faulty = f"faulty_planners:{planner}"
-    found = sweep(a_request(planners=(faulty, "straight"), worlds=2))
+    found = sweep(spec_of(planners=(faulty, "straight"), worlds=2))
     assert [row["outcome"] == "failed" for row in found.rows] == [True, False, True, False]
     assert [row["failure"] for row in found.rows] == [failure, "", failure, ""]
     assert {row["success"] for row in found.rows[::2]} == {False}
-    assert found.rows[0]["ticks"] == 5, "what was decided before is told"
+    assert found.rows[0]["ticks"] == 5, "decisions before the fault are counted"
     assert found.rows[0]["length_m"] == pytest.approx(4 * 0.3)
     assert found.rows[0]["time_to_goal_s"] == math.inf
 
 
 def test_a_planner_that_cannot_be_made_fails() -> None:
     faulty = "faulty_planners:Unmakeable"
-    found = sweep(a_request(planners=(faulty,), worlds=1, seeds=2))
+    found = sweep(spec_of(planners=(faulty,), worlds=1, seeds=2))
     assert [row["failure"] for row in found.rows] == ["", "tick 0: raised KeyError: 'seed'"]
     assert found.rows[1]["ticks"] == 0
 
@@ -254,38 +264,38 @@ def test_a_planner_that_cannot_be_made_fails() -> None:
     ],
 )
 @pytest.mark.parametrize("workers", [1, 2])
-def test_one_that_hangs_or_dies_costs_its_run(
+def test_a_planner_that_hangs_or_dies_loses_only_its_run(
     planner: str, failure: str, workers: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 4)
-    order = a_request(
+    spec = spec_of(
         planners=(f"faulty_planners:{planner}",),
         worlds=2,
         seeds=3,
         setting=Setting(patience_s=4.0),
     )
-    found = sweep(order, workers=workers)
+    found = sweep(spec, workers=workers)
     assert [row["failure"] for row in found.rows] == ["", failure, ""] * 2
     assert [row["outcome"] for row in found.rows] == ["goal_reached", "failed", "goal_reached"] * 2
     lost = found.rows[1]
     assert (lost["length_m"], lost["collisions"], lost["success"]) == (None, None, False)
     rows = found.rows
-    plain = sweep(a_request(planners=("straight",), worlds=2, seeds=3)).rows
+    plain = sweep(spec_of(planners=("straight",), worlds=2, seeds=3)).rows
     for k in (0, 2, 3, 5):
-        assert rows[k]["length_m"] == plain[k]["length_m"], "the others are what they always were"
+        assert rows[k]["length_m"] == plain[k]["length_m"], "the other runs are unchanged"
 
 
-def test_what_is_wrong_with_us_is_no_planner_s_fault() -> None:
+def test_errors_outside_the_planner_are_raised() -> None:
     run_of_no_suite = Run("random-4", 0, "straight", 0)
     with pytest.raises(ConfigError, match="no such suite"):
         list(each(make, [(run_of_no_suite,)], Setting(), 60.0))
     (rows,) = each(make, [(Run("random-3", 0, "straight", 0),)], Setting(), 60.0)
     assert not isinstance(rows, Lost)
     (row,) = rows
-    assert row["outcome"] == "goal_reached", "the next one is made as if nothing was"
+    assert row["outcome"] == "goal_reached", "the next run is not affected"
 
 
-# --- what is said of it -----------------------------------------------------------------------
+# --- table and summary ------------------------------------------------------------------------
 
 
 def test_the_table_as_text_and_as_parquet(small: Swept, tmp_path: Path) -> None:
@@ -312,18 +322,18 @@ def test_a_table_that_was_cut_short_is_left_and_refused(small: Swept, tmp_path: 
     write(path, small.rows, COLUMNS)
     assert path.read_bytes() == whole
     path.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(OutputError, match=r"table.csv: is not what the finished runs say"):
+    with pytest.raises(OutputError, match=r"table.csv: differs from the finished runs"):
         write(path, small.rows, COLUMNS)
     assert path.read_bytes() == whole[: len(whole) // 2]
 
 
-def test_standings(small: Swept) -> None:
+def test_summary_of_each_planner(small: Swept) -> None:
     paper, straight = standings(small.rows, small.timings)
     assert (paper.planner, straight.planner) == ("paper", "straight")
-    good = [row for row in small.rows if row["planner"] == "paper" and row["success"]]
-    assert paper.success.middle == len(good) / 5
+    successes = [row for row in small.rows if row["planner"] == "paper" and row["success"]]
+    assert paper.success.middle == len(successes) / 5
     assert paper.gap is not None
-    assert paper.gap.middle == pytest.approx(sum(row["gap"] for row in good) / len(good))
+    assert paper.gap.middle == pytest.approx(sum(row["gap"] for row in successes) / len(successes))
     assert paper.gap.low <= paper.gap.middle <= paper.gap.high
     assert paper.certified_runs == 5
     hit = [row for row in small.rows if row["planner"] == "straight" and row["collisions"]]
@@ -331,18 +341,18 @@ def test_standings(small: Swept) -> None:
     assert straight.hits_moving + straight.hits_standing == sum(r["collisions"] for r in hit)
 
 
-def made_up(planner: str, world: int, success: bool, gap: float | None, seed: int = 0) -> Any:
+def row_of(planner: str, world: int, success: bool, gap: float | None, seed: int = 0) -> Any:
     return {"planner": planner, "world": world, "seed": seed, "success": success, "gap": gap}
 
 
 def test_a_pair_on_the_same_worlds() -> None:
     rows = [
-        made_up("a", 0, True, 0.3), made_up("b", 0, True, 0.1),
-        made_up("a", 1, True, 0.2), made_up("b", 1, False, 0.0),
-        made_up("a", 2, False, None), made_up("b", 2, True, 0.1),
-        made_up("a", 3, False, None), made_up("b", 3, True, 0.1),
-        made_up("a", 4, True, 0.2), made_up("b", 4, True, 0.2),
-        made_up("a", 5, True, 0.2),
+        row_of("a", 0, True, 0.3), row_of("b", 0, True, 0.1),
+        row_of("a", 1, True, 0.2), row_of("b", 1, False, 0.0),
+        row_of("a", 2, False, None), row_of("b", 2, True, 0.1),
+        row_of("a", 3, False, None), row_of("b", 3, True, 0.1),
+        row_of("a", 4, True, 0.2), row_of("b", 4, True, 0.2),
+        row_of("a", 5, True, 0.2),
     ]  # fmt: skip
     found = versus(rows, "b", "a")
     assert (found.wins, found.losses) == (2, 1)
@@ -353,15 +363,15 @@ def test_a_pair_on_the_same_worlds() -> None:
     assert [(v.planner, v.other) for v in comparisons(rows)] == [("b", "a")]
 
 
-def test_seeds_of_one_world_are_one_case() -> None:
-    rows = [made_up("a", 0, True, 0.1, seed) for seed in range(9)]
-    rows += [made_up("b", 0, True, 0.2, seed) for seed in range(9)]
+def test_seeds_of_a_world_are_a_single_case() -> None:
+    rows = [row_of("a", 0, True, 0.1, seed) for seed in range(9)]
+    rows += [row_of("b", 0, True, 0.2, seed) for seed in range(9)]
     found = versus(rows, "b", "a")
     assert found.gap is not None
     assert found.gap.n == 1
 
 
-# --- orders -----------------------------------------------------------------------------------
+# --- specifications ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -378,9 +388,9 @@ def test_seeds_of_one_world_are_one_case() -> None:
         ({"seeds": 0}, "--seeds=0: out of range; give at least 1"),
     ],
 )
-def test_orders_that_cannot_be(changes: dict[str, Any], reason: str) -> None:
+def test_invalid_specs_are_refused(changes: dict[str, Any], reason: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        a_request(**changes)
+        spec_of(**changes)
     assert reason in str(caught.value)
 
 
@@ -394,44 +404,49 @@ def test_orders_that_cannot_be(changes: dict[str, Any], reason: str) -> None:
         ({"patience_s": math.inf}, "--patience=inf: out of range"),
     ],
 )
-def test_settings_that_cannot_be(changes: dict[str, Any], reason: str) -> None:
+def test_invalid_settings_are_refused(changes: dict[str, Any], reason: str) -> None:
     with pytest.raises(ConfigError) as caught:
         Setting(**changes)
     assert reason in str(caught.value)
 
 
 @pytest.mark.parametrize("text", ["", "a/b/c/d", "random-3/1/paper", "random-3/-1/paper/0"])
-def test_what_is_no_run(text: str) -> None:
+def test_texts_that_are_no_run(text: str) -> None:
     with pytest.raises(ConfigError, match="no run; give SUITE/WORLD/PLANNER/SEED"):
         read_run(text)
     assert read_run("random-3/1/paper/0") == Run("random-3", 1, "paper", 0)
 
 
 def test_perception_reaches_the_planner() -> None:
-    known = sweep(a_request(planners=("paper",), worlds=3)).rows
+    known = sweep(spec_of(planners=("paper",), worlds=3)).rows
     scan = sweep(
-        a_request(planners=("paper",), worlds=3, setting=Setting(perception="scan-12"))
+        spec_of(planners=("paper",), worlds=3, setting=Setting(perception="scan-12"))
     ).rows
     assert [row["length_m"] for row in known] != [row["length_m"] for row in scan]
 
 
-def test_a_directory_belongs_to_one_order(tmp_path: Path) -> None:
-    order = a_request()
-    open_store(tmp_path / "out", order)
-    open_store(tmp_path / "out", a_request())
+def test_a_directory_belongs_to_one_spec(tmp_path: Path) -> None:
+    spec = spec_of()
+    open_store(tmp_path / "out", spec)
+    open_store(tmp_path / "out", spec_of())
     for other, what in (
-        (replace(order, worlds=6), "worlds=5, now 6"),
-        (replace(order, planners=("paper",)), "planners=['paper', 'straight'], now ['paper']"),
-        (replace(order, oracle=True), "oracle=False, now True"),
-        (replace(order, setting=Setting(noise_m=0.1)), "setting="),
+        (replace(spec, worlds=6), "worlds=5, now 6"),
+        (replace(spec, planners=("paper",)), "planners=['paper', 'straight'], now ['paper']"),
+        (replace(spec, oracle=True), "oracle=False, now True"),
+        (replace(spec, setting=Setting(noise_m=0.1)), "setting="),
     ):
         with pytest.raises(OutputError) as caught:
             open_store(tmp_path / "out", other)
         assert what in str(caught.value)
 
 
-def test_parts_do_not_depend_on_who_computes_them() -> None:
-    names = [chunk.name for chunk in chunks_of(a_request(worlds=250, oracle=True))]
+@pytest.mark.parametrize("folder", PACKAGES)
+def test_the_code_digest_covers_every_folder(folder: str) -> None:
+    assert code_digest(folder) != code_digest(), "no sources found"
+
+
+def test_names_of_the_chunks() -> None:
+    names = [chunk.name for chunk in chunks_of(spec_of(worlds=250, oracle=True))]
     assert len(set(names)) == len(names)
     assert names[0] == "random-3-oracle-0-20"
     assert names[-3:] == [
@@ -440,41 +455,41 @@ def test_parts_do_not_depend_on_who_computes_them() -> None:
 
 
 def environment(name: str, _: None) -> str | None:
-    """A variable as the processes see it that work is done in."""
+    """An environment variable in the worker process."""
     return os.environ.get(name)
 
 
-def test_work_is_done_by_one_thread_whatever_the_workers_are_told(
+def test_workers_compute_with_one_thread(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Several would add up in another order: dask tells its workers to use one, others do not."""
+    """Several threads would change the sequence of sums; only dask limits its workers to one."""
     names = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"]
     for name in names:
         monkeypatch.setenv(name, "2")
     child = Worker()
     try:
-        assert list(child.ask(environment, tuple(names), None, 60.0)) == ["1", "1", "1"]
+        assert list(child.run(environment, tuple(names), None, 60.0)) == ["1", "1", "1"]
     finally:
         child.end()
 
 
-def test_one_child_makes_one_part_after_the_other() -> None:
-    first, second = chunks_of(a_request())
+def test_a_worker_computes_several_chunks() -> None:
+    first, second = chunks_of(spec_of())
     first.run()
-    child = worker._LOCAL.keeper
+    child = worker._LOCAL.worker
     second.run()
-    assert worker._LOCAL.keeper is child
+    assert worker._LOCAL.worker is child
     assert child.is_alive
 
 
-def test_a_planner_found_by_a_path_of_after_the_first_sweep(
+def test_a_planner_on_a_path_added_after_the_first_sweep(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "found_later.py").write_text(
         "from mfba_planner.planning.peers.straight_line import Straight as Later\n"
     )
-    before = sweep(a_request(planners=("straight",)))
+    before = sweep(spec_of(planners=("straight",)))
     monkeypatch.syspath_prepend(str(tmp_path))
-    after = sweep(a_request(planners=("found_later:Later",)))
+    after = sweep(spec_of(planners=("found_later:Later",)))
     same = [{**row, "planner": "straight"} for row in after.rows]
     assert sorted_hash(same) == sorted_hash(before.rows)

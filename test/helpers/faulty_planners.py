@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planners that go wrong, each in its own way, from tick 5 on."""
+"""Planners with a fault from tick 5 on, one kind per class."""
 
 import math
 import os
@@ -12,11 +12,11 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.peers.straight_line import Straight
 from mfba_planner.planning.planner_params import PlannerParams
 
-GOOD_TICKS = 5
+NORMAL_TICKS = 5
 
 
 class Faulty(Straight):
-    """Drives straight, then goes wrong."""
+    """Drives straight, then fails."""
 
     def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
         super().__init__(params, sensor, seed)
@@ -25,7 +25,7 @@ class Faulty(Straight):
     def plan(self, obs: Observation) -> Decision:
         decision = super().plan(obs)
         self.tick += 1
-        return decision if self.tick <= GOOD_TICKS else self.wrong(decision)
+        return decision if self.tick <= NORMAL_TICKS else self.wrong(decision)
 
     def wrong(self, decision: Decision) -> Any:
         raise NotImplementedError
@@ -64,7 +64,7 @@ class OneNumber(Faulty):
 
 
 class Hangs(Faulty):
-    """Not even a signal's exception gets it out of there; in world 1 only."""
+    """Hangs with seed 1, and ignores the exception of a signal."""
 
     def wrong(self, decision: Decision) -> Any:
         while self.seed == 1:
@@ -76,7 +76,7 @@ class Hangs(Faulty):
 
 
 class Dies(Faulty):
-    """As a fault in machine code would end it."""
+    """Ends its process with seed 1, as a crash in machine code would."""
 
     def wrong(self, decision: Decision) -> Any:
         if self.seed == 1:
@@ -85,7 +85,7 @@ class Dies(Faulty):
 
 
 class Sleeps(Faulty):
-    """Hangs until somebody wakes it."""
+    """Hangs until its sleep is interrupted."""
 
     def wrong(self, decision: Decision) -> Any:
         time.sleep(3600.0)

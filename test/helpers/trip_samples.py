@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs made by hand: one point per second, whoever may have chosen them."""
+"""Handmade runs: one point per second."""
 
 from typing import Any
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What each node is told, and what makes no sense to tell them."""
+"""RunConfig: the parameters of each node, and refused configurations."""
 
 import pytest
 
@@ -12,13 +12,13 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 CASE1 = load_scenario("case1")
 
 
-def test_lockstep_tells_the_planner_its_parameters_as_they_are() -> None:
-    told = node_parameters(RunConfig(scenario=CASE1, seed=5, speed_factor=0.1), NODES)
-    assert set(told) == set(NODES)
-    assert told["planner"].items() >= {**flatten(PlannerParams()), "seed": 5}.items()
-    assert all(told[name]["lockstep"] for name in NODES)
-    assert all(told[name]["wait_for"] == ",".join(NODES) for name in NODES)
-    assert told["world_sim"]["tick_ns"] == PlannerParams().tick_ns
+def test_in_lockstep_the_planner_gets_its_parameters_unchanged() -> None:
+    parameters = node_parameters(RunConfig(scenario=CASE1, seed=5, speed_factor=0.1), NODES)
+    assert set(parameters) == set(NODES)
+    assert parameters["planner"].items() >= {**flatten(PlannerParams()), "seed": 5}.items()
+    assert all(parameters[name]["lockstep"] for name in NODES)
+    assert all(parameters[name]["wait_for"] == ",".join(NODES) for name in NODES)
+    assert parameters["world_sim"]["tick_ns"] == PlannerParams().tick_ns
 
 
 @pytest.mark.parametrize(
@@ -26,13 +26,13 @@ def test_lockstep_tells_the_planner_its_parameters_as_they_are() -> None:
 )
 def test_in_slow_motion_inputs_are_stale_later(speed_factor: float, timeout_s: float) -> None:
     config = RunConfig(scenario=CASE1, real_time=True, speed_factor=speed_factor)
-    told = node_parameters(config, ())
-    assert told["planner"]["input_timeout_s"] == pytest.approx(timeout_s)
-    assert told["world_sim"]["speed_factor"] == speed_factor
-    assert not any(told[name]["lockstep"] for name in NODES)
+    parameters = node_parameters(config, ())
+    assert parameters["planner"]["input_timeout_s"] == pytest.approx(timeout_s)
+    assert parameters["world_sim"]["speed_factor"] == speed_factor
+    assert not any(parameters[name]["lockstep"] for name in NODES)
 
 
-def test_a_timeout_within_a_tick_makes_no_sense_in_real_time() -> None:
+def test_in_real_time_a_timeout_within_a_tick_is_refused() -> None:
     slow = PlannerParams(step_length_m=1.0, speed_mps=0.5)
     RunConfig(scenario=CASE1, planner=slow)
     with pytest.raises(ConfigError, match=r"^planner.input_timeout_s=1: a tick takes 2 s, so in"):

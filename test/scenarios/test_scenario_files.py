@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenario files: what is accepted, what is refused and how it is said, and the way back."""
+"""Scenario files: accepted and refused input, error messages, and the way back to JSON."""
 
 import json
 import math
@@ -40,7 +40,7 @@ def with_obstacle(changes: str) -> str:
     return f"{TASK}obstacles: [{{{changes}}}]"
 
 
-# --- accepted -------------------------------------------------------------------------------
+# --- accepted ---------------------------------------------------------------------------------
 
 
 def test_case_study_1_is_table_4() -> None:
@@ -71,7 +71,7 @@ def test_case_study_2_is_table_6() -> None:
 
 
 @pytest.mark.parametrize("name", ["case1", "case2", "empty", "kidnapped", "walled"])
-def test_every_shipped_scenario_has_its_name_and_can_be_won(name: str) -> None:
+def test_every_shipped_scenario_has_its_name_and_can_be_solved(name: str) -> None:
     scenario = load_scenario(name)
     assert scenario.name == name
     assert scenario.description
@@ -93,7 +93,7 @@ def test_numbers_as_people_write_them(text: str, value: float) -> None:
     assert parse_scenario(f"{TASK}time_limit_s: {text}", "x").time_limit_s == value
 
 
-def test_what_is_left_out_is_the_core_s_default() -> None:
+def test_missing_keys_have_the_defaults_of_the_dataclass() -> None:
     assert parse_scenario(TASK, "x") == Scenario(name="x", start_m=(0.0, 0.0), goal_m=(5.0, 5.0))
 
 
@@ -133,7 +133,7 @@ def test_a_goal_inside_an_obstacle_at_rest_is_allowed_and_never_reached() -> Non
     assert evaluate(episode).collisions == 0
 
 
-# --- where a scenario comes from ------------------------------------------------------------
+# --- where a scenario comes from --------------------------------------------------------------
 
 
 def test_files_names_and_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -149,7 +149,7 @@ def test_files_names_and_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert load_scenario(f"  \n{{{', '.join(TASK.split(chr(10)))}}}") == mine
 
 
-def test_a_shipped_name_is_not_confused_with_what_lies_about(
+def test_shipped_names_win_over_files_of_the_same_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shipped = load_scenario("case1")
@@ -181,7 +181,7 @@ def test_a_shipped_name_is_not_confused_with_what_lies_about(
         ("a\x00.json", "a\x00.json: not a text file; give a readable scenario .yaml"),
     ],
 )
-def test_what_cannot_be_found_or_read(
+def test_sources_that_cannot_be_found_or_read(
     source: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -200,7 +200,7 @@ def test_a_text_too_long_for_a_name_is_still_one_line() -> None:
         assert "\n" not in str(caught.value)
 
 
-# --- refused --------------------------------------------------------------------------------
+# --- refused ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("text", ["", "  \n\n", "# nothing yet\n", "---\n", "null"])
@@ -258,7 +258,7 @@ def test_not_yaml(text: str, problem: str) -> None:
         (TASK + "zzzz: 3", "zzzz: unknown key; known: description, goal_m, kidnappings, "
                            "name, obstacles, robot, robot_radius_m, robots, start_m, "
                            "time_limit_s, walls"),
-        # the misspelt key is named, not the one that it leaves out
+        # the misspelt key is named, not the one missing because of it
         ("name: x\nstart_m: [0, 0]\ngaol_m: [1, 1]",
          "gaol_m: unknown key; did you mean 'goal_m'?"),
         (with_obstacle("center_m: [4, 4], radius_m: 0.3, speed: 1"),
@@ -340,7 +340,7 @@ def test_what_is_not_a_finite_number(value: str, message: str) -> None:
         (TASK + "description: [1]", "description=[1]: refused; give a text"),
     ],
 )  # fmt: skip
-def test_values_out_of_place(text: str, message: str) -> None:
+def test_values_of_the_wrong_kind_or_range(text: str, message: str) -> None:
     assert refusal(text) == f": {message}"
 
 
@@ -363,11 +363,11 @@ def test_values_out_of_place(text: str, message: str) -> None:
          "heading_deg=90: heading_rad=1 is given as well; keep one of them"),
     ],
 )  # fmt: skip
-def test_tasks_that_make_no_sense(text: str, message: str) -> None:
+def test_invalid_tasks(text: str, message: str) -> None:
     assert refusal(text) == f": {message}"
 
 
-def test_inline_text_is_called_so() -> None:
+def test_messages_name_an_inline_scenario() -> None:
     with pytest.raises(ConfigError, match=r"^inline scenario: zzzz: unknown key; known: "):
         load_scenario('{"zzzz": 1}')
     with pytest.raises(ConfigError, match=r"^inline scenario: start_m.1=nan: refused; give a fin"):
@@ -375,7 +375,7 @@ def test_inline_text_is_called_so() -> None:
 
 
 @given(st.text())
-def test_no_text_at_all_raises_anything_else(text: str) -> None:
+def test_any_text_raises_config_error_only(text: str) -> None:
     with pytest.raises(ConfigError) as caught:
         parse_scenario(text, "my.yaml")
     assert "\n" not in str(caught.value)
@@ -397,13 +397,13 @@ def test_no_text_at_all_raises_anything_else(text: str) -> None:
         max_leaves=8,
     )
 )
-def test_no_data_at_all_raises_anything_else(data: Any) -> None:
+def test_any_data_raises_config_error_only(data: Any) -> None:
     with pytest.raises(ConfigError) as caught:
         parse_scenario(json.dumps(data), "my.yaml")
     assert "\n" not in str(caught.value)
 
 
-# --- the way back ---------------------------------------------------------------------------
+# --- back to JSON -----------------------------------------------------------------------------
 
 NUMBERS = st.floats(-1e6, 1e6)
 POSITIVE = st.floats(0.0, 1e6, exclude_min=True)
@@ -471,16 +471,16 @@ def test_json_and_back_is_the_same_scenario(scenario: Scenario) -> None:
     assert json.loads(text) == scenario_to_dict(scenario)
 
 
-def outcome(door: Callable[[dict[str, Any]], Scenario], data: dict[str, Any]) -> object:
-    """What comes of plain data: a scenario, or what is said of it."""
+def outcome(parse: Callable[[dict[str, Any]], Scenario], data: dict[str, Any]) -> object:
+    """The result of plain data: a scenario, or an error message."""
     try:
-        return door(data)
+        return parse(data)
     except ConfigError as error:
         return str(error).removeprefix("x: ")
 
 
 @given(scenarios())
-def test_the_short_way_for_what_programs_write_is_the_long_one(scenario: Scenario) -> None:
+def test_yaml_schema_accepts_what_programs_write(scenario: Scenario) -> None:
     assert outcome(checked, scenario_to_dict(scenario)) == scenario
 
 
@@ -491,27 +491,27 @@ ODD = st.sampled_from(
 
 
 @given(scenarios(), ODD, st.data())
-def test_what_is_not_as_programs_write_it_is_judged_by_the_long_way(
+def test_unusual_data_gives_the_same_result_as_yaml_schema(
     scenario: Scenario, odd: Any, data: st.DataObject
 ) -> None:
     plain = scenario_to_dict(scenario)
-    place: Any = plain
+    node: Any = plain
     while True:
-        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
-        key = data.draw(st.sampled_from(keys + ["another"] * isinstance(place, dict)))
-        deeper = key != "another" and isinstance(place[key], dict | list) and place[key]
+        keys = list(node) if isinstance(node, dict) else list(range(len(node)))
+        key = data.draw(st.sampled_from(keys + ["another"] * isinstance(node, dict)))
+        deeper = key != "another" and isinstance(node[key], dict | list) and node[key]
         if not deeper or data.draw(st.booleans()):
             break
-        place = place[key]
+        node = node[key]
     if key != "another" and data.draw(st.booleans()):
-        del place[key]
+        del node[key]
     else:
-        place[key] = odd
+        node[key] = odd
     text = json.dumps(plain)
     assert outcome(lambda _: parse_scenario(text, "x"), plain) == outcome(checked, plain)
 
 
-def test_what_explains_mistakes_is_not_loaded_for_what_programs_write() -> None:
+def test_pydantic_and_yaml_are_not_imported_for_what_programs_write() -> None:
     text = scenario_to_json(load_scenario("case2"))
     code = (
         "import sys\nfrom mfba_planner.scenarios.scenario_files import load_scenario\n"
@@ -544,7 +544,7 @@ def test_plain_data_is_plain() -> None:
     assert "turns" not in data["obstacles"][0]
 
 
-# --- turns ----------------------------------------------------------------------------------
+# --- turns ------------------------------------------------------------------------------------
 
 WITH_TURNS = """name: x
 start_m: [0, 0]
@@ -588,10 +588,10 @@ def test_obstacles_may_turn() -> None:
         ),
         (
             "at_s: 1, speed_mps: 1}, {at_s: 1, speed_mps: 2",
-            ": obstacle 1 turns: at_s=1 does not come after 1; give the turns in order of time",
+            ": obstacle 1 turns: at_s=1 does not come after 1; sort the turns by time",
         ),
     ],
 )
-def test_turns_that_make_no_sense_are_refused(turn: str, message: str) -> None:
+def test_invalid_turns_are_refused(turn: str, message: str) -> None:
     found = refusal(with_obstacle(f"center_m: [4, 4], radius_m: 1, turns: [{{{turn}}}]"))
     assert found.startswith(message)

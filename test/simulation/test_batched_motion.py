@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many obstacles at many moments at once: bit by bit what world.py says of each alone."""
+"""batched_motion equals obstacle_motion and contact, bit for bit."""
 
 import math
 from itertools import pairwise
@@ -19,7 +19,7 @@ SPEEDS, HEADINGS = st.floats(0.0, 3.0), st.floats(-10.0, 10.0)
 
 @st.composite
 def obstacles(draw: st.DrawFn) -> Obstacle:
-    """One that fits into ROOM, with or without turns."""
+    """An obstacle that fits into ROOM, with or without turns."""
     radius = draw(st.sampled_from([0.05, 0.3, 0.999]))
     times = sorted(draw(st.sets(st.floats(0.1, 20.0), max_size=3)))
     return Obstacle(
@@ -36,61 +36,59 @@ def obstacles(draw: st.DrawFn) -> Obstacle:
     )
 
 
-def scenario(some: list[Obstacle], walled: bool) -> Scenario:
+def scenario(crowd: list[Obstacle], walled: bool) -> Scenario:
     return Scenario(
         name="x",
         start_m=(-50.0, -50.0),
         goal_m=(0.0, 0.0),
-        obstacles=tuple(some),
+        obstacles=tuple(crowd),
         walls=ROOM if walled else None,
     )
 
 
 @settings(max_examples=150)
 @given(
-    some=st.lists(obstacles(), max_size=4),
+    crowd=st.lists(obstacles(), max_size=4),
     walled=st.booleans(),
     times=st.lists(st.floats(0.0, 100.0), min_size=1, max_size=5),
 )
-def test_centres_are_those_of_center_at(
-    some: list[Obstacle], walled: bool, times: list[float]
-) -> None:
-    world = scenario(some, walled)
+def test_centers_equal_center_at(crowd: list[Obstacle], walled: bool, times: list[float]) -> None:
+    world = scenario(crowd, walled)
     found = Motion(world).centers(np.array(times))
-    assert found.shape == (2, len(times), len(some))
+    assert found.shape == (2, len(times), len(crowd))
     for k, t in enumerate(times):
-        for i, obstacle in enumerate(some):
+        for i, obstacle in enumerate(crowd):
             assert tuple(found[:, k, i].tolist()) == center_at(obstacle, t, world.walls)
 
 
 @settings(max_examples=150)
 @given(
-    some=st.lists(obstacles(), min_size=1, max_size=4),
+    crowd=st.lists(obstacles(), min_size=1, max_size=4),
     walled=st.booleans(),
     start=st.floats(0.0, 30.0),
     durations=st.lists(st.floats(1e-3, 5.0), min_size=1, max_size=5),
     data=st.data(),
 )
-def test_gaps_are_those_of_step_clearances(
-    some: list[Obstacle],
+def test_gaps_equal_step_clearances(
+    crowd: list[Obstacle],
     walled: bool,
     start: float,
     durations: list[float],
     data: st.DataObject,
 ) -> None:
-    world = scenario(some, walled)
+    world = scenario(crowd, walled)
     times = [start]
     for duration in durations:
         times.append(times[-1] + duration)
-    place = st.tuples(st.floats(-3.0, 5.0), st.floats(0.0, 7.0))
-    places = [data.draw(place) for _ in times]
-    steps = Motion(world).steps(np.array(times), np.array(places).T)
-    for k, ((t0, a), (t1, b)) in enumerate(pairwise(zip(times, places))):
+    points = st.tuples(st.floats(-3.0, 5.0), st.floats(0.0, 7.0))
+    positions = [data.draw(points) for _ in times]
+    steps = Motion(world).steps(np.array(times), np.array(positions).T)
+    for k, ((t0, a), (t1, b)) in enumerate(pairwise(zip(times, positions))):
         assert steps.gap_m[k].tolist() == step_clearances(world, t0, t1, a, b)
-    for k, (t, place_m) in enumerate(zip(times, places)):
-        for i, obstacle in enumerate(some):
-            there = center_at(obstacle, t, world.walls)
-            dx, dy = there[0] - place_m[0], there[1] - place_m[1]
+    for k, (t, position) in enumerate(zip(times, positions)):
+        for i, obstacle in enumerate(crowd):
+            center = center_at(obstacle, t, world.walls)
+            dx, dy = center[0] - position[0], center[1] - position[1]
             assert steps.distance_m[k, i] == math.sqrt(dx * dx + dy * dy)
 
 
@@ -109,6 +107,6 @@ def test_a_room_without_room_to_move() -> None:
     assert steps.gap_m[:1].tolist() == expected
 
 
-def test_nobody_is_nowhere() -> None:
+def test_a_scenario_without_obstacles() -> None:
     found = Motion(scenario([], True)).steps(np.array([0.0, 1.0]), np.zeros((2, 2)))
     assert found.gap_m.shape == (1, 0)

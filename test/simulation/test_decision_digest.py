@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The digest: one form, every field of it, and a stored value that must not change unseen."""
+"""The decision digest: its form, its fields, and the stored digests of the case studies."""
 
 import hashlib
 import math
@@ -34,7 +34,7 @@ SAMPLE = Decision(
 
 
 def spelt_out() -> bytes:
-    """SAMPLE at tick 3, byte by byte, as the documentation says it."""
+    """SAMPLE at tick 3, byte by byte, as documented."""
     mode, reason = b"obstacle_avoidance", "säctor".encode()
     return b"".join(
         [
@@ -54,7 +54,7 @@ def spelt_out() -> bytes:
     )
 
 
-def test_the_form_is_the_documented_one() -> None:
+def test_the_canonical_form_is_as_documented() -> None:
     assert canonical(3, SAMPLE) == spelt_out()
     assert digest([SAMPLE]) == hashlib.sha256(HEAD + canonical(0, SAMPLE)).hexdigest()
 
@@ -87,7 +87,7 @@ def test_every_field_counts_to_the_last_bit(changed: dict[str, Any]) -> None:
     assert digest([replace(SAMPLE, **changed)]) != digest([SAMPLE])
 
 
-def test_order_and_number_of_ticks_count() -> None:
+def test_sequence_and_number_of_ticks_count() -> None:
     other = replace(SAMPLE, gap=1)
     found = {digest(ticks) for ticks in ([], [SAMPLE], [SAMPLE, other], [other, SAMPLE])}
     assert len(found) == 4
@@ -99,7 +99,7 @@ def test_every_nan_is_the_same(payload: bytes) -> None:
     assert digest([replace(SAMPLE, ranges_m=(0.25, math.inf, nan))]) == digest([SAMPLE])
 
 
-def test_what_the_bats_tried_is_not_a_decision() -> None:
+def test_candidates_are_not_in_the_digest() -> None:
     assert digest([replace(SAMPLE, candidates=())]) == digest([SAMPLE])
 
 
@@ -111,6 +111,6 @@ def test_what_the_bats_tried_is_not_a_decision() -> None:
     ],
 )
 def test_the_case_studies_keep_their_digests(scenario: str, expected: str) -> None:
-    """A change here is a change of what everybody's planner decides: say so in the CHANGELOG."""
+    """A change here changes the decisions of every user: note it in the CHANGELOG."""
     ticks = run_episode.run(load_scenario(scenario), seed=1).ticks
     assert digest(ticks) == expected

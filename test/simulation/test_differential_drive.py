@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A differential drive: the law, the base that obeys it, and how far both get together."""
+"""Differential drive: heading law, simulated base, and runs to the goal."""
 
 import math
 from dataclasses import replace
@@ -52,11 +52,11 @@ def decision(
     )
 
 
-def test_an_omnidirectional_base_is_told_the_velocity_itself() -> None:
+def test_the_command_of_an_omnidirectional_base_is_the_velocity() -> None:
     assert command(decision((0.3, -0.4)), Base(), TICK_NS) == (0.3, -0.4)
 
 
-def test_ahead_it_drives_and_aside_it_turns_first() -> None:
+def test_drives_ahead_but_turns_first_towards_a_side() -> None:
     assert track(decision((0.5, 0.0)), BASE, TICK_NS) == (0.5, 0.0)
     left = track(decision((0.0, 0.5)), BASE, TICK_NS)
     assert left.v == 0.0
@@ -67,16 +67,16 @@ def test_ahead_it_drives_and_aside_it_turns_first() -> None:
     assert track(decision((0.0, 0.0)), BASE, TICK_NS) == (0.0, 0.0)
 
 
-def test_half_as_far_aside_as_it_turns_first_it_drives_at_half_the_speed() -> None:
+def test_half_the_speed_at_half_of_turn_first_rad() -> None:
     u = 0.5  # m/s, slow enough for every limit
     wanted = (u * math.cos(0.4), u * math.sin(0.4))
-    told = track(decision(wanted), replace(BASE, turn_first_rad=0.8), TICK_NS)
-    assert told.v == pytest.approx(0.5 * u)
+    commanded = track(decision(wanted), replace(BASE, turn_first_rad=0.8), TICK_NS)
+    assert commanded.v == pytest.approx(0.5 * u)
     a, t = BASE.max_turn_accel_radps2, 0.1
-    assert told.omega == pytest.approx(a * (math.sqrt(t * t + 2.0 * 0.4 / a) - t))
+    assert commanded.omega == pytest.approx(a * (math.sqrt(t * t + 2.0 * 0.4 / a) - t))
 
 
-def test_behind_it_reverses_only_where_it_may() -> None:
+def test_reverses_only_where_allowed() -> None:
     back = track(decision((-0.5, 0.05)), BASE, TICK_NS)
     assert back.v < 0.0
     assert back.omega < 0.0
@@ -86,19 +86,17 @@ def test_behind_it_reverses_only_where_it_may() -> None:
 
 
 @given(left=st.floats(0.0, 100.0), a=st.floats(0.01, 100.0), held=st.floats(0.001, 2.0))
-def test_from_brakes_speed_one_stops_in_time(left: float, a: float, held: float) -> None:
+def test_the_speed_of_brake_stops_in_time(left: float, a: float, held: float) -> None:
     v = brake(left, a, held)
     assert v * held + v * v / (2.0 * a) == pytest.approx(left, rel=1e-6, abs=1e-9)
 
 
-@given(yaw=angles, v=st.floats(-2.0, 2.0), omega=st.floats(-3.0, 3.0), parts=st.integers(2, 50))
-def test_an_arc_is_the_same_in_one_piece_or_many(
-    yaw: float, v: float, omega: float, parts: int
-) -> None:
+@given(yaw=angles, v=st.floats(-2.0, 2.0), omega=st.floats(-3.0, 3.0), chunks=st.integers(2, 50))
+def test_an_arc_equals_its_pieces(yaw: float, v: float, omega: float, chunks: int) -> None:
     whole = arc(Pose2D(1.0, 2.0, yaw), v, omega, 0.4)
     pose = Pose2D(1.0, 2.0, yaw)
-    for _ in range(parts):
-        pose = arc(pose, v, omega, 0.4 / parts)
+    for _ in range(chunks):
+        pose = arc(pose, v, omega, 0.4 / chunks)
     assert (pose.x, pose.y) == pytest.approx((whole.x, whole.y), abs=1e-9)
     assert math.cos(pose.yaw - whole.yaw) == pytest.approx(1.0)
 
@@ -109,14 +107,14 @@ def test_a_quarter_of_a_circle() -> None:
 
 
 @given(
-    told=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0)),
+    commanded=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0)),
     v=st.floats(-1.0, 1.0),
     omega=st.floats(-2.84, 2.84),
 )
-def test_limits_hold_whatever_it_is_told(
-    told: tuple[float, float], v: float, omega: float
+def test_limits_hold_for_any_command(
+    commanded: tuple[float, float], v: float, omega: float
 ) -> None:
-    pose, now = apply_command(Pose2D(0.0, 0.0), Speeds(v, omega), told, BASE, TICK_NS)
+    pose, now = apply_command(Pose2D(0.0, 0.0), Speeds(v, omega), commanded, BASE, TICK_NS)
     assert abs(now.v) <= BASE.max_speed_mps
     assert abs(now.omega) <= BASE.max_turn_radps
     assert abs(now.v - v) <= BASE.max_accel_mps2 * 0.1 + 1e-9
@@ -126,7 +124,7 @@ def test_limits_hold_whatever_it_is_told(
 
 @pytest.mark.parametrize("goal", [(3.0, 0.0), (-3.0, 0.1), (0.0, -2.0), (-0.5, 0.5)])
 @pytest.mark.parametrize("reverse", [True, False])
-def test_it_arrives_and_stops_there(goal: tuple[float, float], reverse: bool) -> None:
+def test_the_robot_arrives_and_stops(goal: tuple[float, float], reverse: bool) -> None:
     robot = Robot(drive=Drive.DIFFERENTIAL, reverse=reverse)
     scenario = Scenario(name="x", start_m=(0.0, 0.0), goal_m=goal, robot=robot)
     params = PlannerParams(speed_mps=0.8, step_length_m=0.08)
@@ -138,7 +136,7 @@ def test_it_arrives_and_stops_there(goal: tuple[float, float], reverse: bool) ->
         assert distance(a.pose.position, b.pose.position) <= 0.08 + 1e-9
 
 
-def test_who_is_put_elsewhere_is_at_rest() -> None:
+def test_a_robot_placed_elsewhere_is_at_rest() -> None:
     scenario = replace(load_scenario("empty"), robot=Robot(drive=Drive.DIFFERENTIAL))
     world = World(scenario, TICK_NS, 0.02)
     world.step((1.0, 0.5))
@@ -148,13 +146,13 @@ def test_who_is_put_elsewhere_is_at_rest() -> None:
     assert world.pose == (5.0, 5.0, 1.0)
 
 
-def test_a_pose_is_read_as_a_message_carries_it() -> None:
+def test_a_pose_survives_a_message() -> None:
     pose = Pose2D(1.0, 2.0, 0.0)
     assert carried(pose) is pose
     assert carried(Pose2D(1.0, 2.0, 3.0)) == pytest.approx((1.0, 2.0, 3.0))
 
 
-def test_a_scenario_says_which_robot_and_says_it_again_alike() -> None:
+def test_the_robot_of_a_scenario_survives_a_round_trip() -> None:
     text = (
         "{name: x, start_m: [0.0, 0.0], goal_m: [1.0, 1.0], "
         "robot: {drive: differential, max_turn_radps: 1, lidar: {beams: 720}, "
@@ -188,7 +186,7 @@ def test_a_scenario_says_which_robot_and_says_it_again_alike() -> None:
         ("[1]", r"robot=\[1\]: refused"),
     ],
 )
-def test_a_robot_that_cannot_be_is_refused(robot: str, reason: str) -> None:
+def test_invalid_robots_are_refused(robot: str, reason: str) -> None:
     text = f"{{name: x, start_m: [0.0, 0.0], goal_m: [1.0, 1.0], robot: {robot}}}"
     with pytest.raises(ConfigError, match=f"^it: {reason}"):
         parse_scenario(text, "it")

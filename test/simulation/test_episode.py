@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core driver and what a run was worth: by hand, and over both case studies."""
+"""The core driver and the metrics of a run: worked examples, and both case studies."""
 
 import math
 from dataclasses import replace
@@ -28,10 +28,10 @@ STRAIGHT = 12.0 * math.sqrt(2.0)  # 16.9706 m
 TASK: dict[str, Any] = {"name": "x", "start_m": (0.0, 0.0), "goal_m": (4.0, 0.0)}
 
 
-# --- the world ------------------------------------------------------------------------------
+# --- the world --------------------------------------------------------------------------------
 
 
-def test_stamps_begin_with_one_tick() -> None:
+def test_stamps_start_at_one_tick() -> None:
     assert [stamp_of(k, 250) for k in (0, 1, 2)] == [250, 500, 750]
 
 
@@ -70,10 +70,10 @@ def test_a_world_ends_at_the_goal_or_at_the_time_limit() -> None:
     assert world.outcome() is Outcome.GOAL_REACHED, "the goal counts, if late"
 
 
-# --- the driver -----------------------------------------------------------------------------
+# --- the driver -------------------------------------------------------------------------------
 
 
-def test_the_driver_is_sense_decide_move() -> None:
+def test_the_driver_senses_decides_moves() -> None:
     scenario = load_scenario("case1")
     params, sensor = PlannerParams(speed_mps=0.7), SensorParams(sectors=8)
     episode = run(scenario, planner=params, sensor=sensor, seed=3)
@@ -94,7 +94,7 @@ def test_the_driver_is_sense_decide_move() -> None:
     assert episode.outcome is Outcome.GOAL_REACHED
 
 
-def test_defaults_are_those_of_section_6_2() -> None:
+def test_the_defaults_are_those_of_section_6_2() -> None:
     scenario = load_scenario("empty")
     episode = run(scenario)
     assert episode == run(scenario, planner=PlannerParams(), sensor=SensorParams(), seed=0)
@@ -102,13 +102,13 @@ def test_defaults_are_those_of_section_6_2() -> None:
     assert (plain.planner, plain.sensor) == (PlannerParams(), SensorParams())
 
 
-def test_the_same_seed_gives_the_same_episode_and_another_one_does_not() -> None:
+def test_equal_seeds_give_equal_episodes() -> None:
     scenario = load_scenario("case2")
     assert run(scenario, seed=4) == run(scenario, seed=4)
     assert run(scenario, seed=4).ticks != run(scenario, seed=5).ticks
 
 
-def test_without_obstacles_the_way_is_nearly_straight() -> None:
+def test_without_obstacles_the_path_is_nearly_straight() -> None:
     lengths = []
     for seed in range(20):
         episode = run(load_scenario("empty"), seed=seed)
@@ -158,21 +158,21 @@ def test_a_start_within_the_tolerance_of_the_goal_is_an_arrival() -> None:
     assert evaluate(episode).time_s == 0.0
 
 
-def test_a_run_can_be_ended_from_outside() -> None:
-    seen = []
+def test_go_on_ends_a_run() -> None:
+    ticks = []
 
     def go_on(world: World) -> bool:
-        seen.append(world.tick)
+        ticks.append(world.tick)
         return world.tick < 5
 
     episode = run(load_scenario("case1"), go_on=go_on)
-    assert seen == [0, 1, 2, 3, 4, 5]
+    assert ticks == [0, 1, 2, 3, 4, 5]
     assert len(episode.ticks) == 6
     assert episode.outcome is Outcome.INTERRUPTED
     assert not evaluate(episode).success
 
 
-# --- hand-made episodes ---------------------------------------------------------------------
+# --- hand-made episodes -----------------------------------------------------------------------
 
 PG, OA = Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE
 
@@ -230,15 +230,15 @@ def test_clearances_per_step_and_obstacle() -> None:
     assert (result.collisions, result.success) == (1, False)
 
 
-def test_the_first_step_begins_at_the_start_of_the_motion() -> None:
+def test_the_first_step_starts_at_t_0() -> None:
     runner = Obstacle(center_m=(0.0, 2.0), radius_m=0.5, speed_mps=1.0, heading_rad=0.0)
     episode = trip([(0.0, 0.0)] * 2, obstacles=(runner,))
     assert tick_clearances(episode) == [[2.0 - 0.8]]
 
 
 def test_two_contacts_with_one_obstacle_are_two_collisions() -> None:
-    there = [(0.0, 0.0), (2.0, 0.0), (4.0, 0.0)]  # through the post in both steps
-    episode = trip([*there, (6.0, 0.0), (4.0, 0.0), (2.0, 0.0)], obstacles=(post((2.0, 0.0)),))
+    through = [(0.0, 0.0), (2.0, 0.0), (4.0, 0.0)]  # through the post in both steps
+    episode = trip([*through, (6.0, 0.0), (4.0, 0.0), (2.0, 0.0)], obstacles=(post((2.0, 0.0)),))
     assert [row[0] < 0.0 for row in tick_clearances(episode)] == [True, True, False, False, True]
     assert evaluate(episode).collisions == 2
 
@@ -248,7 +248,7 @@ def test_each_obstacle_in_contact_counts() -> None:
     assert evaluate(trip([(0.0, 0.0), (4.0, 0.0)], obstacles=posts)).collisions == 2
 
 
-def test_to_touch_is_not_to_collide() -> None:
+def test_touching_is_not_a_collision() -> None:
     for radius, collisions in ((0.5, 0), (0.5 + 1e-10, 0), (0.5 + 1e-8, 1)):
         beside = post((2.0, 0.8), radius)
         result = evaluate(trip([(0.0, 0.0), (4.0, 0.0)], obstacles=(beside,)))
@@ -261,13 +261,13 @@ def test_success_needs_the_goal(outcome: Outcome) -> None:
     assert (result.success, result.outcome) == (False, outcome)
 
 
-def test_the_core_alone_knows_the_papers_method_only() -> None:
+def test_run_refuses_other_methods_than_the_papers() -> None:
     params = PlannerParams(method=Method.PREDICTIVE)
     with pytest.raises(ConfigError, match="method=predictive: not Algorithm 1"):
         run(load_scenario("case1"), planner=params)
 
 
-def test_encounters_in_order_of_time() -> None:
+def test_encounters_are_sorted_by_time() -> None:
     # SR 0.8 from the enlarged edge: 1.6 m from a centre
     posts = (post((6.0, 1.6)), post((3.0, -1.5)), post((0.0, 1.6000001)), post((6.0, -1.0)))
     episode = trip([(0.0, 0.0), (3.0, 0.0), (6.0, 0.0), (3.0, 0.0)], obstacles=posts)
@@ -289,7 +289,7 @@ def test_lengths_do_not_depend_on_how_python_sums() -> None:
     )
 
 
-# --- both case studies ----------------------------------------------------------------------
+# --- both case studies ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("algorithm", Algorithm)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several robots in one world: what they see, who touches whom, and that seeds say it all."""
+"""Fleets: what robots observe of each other, contacts between them, reproducibility by seed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,13 @@ from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
-from mfba_planner.simulation.fleet import Fleet, alone, robot_seed, run_fleet, way
+from mfba_planner.simulation.fleet import (
+    Fleet,
+    path_as_obstacle,
+    robot_seed,
+    run_fleet,
+    single_robot_scenario,
+)
 from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at
 from mfba_planner.simulation.planner_observations import Perception
 from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
@@ -56,7 +62,7 @@ def head_on(**more: Any) -> Scenario:
 
 
 class Blind:
-    """Drives straight on to its goal whatever it sees, at 1.5 m per tick."""
+    """Drives straight to its goal and ignores obstacles, 1.5 m per tick."""
 
     def __init__(self, seed: int) -> None:
         self.inner = make("straight", PlannerParams(step_length_m=1.5), seed=seed)
@@ -76,7 +82,7 @@ def test_two_robots_head_on_pass_each_other(seed: int) -> None:
 
 
 def test_algorithm_1_head_on_never_touches_but_may_go_on_side_by_side() -> None:
-    """Who evades to the same side as the other is beside him at the next tick as well."""
+    """Two robots that avoid to the same side stay side by side at every tick."""
     results = [evaluate(e) for seed in range(6) for e in run_fleet(head_on(), seed=seed)]
     assert not any(result.collisions for result in results)
     assert {result.outcome for result in results} == {Outcome.GOAL_REACHED, Outcome.TIME_LIMIT}
@@ -93,8 +99,8 @@ def test_ten_robots_swap_places_on_the_shipped_circle() -> None:
         assert episode.ticks[-1].mode is Mode.ARRIVED
 
 
-def test_a_contact_between_two_ticks_is_seen_by_both() -> None:
-    """They change places within one tick: apart at every tick, through each other between."""
+def test_a_contact_between_two_ticks_counts_for_both() -> None:
+    """They swap positions within one tick: apart at every tick, in contact between."""
     scenario = fleet_of(((-0.7, 0.0), (3.0, 0.0)), ((0.7, 0.0), (-3.0, 0.0)))
     params = PlannerParams(step_length_m=1.5)
     done = run_fleet(scenario, planner=params, path_planner=Blind)
@@ -108,15 +114,15 @@ def test_a_contact_between_two_ticks_is_seen_by_both() -> None:
         assert not result.success
 
 
-def test_who_has_arrived_is_still_in_the_way() -> None:
+def test_an_arrived_robot_remains_an_obstacle() -> None:
     scenario = fleet_of(((1.5, 0.0), (2.0, 0.0)), ((-4.0, 0.0), (6.0, 0.0)))
     near, far = run_fleet(scenario, path_planner=Blind, planner=PlannerParams(step_length_m=1.5))
     assert len(near.ticks) < len(far.ticks)
     assert evaluate(far).collisions == 1
-    assert evaluate(near).collisions == 0  # its own run was over
+    assert evaluate(near).collisions == 0  # its own run had ended
 
 
-def test_time_goes_on_around_who_has_arrived() -> None:
+def test_obstacles_keep_moving_around_an_arrived_robot() -> None:
     obstacle = Obstacle(center_m=(2.0, 0.0), radius_m=0.3, speed_mps=0.2, heading_rad=1.0)
     ends = (((0.0, 0.0), (0.3, 0.0)), ((0.0, 5.0), (8.0, 5.0)))
     fleet = Fleet(fleet_of(*ends, obstacles=(obstacle,)), TICK_NS, 0.01, 0)
@@ -124,20 +130,20 @@ def test_time_goes_on_around_who_has_arrived() -> None:
     assert fleet.running == [1]
     for _ in range(3):
         fleet.step({1: (0.1, 0.0)})
-    here = fleet.robot_worlds[0]
-    assert here.tick == fleet.tick == 4
-    _, circles = here.near(10.0)
+    arrived = fleet.robot_worlds[0]
+    assert arrived.tick == fleet.tick == 4
+    _, circles = arrived.near(10.0)
     assert circles[0][0] == pytest.approx(center_at(obstacle, 4 * TICK_NS * 1e-9))
 
 
-def test_the_others_are_where_they_went() -> None:
+def test_other_robots_are_obstacles_along_their_paths() -> None:
     done = run_fleet(load_scenario("swap"), seed=2)
     for episode in done:
         others = [e for e in done if e is not episode]
         for obstacle, other in zip(episode.scenario.obstacles, others, strict=True):
             for tick in other.ticks:
-                there = center_at(obstacle, other.time_s(tick.stamp_ns))
-                assert distance(there, tick.pose.position) < 1e-9
+                center = center_at(obstacle, other.time_s(tick.stamp_ns))
+                assert distance(center, tick.pose.position) < 1e-9
             last_s = other.time_s(other.ticks[-1].stamp_ns)
             assert (
                 distance(center_at(obstacle, last_s + 50.0), other.ticks[-1].pose.position) < 1e-9
@@ -155,8 +161,8 @@ def test_the_others_are_where_they_went() -> None:
         assert result.min_clearance_m == pytest.approx(min(map(min, gaps)), abs=1e-12)
 
 
-def test_an_episode_is_an_ordinary_one() -> None:
-    """Run again as the one robot among obstacles, it decides the same."""
+def test_an_episode_of_a_fleet_can_be_run_again() -> None:
+    """Run again as a single robot among obstacles, it decides the same."""
     for episode in run_fleet(head_on(), seed=3):
         text = scenario_to_json(episode.scenario)
         assert load_scenario(text) == episode.scenario
@@ -164,23 +170,23 @@ def test_an_episode_is_an_ordinary_one() -> None:
         assert digest(again.ticks) == digest(episode.ticks)
 
 
-def test_equal_seeds_equal_decisions_and_streams_of_their_own() -> None:
+def test_equal_seeds_give_equal_decisions_and_robots_have_own_seeds() -> None:
     scenario = load_scenario("swap")
-    one, same, other = (run_fleet(scenario, seed=seed) for seed in (5, 5, 6))
-    assert [digest(e.ticks) for e in one] == [digest(e.ticks) for e in same]
-    assert [digest(e.ticks) for e in one] != [digest(e.ticks) for e in other]
+    first, same, other = (run_fleet(scenario, seed=seed) for seed in (5, 5, 6))
+    assert [digest(e.ticks) for e in first] == [digest(e.ticks) for e in same]
+    assert [digest(e.ticks) for e in first] != [digest(e.ticks) for e in other]
     assert len({robot_seed(seed, n) for seed in range(50) for n in range(10)}) == 500
     assert all(0 <= robot_seed(seed, n) < 2**63 for seed in range(50) for n in range(10))
 
 
-def test_a_fleet_of_one_is_a_robot_alone() -> None:
+def test_a_fleet_of_one_equals_a_single_robot() -> None:
     case = load_scenario("case1")
     only = Member(name="a", start_m=case.start_m, goal_m=case.goal_m)
     (episode,) = run_fleet(replace(case, robots=(only,)), seed=4)
     assert digest(episode.ticks) == digest(run(case, seed=robot_seed(4, 0)).ticks)
 
 
-def test_obstacles_and_robots_are_seen_alike() -> None:
+def test_obstacles_and_robots_are_observed_alike() -> None:
     still = Obstacle(center_m=(0.0, 1.0), radius_m=0.2)
     scenario = fleet_of(((0.0, 0.0), (9.0, 0.0)), ((1.0, 0.0), (9.0, 5.0)), obstacles=(still,))
     fleet = Fleet(scenario, TICK_NS, 0.02)
@@ -192,13 +198,13 @@ def test_obstacles_and_robots_are_seen_alike() -> None:
     fleet.step({0: (0.0, 0.0), 1: (0.5, -0.25)})
     assert first.velocity(1) == pytest.approx((0.5, -0.25))
     assert second.velocity(1) == (0.0, 0.0)
-    seen = Perception("known")(first, SensorParams())
-    assert seen.circles is not None
-    assert [c.velocity_mps for c in seen.circles] == [(0.0, 0.0), first.velocity(1)]
+    obs = Perception("known")(first, SensorParams())
+    assert obs.circles is not None
+    assert [c.velocity_mps for c in obs.circles] == [(0.0, 0.0), first.velocity(1)]
 
 
 @pytest.mark.parametrize("beams", [0, 360])
-def test_a_lidar_sees_the_other_robots(beams: int) -> None:
+def test_a_lidar_detects_the_other_robots(beams: int) -> None:
     scenario = fleet_of(((0.0, 0.0), (9.0, 0.0)), ((1.5, 0.0), (9.0, 5.0)),
                         robot=Robot(lidar=Lidar(beams=beams)))  # fmt: skip
     scan = Fleet(scenario, TICK_NS, 0.02).robot_worlds[0].read().scan
@@ -218,21 +224,23 @@ def test_differential_robots_with_lidars_share_a_world() -> None:
 @given(
     st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.integers(1, 4)), max_size=12)
 )
-def test_a_way_goes_through_its_poses(stretches: list[tuple[float, float, int]]) -> None:
+def test_path_as_obstacle_passes_through_the_poses(
+    stretches: list[tuple[float, float, int]],
+) -> None:
     poses = [Pose2D(1.0, -2.0)]
     for vx, vy, ticks in stretches:
         for _ in range(ticks):
             poses.append(Pose2D(poses[-1].x + 0.1 * vx, poses[-1].y + 0.1 * vy))
-    obstacle = way(poses, 100_000_000, 0.3)
+    obstacle = path_as_obstacle(poses, 100_000_000, 0.3)
     for k, pose in enumerate(poses):
-        there = center_at(obstacle, k * 100_000_000 * 1e-9)
-        assert distance(there, pose.position) < 1e-9
-    # What moves by less than can be told from rounding may count as several stretches.
+        center = center_at(obstacle, k * 100_000_000 * 1e-9)
+        assert distance(center, pose.position) < 1e-9
+    # Motion as small as rounding errors may count as several stretches.
     if all(v == 0.0 or abs(v) > 1e-3 for vx, vy, _ in stretches for v in (vx, vy)):
         assert len(obstacle.turns) <= len(stretches) + 1
 
 
-def test_the_others_are_seen_and_remembered_in_the_scenario_s_order() -> None:
+def test_other_robots_are_in_scenario_sequence() -> None:
     scenario = load_scenario("swap")
     fleet = Fleet(scenario, TICK_NS, 0.02)
     starts = [member.start_m for member in scenario.robots]
@@ -243,7 +251,7 @@ def test_the_others_are_seen_and_remembered_in_the_scenario_s_order() -> None:
     assert [o.center_m for o in third.scenario.obstacles] == without_the_third
 
 
-def test_options_of_the_planner_count_in_a_fleet_without_a_brain_of_its_own() -> None:
+def test_planner_parameters_apply_to_a_fleet() -> None:
     params = PlannerParams(speed_limit=SpeedLimitParams(slow_within_m=0.8))
     own = run_fleet(head_on(), planner=params, seed=3)
     again = simulate_fleet(head_on(), planner=params, sensor=SensorParams(), seed=3)
@@ -251,13 +259,13 @@ def test_options_of_the_planner_count_in_a_fleet_without_a_brain_of_its_own() ->
     assert any("% speed so near" in tick.reason for e in own for tick in e.ticks)
 
 
-def test_scenario_files_name_robots_and_come_back_the_same() -> None:
+def test_a_fleet_scenario_survives_a_round_trip() -> None:
     scenario = load_scenario("swap")
     assert len(scenario.robots) == 10
     assert (scenario.start_m, scenario.goal_m) == ((6.0, 0.0), (-6.0, 0.0))
     assert load_scenario(scenario_to_json(scenario)) == scenario
     assert "robots" not in scenario_to_json(load_scenario("case1"))
-    assert alone(scenario, 1).start_m == scenario.robots[1].start_m
+    assert single_robot_scenario(scenario, 1).start_m == scenario.robots[1].start_m
 
 
 TWO = (((0.0, 0.0), (5.0, 0.0)), ((2.0, 0.0), (5.0, 5.0)))
@@ -294,7 +302,7 @@ TWO = (((0.0, 0.0), (5.0, 0.0)), ((2.0, 0.0), (5.0, 5.0)))
         (lambda: load_scenario('{"name": "x", "robots": []}'), "start_m: missing"),
     ],
 )
-def test_what_cannot_be_a_fleet(make_it: Any, what: str) -> None:
+def test_invalid_fleets_are_refused(make_it: Any, what: str) -> None:
     with pytest.raises(ConfigError) as caught:
         make_it()
     assert what in str(caught.value)
@@ -303,14 +311,14 @@ def test_what_cannot_be_a_fleet(make_it: Any, what: str) -> None:
 
 def test_sim_prints_a_row_per_robot_or_per_seed(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["sim", "swap"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert len(said) == 12
-    assert said[1].split()[:2] == ["robot0", "goal_reached"]
-    assert said[-1] == "10 of 10 robots at the goal without collision"
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 12
+    assert lines[1].split()[:2] == ["robot0", "goal_reached"]
+    assert lines[-1] == "10 of 10 robots at the goal without collision"
     assert cli.main(["sim", "swap", "--seeds", "2"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[1].split()[:4] == ["0", "10", "of", "10"]
-    assert said[-1] == "2 of 2 seeds with all robots at the goal without collision"
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].split()[:4] == ["0", "10", "of", "10"]
+    assert lines[-1] == "2 of 2 seeds with all robots at the goal without collision"
 
 
 PAPER = ("--planner", "paper")
@@ -318,14 +326,16 @@ PAPER = ("--planner", "paper")
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """`mfba run` of four robots: the whole graph, one call."""
-    place = tmp_path_factory.mktemp("fleet")
+    """`mfba run` of four robots: the whole graph in one call."""
+    directory = tmp_path_factory.mktemp("fleet")
     whole = load_scenario("swap")
-    some = replace(whole, robots=whole.robots[::5] + whole.robots[2::5])
-    file = place / "some.json"
-    file.write_text(scenario_to_json(some), encoding="utf-8")
-    assert cli.main(["run", str(file), *PAPER, "--seed", "3", "--out", str(place / "run")]) == 0
-    return place / "run"
+    four = replace(whole, robots=whole.robots[::5] + whole.robots[2::5])
+    file = directory / "some.json"
+    file.write_text(scenario_to_json(four), encoding="utf-8")
+    assert (
+        cli.main(["run", str(file), *PAPER, "--seed", "3", "--out", str(directory / "run")]) == 0
+    )
+    return directory / "run"
 
 
 def test_the_graph_decides_as_the_core_does(driven: Path) -> None:
@@ -353,14 +363,14 @@ def test_a_result_for_each_robot_and_one_picture(driven: Path) -> None:
     found = sorted(path.name for path in driven.iterdir())
     assert found == ["bag", *(f"robot{n}.json" for n in (0, 2, 5, 7)), "run.png"]
     core = run_fleet(load_scenario(str(driven.parent / "some.json")), seed=3)
-    told = read_result(driven / "robot0.json")
-    assert told["digest"] == digest(core[0].ticks)
-    assert told["result"]["success"]
-    assert told["extra"]["fleet_seed"] == 3
-    assert told["seed"] == robot_seed(3, 0)
+    result = read_result(driven / "robot0.json")
+    assert result["digest"] == digest(core[0].ticks)
+    assert result["result"]["success"]
+    assert result["extra"]["fleet_seed"] == 3
+    assert result["seed"] == robot_seed(3, 0)
 
 
-def test_what_knows_one_robot_only_says_so(driven: Path) -> None:
+def test_commands_for_one_robot_refuse_a_fleet(driven: Path) -> None:
     with pytest.raises(BagError, match="holds 4 robots, but this reads a bag of one"):
         read_episode(driven / "bag")
     for args, what in (

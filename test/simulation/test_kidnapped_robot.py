@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kidnapped robot: noticed, said, forgotten what no longer holds, and at the goal at last."""
+"""The kidnapped robot: detection, report, reset of the planner, arrival."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -53,13 +53,13 @@ def carried(episode: Episode) -> list[int]:
     return [k for k, tick in enumerate(episode.ticks) if is_jump_reason(tick.reason)]
 
 
-def played(scenario: Scenario, planner: PlannerParams) -> Episode:
+def simulated(scenario: Scenario, planner: PlannerParams) -> Episode:
     return simulate(scenario, planner=planner, sensor=SensorParams(), seed=1)
 
 
 @pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS)
-def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams) -> None:
-    episode = played(KIDNAPPED, planner)
+def test_both_kidnappings_are_detected_and_the_goal_is_reached(planner: PlannerParams) -> None:
+    episode = simulated(KIDNAPPED, planner)
     assert evaluate(episode).success
     noticed = carried(episode)
     times_s = [episode.time_s(episode.ticks[k].stamp_ns) for k in noticed]
@@ -73,19 +73,19 @@ def test_it_is_noticed_both_times_and_the_goal_is_reached(planner: PlannerParams
 
 
 @pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS)
-def test_afterwards_it_decides_as_one_that_knows_of_nothing(planner: PlannerParams) -> None:
-    """What a planner remembers must not outlive the jump: a fresh one decides the same."""
-    episode = played(KIDNAPPED, planner)
+def test_after_a_kidnapping_it_decides_as_a_fresh_planner(planner: PlannerParams) -> None:
+    """The planner resets its memory at an odometry jump: a new planner decides the same."""
+    episode = simulated(KIDNAPPED, planner)
     first, second = carried(episode)
     fresh = make_planner(planner, SensorParams(), seed=1)
     for tick in episode.ticks[first:second]:
-        seen = observe(tick.stamp_ns, tick.pose, tick.ranges_m, tick.goal, tick.pose)
-        own = fresh.plan(seen)
+        obs = observe(tick.stamp_ns, tick.pose, tick.ranges_m, tick.goal, tick.pose)
+        own = fresh.plan(obs)
         assert (own.waypoint, own.velocity, own.mode) == (tick.waypoint, tick.velocity, tick.mode)
 
 
-def test_being_carried_is_no_way_driven_and_no_contact() -> None:
-    post = Obstacle(center_m=(2.0, 3.0), radius_m=0.5)  # on the straight way of the carriers
+def test_a_kidnapping_adds_no_length_and_no_contact() -> None:
+    post = Obstacle(center_m=(2.0, 3.0), radius_m=0.5)  # on the straight line to the new position
     scenario = Scenario(
         name="x",
         start_m=(0.0, 0.0),
@@ -95,8 +95,8 @@ def test_being_carried_is_no_way_driven_and_no_contact() -> None:
     )
     episode = run(scenario, seed=2)
     (k,) = carried(episode)
-    places = [tick.pose.position for tick in episode.ticks]
-    steps = [distance(a, b) for a, b in zip(places, places[1:])]
+    positions = [tick.pose.position for tick in episode.ticks]
+    steps = [distance(a, b) for a, b in zip(positions, positions[1:])]
     result, run_motion = assess(episode)
     assert result.collisions == 0
     assert result.length_m == pytest.approx(sum(steps) - steps[k - 1])
@@ -114,7 +114,7 @@ def observe_sectors(stamp_ns: int, x: float) -> Any:
     jump_m=st.floats(0.05, 3.0),
 )
 @settings(max_examples=60)
-def test_only_what_cannot_have_been_driven_is_a_jump(
+def test_only_impossible_moves_are_an_odometry_jump(
     stretch: float, took_s: float, jump_m: float
 ) -> None:
     planner = Algorithm1(PlannerParams(jump_m=jump_m), seed=0)
@@ -127,7 +127,7 @@ def test_only_what_cannot_have_been_driven_is_a_jump(
         assert is_jump_reason(decision.reason) is (stretch > 1.0)
 
 
-def test_a_pose_that_was_refused_says_nothing_about_jumps() -> None:
+def test_a_refused_pose_is_no_odometry_jump() -> None:
     planner = Algorithm1(PlannerParams(), seed=0)
     planner.plan(observe_sectors(1, 0.0))
     refused = observe(2, "odom holds nan", FREE, (100.0, 0.0), Pose2D(50.0, 0.0))
@@ -141,23 +141,23 @@ def test_the_graph_is_kidnapped_as_the_core_is(tmp_path: Path, domain_id: int) -
     config = RunConfig(scenario=KIDNAPPED, seed=1, driver=Driver.IN_PROCESS)
     run_in_process(config, tmp_path / "bag", domain_id=domain_id)
     recorded = read_episode(tmp_path / "bag")
-    assert recorded.ticks == played(KIDNAPPED, PlannerParams()).ticks
+    assert recorded.ticks == simulated(KIDNAPPED, PlannerParams()).ticks
     assert len(carried(recorded)) == 2
     report = verify(tmp_path / "bag")
     assert report.is_identical, report.faults
 
 
 def start(graph: Graph, scenario: Scenario) -> WorldSim:
-    told = node_parameters(RunConfig(scenario=scenario, seed=6), peers=())
-    graph.start(VirtualSensor, told["virtual_sensor"])
-    planner = graph.start(PlannerNode, told["planner"])
-    world = graph.start(WorldSim, told["world_sim"])
+    parameters = node_parameters(RunConfig(scenario=scenario, seed=6), peers=())
+    graph.start(VirtualSensor, parameters["virtual_sensor"])
+    planner = graph.start(PlannerNode, parameters["planner"])
+    world = graph.start(WorldSim, parameters["world_sim"])
     graph.until(lambda: planner.goals.goal_queue.goal is not None)
     return world
 
 
 @pytest.mark.parametrize("drive", list(Drive))
-def test_initialpose_carries_the_robot_off_and_the_planner_says_so(
+def test_initialpose_moves_the_robot_and_the_planner_reports_it(
     graph: Graph, drive: Drive
 ) -> None:
     decisions = graph.hear(topics.DECISION)
@@ -170,9 +170,9 @@ def test_initialpose_carries_the_robot_off_and_the_planner_says_so(
     graph.until(lambda: world.over, timeout_s=60.0)
     graph.settle()
     assert world.world.outcome() is Outcome.GOAL_REACHED
-    said = [m.status[0] for m in decisions if is_jump_reason(m.status[0].message)]
-    assert len(said) == 1
-    assert said[0].level == b"\x01"
+    reports = [m.status[0] for m in decisions if is_jump_reason(m.status[0].message)]
+    assert len(reports) == 1
+    assert reports[0].level == b"\x01"
 
 
 @pytest.mark.parametrize(
@@ -181,12 +181,12 @@ def test_initialpose_carries_the_robot_off_and_the_planner_says_so(
         ("[{at_s: 1.0, to_m: [4, 4]}]", r"kidnapping to_m=\[4.0, 4.0\]: 0.6 m inside obstacle 1"),
         ("[{at_s: 0.0, to_m: [1, 1]}]", r"kidnappings.1.at_s=0.0: refused; give a number "),
         ("[{at_s: 2.0, to_m: [1, 1]}, {at_s: 2.0, to_m: [1, 1]}]",
-         r"kidnappings: at_s=2 does not come after 2; give the kidnappings in order of time"),
+         r"kidnappings: at_s=2 does not come after 2; sort the kidnappings by time"),
         ("[{at_s: 2.0, to: [1, 1]}]", r"kidnappings.1.to: unknown key; did you mean 'to_m'\?"),
         ("[{at_s: 2.0}]", r"kidnappings.1.to_m: missing"),
     ],
 )  # fmt: skip
-def test_kidnappings_that_cannot_be_are_refused(kidnappings: str, reason: str) -> None:
+def test_invalid_kidnappings_are_refused(kidnappings: str, reason: str) -> None:
     text = (
         "{name: x, start_m: [0, 0], goal_m: [9, 9], "
         f"obstacles: [{{center_m: [4, 4], radius_m: 0.3}}], kidnappings: {kidnappings}}}"
@@ -195,23 +195,23 @@ def test_kidnappings_that_cannot_be_are_refused(kidnappings: str, reason: str) -
         parse_scenario(text, "it")
 
 
-def test_kidnappings_are_written_and_read_again() -> None:
+def test_kidnappings_survive_a_round_trip() -> None:
     assert parse_scenario(scenario_to_json(KIDNAPPED), "again") == KIDNAPPED
 
 
-def free_place(rng: np.random.Generator, scenario: Scenario, t_s: float) -> Point:
+def free_point(rng: np.random.Generator, scenario: Scenario, t_s: float) -> Point:
     while True:
         x, y = rng.uniform(0.5, 11.5, size=2).tolist()
         if all(distance((x, y), c) > r + 0.3 for c, r in scenario.enlarged(t_s)):
             return (x, y)
 
 
-def test_wherever_and_whenever_it_arrives() -> None:
+def test_the_goal_is_reached_from_any_kidnapping() -> None:
     rng = np.random.default_rng(5)
     case = load_scenario("case1")
     for seed in range(10):
         at_s = float(rng.uniform(0.5, 20.0))
-        kidnapping = Kidnapping(at_s=at_s, to_m=free_place(rng, case, at_s))
+        kidnapping = Kidnapping(at_s=at_s, to_m=free_point(rng, case, at_s))
         episode = run(replace(case, kidnappings=(kidnapping,)), seed=seed)
         assert episode.outcome is Outcome.GOAL_REACHED
         assert len(carried(episode)) == 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who is near: nobody within reach is ever missing, wherever the robot is put."""
+"""NearbyObstacles: no obstacle within reach is missing, wherever the robot is."""
 
 import math
 
@@ -19,7 +19,7 @@ SR_M = 0.8
 @pytest.mark.parametrize(
     "name", ["random-3", "random-20", "random-30", "adversarial", "dynabarn-like"]
 )
-def test_nobody_within_reach_is_missing(name: str) -> None:
+def test_no_obstacle_within_reach_is_missing(name: str) -> None:
     scenario = suite(name).world(3)
     world, rng = World(scenario, 100_000_000, 0.02), np.random.default_rng(1)
     velocity, fewest = (0.6, 0.5), len(scenario.obstacles)
@@ -28,19 +28,19 @@ def test_nobody_within_reach_is_missing(name: str) -> None:
             world.pose = Pose2D(*rng.uniform(0.0, 12.0, 2).tolist())
         if k % 90 == 11:  # as a bag does
             world.tick = int(rng.integers(0, 300))
-        here = world.pose.position
-        everyone = scenario.enlarged(world.time_s)
-        within = [i for i, (c, r) in enumerate(everyone) if distance(here, c) - r <= SR_M]
+        position = world.pose.position
+        circles_now = scenario.enlarged(world.time_s)
+        within = [i for i, (c, r) in enumerate(circles_now) if distance(position, c) - r <= SR_M]
         which, circles = world.near(SR_M)
         assert set(within) <= set(which)
         assert which == sorted(which)
-        assert circles == [everyone[i] for i in which]
+        assert circles == [circles_now[i] for i in which]
         fewest = min(fewest, len(which))
         world.step(velocity)
     assert (fewest < len(scenario.obstacles)) == (len(scenario.obstacles) > FEW)
 
 
-def test_another_reach_is_another_question() -> None:
+def test_another_reach_selects_again() -> None:
     world = World(suite("random-30").world(3), 100_000_000, 0.02)
     few, all_of_them = world.near(0.1)[0], world.near(100.0)[0]
     assert len(few) < len(all_of_them) == 30
@@ -48,7 +48,7 @@ def test_another_reach_is_another_question() -> None:
 
 
 @pytest.mark.parametrize("x", [math.nan, math.inf])
-def test_a_place_that_is_none_is_near_to_all_so_that_sensing_refuses_it(x: float) -> None:
+def test_a_position_that_is_not_finite_is_near_to_all(x: float) -> None:
     world = World(suite("random-3").world(0), 100_000_000, 0.02)
     world.near(SR_M)
     world.pose = Pose2D(x, 0.0)

@@ -28,8 +28,8 @@ RADII = st.floats(0.05, 1.0)
 SPEEDS = st.floats(0.0, 2.0)
 HEADINGS = st.floats(-10.0, 10.0)
 TIMES = st.floats(0.0, 200.0)
-PLACES = st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
-FREE = st.builds(Obstacle, center_m=PLACES, radius_m=RADII, speed_mps=SPEEDS, heading_rad=HEADINGS)
+POINTS = st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
+FREE = st.builds(Obstacle, center_m=POINTS, radius_m=RADII, speed_mps=SPEEDS, heading_rad=HEADINGS)
 
 
 @st.composite
@@ -50,7 +50,7 @@ def mover(center: Point, degrees: float, speed: float = 1.0, radius: float = 0.5
 
 
 def stepwise(obstacle: Obstacle, walls: Walls, t: float, steps: int) -> Point:
-    """The same motion the naive way: move on, and turn round at a wall."""
+    """The same motion in small steps, reversed at walls."""
     position, velocity = list(obstacle.center_m), list(obstacle.velocity)
     for _ in range(steps):
         for axis in (0, 1):
@@ -64,7 +64,7 @@ def stepwise(obstacle: Obstacle, walls: Walls, t: float, steps: int) -> Point:
     return (position[0], position[1])
 
 
-# --- motion ---------------------------------------------------------------------------------
+# --- motion -----------------------------------------------------------------------------------
 
 
 def test_obstacle_1_of_case_study_1() -> None:
@@ -126,7 +126,7 @@ def test_walls_are_never_left(obstacle: Obstacle, t: float) -> None:
 
 
 @given(walled())
-def test_every_motion_starts_where_it_is_told_to(obstacle: Obstacle) -> None:
+def test_every_motion_starts_at_its_center(obstacle: Obstacle) -> None:
     assert center_at(obstacle, 0.0, ROOM) == center_at(obstacle, 0.0) == obstacle.center_m
 
 
@@ -146,7 +146,7 @@ def test_an_obstacle_that_fills_the_room_stays() -> None:
     assert bounce_times(obstacle, 0.0, 7.0, tight) == pytest.approx([6.5])
 
 
-# --- bounces --------------------------------------------------------------------------------
+# --- bounces ----------------------------------------------------------------------------------
 
 
 def test_bounce_times_by_hand() -> None:
@@ -175,14 +175,14 @@ def test_no_walls_or_no_motion_no_bounce() -> None:
     assert bounce_times(mover((0.0, 2.0), 0.0, speed=0.0), 0.0, 99.0, ROOM) == []
 
 
-def test_a_corner_is_one_bounce() -> None:
+def test_a_corner_is_a_single_bounce() -> None:
     square = Walls(lower_m=(0.0, 0.0), upper_m=(4.0, 4.0))
     obstacle = Obstacle(
         center_m=(2.0, 2.0), radius_m=0.5, speed_mps=1.0, heading_rad=math.radians(45.0)
     )
     times = bounce_times(obstacle, 0.0, 4.0, square)
     assert times == pytest.approx([1.5 * math.sqrt(2.0)] * len(times))
-    assert 1 <= len(times) <= 2, "twice at most, by rounding"
+    assert 1 <= len(times) <= 2, "at most twice, by rounding"
 
 
 @given(walled(), TIMES, st.floats(0.0, 20.0))
@@ -210,7 +210,7 @@ def test_at_a_bounce_the_obstacle_touches_a_wall(
         assert min(gaps) == pytest.approx(0.0, abs=1e-6)
 
 
-# --- turns ----------------------------------------------------------------------------------
+# --- turns ------------------------------------------------------------------------------------
 
 TURNS = st.lists(
     st.tuples(st.floats(0.01, 30.0), SPEEDS, HEADINGS),
@@ -221,7 +221,7 @@ TURNS = st.lists(
 
 
 def turner() -> Obstacle:
-    """East, then north twice as fast from 2 s on, at rest between 3 and 5 s, then west."""
+    """East; from 2 s on north at twice the speed; at rest from 3 to 5 s; then west."""
     return Obstacle(
         center_m=(0.0, 2.0),
         radius_m=0.5,
@@ -235,7 +235,7 @@ def turner() -> Obstacle:
 
 
 @pytest.mark.parametrize(
-    ("t", "place"),
+    ("t", "center"),
     [
         (0.0, (0.0, 2.0)),
         (-1.0, (-1.0, 2.0)),
@@ -246,8 +246,8 @@ def turner() -> Obstacle:
         (6.5, (0.5, 4.0)),
     ],
 )
-def test_turns_by_hand(t: float, place: Point) -> None:
-    assert center_at(turner(), t) == pytest.approx(place)
+def test_turns_by_hand(t: float, center: Point) -> None:
+    assert center_at(turner(), t) == pytest.approx(center)
     assert turner().top_speed_mps == 2.0
 
 
@@ -285,7 +285,7 @@ def test_between_two_kinks_motion_is_straight_and_joined(
             assert (vx, vy) == pytest.approx(expected, abs=1e-6)
 
 
-def test_at_a_wall_or_a_turn_the_velocity_is_the_one_that_follows() -> None:
+def test_at_a_wall_or_a_turn_the_velocity_is_the_later_one() -> None:
     east, west = mover((0.0, 2.0), 0.0), mover((0.0, 2.0), 180.0)
     assert velocity_at(east, 3.5, ROOM) == pytest.approx((-1.0, 0.0))
     assert velocity_at(west, 1.5, ROOM) == pytest.approx((1.0, 0.0))
@@ -308,7 +308,7 @@ def test_a_contact_just_at_a_turn_is_noticed() -> None:
     assert gap == pytest.approx([0.1 - 0.8])
 
 
-# --- contact --------------------------------------------------------------------------------
+# --- contact ----------------------------------------------------------------------------------
 
 
 def world(*obstacles: Obstacle, walls: Walls | None = None) -> Scenario:
@@ -346,7 +346,7 @@ def test_a_bounce_within_the_step_is_followed() -> None:
 
 def test_without_time_the_gap_is_that_of_the_moment() -> None:
     post = mover((2.0, 0.0), 0.0)
-    for end in ((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0)):  # wherever it is next
+    for end in ((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0)):  # for any end of the step
         assert step_clearances(world(post), 1.0, 1.0, (0.0, 0.0), end) == [3.0 - 0.8]
 
 
@@ -354,7 +354,7 @@ def test_no_obstacles_no_gaps() -> None:
     assert step_clearances(world(), 0.0, 1.0, (0.0, 0.0), (4.0, 0.0)) == []
 
 
-@given(walled(), TIMES, st.floats(0.01, 6.0), PLACES, PLACES, st.booleans())
+@given(walled(), TIMES, st.floats(0.01, 6.0), POINTS, POINTS, st.booleans())
 def test_clearance_against_dense_sampling(
     obstacle: Obstacle, t0: float, duration: float, start: Point, end: Point, closed: bool
 ) -> None:
@@ -367,12 +367,12 @@ def test_clearance_against_dense_sampling(
         samples.append(math.dist(robot, center_at(obstacle, t0 + s * duration, walls)))
     enlarged = obstacle.radius_m + 0.3
     (gap,) = step_clearances(world(obstacle, walls=walls), t0, t0 + duration, start, end)
-    way = math.dist(start, end) + obstacle.speed_mps * duration
+    travel_m = math.dist(start, end) + obstacle.speed_mps * duration
     assert gap <= min(samples) - enlarged + 1e-6
-    assert gap >= min(samples) - enlarged - way / n - 1e-6
+    assert gap >= min(samples) - enlarged - travel_m / n - 1e-6
 
 
-# --- scenarios ------------------------------------------------------------------------------
+# --- scenarios --------------------------------------------------------------------------------
 
 
 def test_defaults() -> None:
@@ -383,7 +383,7 @@ def test_defaults() -> None:
     assert (still.speed_mps, still.heading_rad) == (0.0, 0.0)
 
 
-def test_centres_and_enlarged_circles_in_scenario_order() -> None:
+def test_centers_and_enlarged_circles_as_in_the_scenario() -> None:
     first, second = mover((0.0, 3.0), 0.0), mover((1.0, 4.0), 90.0, radius=0.25)
     scenario = world(first, second)
     assert scenario.enlarged_radius(second) == 0.55
@@ -446,7 +446,7 @@ def test_obstacles_are_values(obstacle: Obstacle) -> None:
 
 
 @pytest.mark.parametrize("times", [(2.0, 1.0), (1.0, 1.0), (0.0,), (math.nan,)])
-def test_turns_out_of_order_are_refused(times: tuple[float, ...]) -> None:
+def test_turns_not_sorted_by_time_are_refused(times: tuple[float, ...]) -> None:
     post = Obstacle(
         center_m=(3.0, 3.0),
         radius_m=0.3,
@@ -454,4 +454,4 @@ def test_turns_out_of_order_are_refused(times: tuple[float, ...]) -> None:
     )
     message = refusal(obstacles=(mover((3.0, 1.0), 0.0), post))
     assert message.startswith("obstacle 2 turns: at_s=")
-    assert message.endswith("give the turns in order of time, the first after 0")
+    assert message.endswith("sort the turns by time, the first after 0")

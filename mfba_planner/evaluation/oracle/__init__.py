@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The oracle: the shortest collision-free trajectory with full knowledge, and certificates."""
+"""The oracle: shortest collision-free trajectory with full knowledge, and certificates."""
 
 from .independent_check import Fault, inspect
 from .solution import Certificate, Solution

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The independent check: nothing here shares a formula with core's motion or contact.
+"""The oracle's independent check: shares no formula with simulation's motion or contact.
 
-Obstacles are followed from event to event (a wall hit turns a velocity round, a turn replaces
-it) where core folds; contact is the sign of a quadratic where core projects onto a leg.
+Obstacles are followed from event to event (a wall reverses a velocity, a turn replaces it);
+simulation folds coordinates. The distance is the minimum of a quadratic; simulation projects onto
+a segment.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from ...simulation.scenario import Scenario
 from .solution import Waypoint
 
 Fault = str
-Piece = tuple[float, float, float, float, float, float]  # begin, end, x, y, vx, vy
+Piece = tuple[float, float, float, float, float, float]  # start, end, x, y, vx, vy
 
 SLACK = 1e-9
 
 
 def pieces(obstacle: Obstacle, walls: Walls | None, until_s: float) -> Iterator[Piece]:
-    """The obstacle's motion in [0, until_s], event by event; metres, seconds."""
+    """The obstacle's motion in [0, until_s] between events; metres, seconds."""
     (x, y), (vx, vy) = obstacle.center_m, _polar(obstacle.speed_mps, obstacle.heading_rad)
     t = 0.0
     due = list(obstacle.turns)
@@ -51,7 +52,7 @@ def _polar(speed: float, heading: float) -> tuple[float, float]:
 
 
 def _inwards(value: float, speed: float, low: float, high: float) -> tuple[float, float]:
-    """At a wall the speed points away from it; no room at all means no motion."""
+    """At a wall the speed points away from it; without room there is no motion."""
     if high <= low:
         return low, 0.0
     if value <= low + SLACK * 1e-3:
@@ -68,28 +69,28 @@ def _until_wall(value: float, speed: float, low: float, high: float) -> float:
 
 
 def clearance(scenario: Scenario, waypoints: Sequence[Waypoint]) -> float:
-    """Smallest gap (m) to any enlarged circle along straight legs; negative in contact."""
+    """Smallest gap (m) to any enlarged circle along straight segments; negative in contact."""
     smallest = math.inf
     for obstacle in scenario.obstacles:
         radius = obstacle.radius_m + scenario.robot_radius_m
         for piece in pieces(obstacle, scenario.walls, waypoints[-1].t_s):
             for a, b in pairwise(waypoints):
-                begin, end = max(piece[0], a.t_s), min(piece[1], b.t_s)
-                if begin <= end and a.t_s < b.t_s:
-                    smallest = min(smallest, _apart(a, b, piece, begin, end) - radius)
+                start, end = max(piece[0], a.t_s), min(piece[1], b.t_s)
+                if start <= end and a.t_s < b.t_s:
+                    smallest = min(smallest, _smallest_distance(a, b, piece, start, end) - radius)
     return smallest
 
 
-def _apart(a: Waypoint, b: Waypoint, piece: Piece, begin: float, end: float) -> float:
-    """Smallest distance in [begin, end]: the least value of A t^2 + B t + C, rooted."""
+def _smallest_distance(a: Waypoint, b: Waypoint, piece: Piece, start: float, end: float) -> float:
+    """Smallest distance in [start, end]: root of the minimum of A t^2 + B t + C."""
     since, _, x, y, vx, vy = piece
     ux, uy = (b.x - a.x) / (b.t_s - a.t_s), (b.y - a.y) / (b.t_s - a.t_s)
-    gx = (a.x + ux * (begin - a.t_s)) - (x + vx * (begin - since))
-    gy = (a.y + uy * (begin - a.t_s)) - (y + vy * (begin - since))
+    gx = (a.x + ux * (start - a.t_s)) - (x + vx * (start - since))
+    gy = (a.y + uy * (start - a.t_s)) - (y + vy * (start - since))
     A = (ux - vx) ** 2 + (uy - vy) ** 2
     B = 2.0 * (gx * (ux - vx) + gy * (uy - vy))
     C = gx * gx + gy * gy
-    span = end - begin
+    span = end - start
     least = min(C, (A * span + B) * span + C)
     if B < 0.0 and 2.0 * A * span > -B:
         least = C - B * B / (4.0 * A)
@@ -99,21 +100,21 @@ def _apart(a: Waypoint, b: Waypoint, piece: Piece, begin: float, end: float) -> 
 def inspect(
     scenario: Scenario, waypoints: Sequence[Waypoint], speed_mps: float
 ) -> tuple[float, Fault]:
-    """Smallest clearance (m) and what is wrong with a trajectory, "" for nothing.
+    """Smallest clearance (m) of a trajectory, and its fault ("" for none).
 
-    It has to lead from start to goal, from t = 0 on, at speed_mps on every leg (to 1e-6 of
-    it), within the scenario's time limit and without contact.
+    It must start at start_m at t = 0, end at goal_m within the time limit, keep speed_mps on
+    every segment (to 1e-6 of it) and have no contact.
     """
     if len(waypoints) < 2 or waypoints[0] != (0.0, *scenario.start_m):
-        return -math.inf, "does not begin at start_m at t = 0"
+        return -math.inf, "does not start at start_m at t = 0"
     if waypoints[-1].point != scenario.goal_m:
         return -math.inf, "does not end at goal_m"
     if waypoints[-1].t_s > scenario.time_limit_s:
         return -math.inf, f"ends after the time limit of {scenario.time_limit_s:g} s"
     for a, b in pairwise(waypoints):
-        way, time = math.hypot(b.x - a.x, b.y - a.y), b.t_s - a.t_s
-        if time < 0.0 or abs(way - speed_mps * time) > 1e-6 * speed_mps * time + SLACK:
-            return -math.inf, f"moves {way:.9g} m in {time:.9g} s at t = {a.t_s:.9g} s"
+        length_m, time_s = math.hypot(b.x - a.x, b.y - a.y), b.t_s - a.t_s
+        if time_s < 0.0 or abs(length_m - speed_mps * time_s) > 1e-6 * speed_mps * time_s + SLACK:
+            return -math.inf, f"moves {length_m:.9g} m in {time_s:.9g} s at t = {a.t_s:.9g} s"
     smallest = clearance(scenario, waypoints)
     if smallest < 0.0:
         return smallest, f"touches an enlarged circle ({-smallest:.3g} m inside)"

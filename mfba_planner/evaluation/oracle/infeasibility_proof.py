@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Proof that a goal cannot be reached: a sweep of all places where the robot might be.
+"""Proof that a goal cannot be reached: reachable grid cells over time.
 
-The sweep errs on the robot's side in everything: a cell counts as free unless it lies wholly
-inside a circle, circles are looked at only at the ticks of the time grid, every step is
-rounded up to whole cells, speeds from 0 to the robot's own are allowed, and whoever leaves
-the area may come back anywhere at any later time. What it cannot reach, nobody can.
+Every approximation favours the robot: a cell is free unless it lies wholly inside a circle,
+circles are tested only at the ticks of the time grid, every step is rounded up to whole cells,
+speeds from 0 to the robot's own are allowed, and a robot that leaves the area may return anywhere
+at any later time. So a goal that is not reached here cannot be reached at all.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 from ...simulation.scenario import Scenario
 from ...simulation.uniform_segments import UniformSegments
 
-GOAL_TOLERANCE_M = 0.05  # more than any planner of ours is granted
+GOAL_TOLERANCE_M = 0.05  # larger than the tolerance of any planner here
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReachParams:
-    """The grid of the proof."""
+    """Grid of the proof."""
 
     cell_m: float = 0.075
     step_s: float = 0.25
@@ -35,9 +35,9 @@ def unreachable(
     segments: UniformSegments,
     params: ReachParams | None = None,
 ) -> str:
-    """Why no trajectory at up to speed_mps can reach the goal, "" when that is not proven.
+    """Reason why no trajectory at up to speed_mps reaches the goal; "" when not proven.
 
-    legs must cover the scenario's time limit.
+    segments must cover the scenario's time limit.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -50,7 +50,7 @@ def unreachable(
     reached = np.hypot(xs[:, None] - sx, ys[None, :] - sy) <= half + 1e-9
     edge = np.zeros_like(reached)
     edge[[0, -1], :] = edge[:, [0, -1]] = True
-    # from anywhere in one cell to anywhere in another: centres apart by the way and a diagonal
+    # any point of one cell to any point of another: distance of centres plus a diagonal
     stride = (speed_mps * p.step_s + 2.0 * half) / p.cell_m + 1e-9
     outside = False
     for tick in range(1, math.ceil(scenario.time_limit_s / p.step_s) + 1):
@@ -59,7 +59,7 @@ def unreachable(
         reached = distance_transform_edt(~reached) <= stride
         if outside:
             reached |= edge
-        if (reached & goal).any() and not _shut(scenario, segments, before_s, now_s):
+        if (reached & goal).any() and not _goal_covered(scenario, segments, before_s, now_s):
             return ""
         reached &= ~_covered(xs, ys, segments, now_s, half)
         if not reached.any():
@@ -67,24 +67,26 @@ def unreachable(
     return f"goal_m cannot be reached within the time limit of {scenario.time_limit_s:g} s"
 
 
-def _shut(scenario: Scenario, segments: UniformSegments, begin_s: float, end_s: float) -> bool:
-    """Whether one circle holds the goal, tolerance included, all the time in between.
+def _goal_covered(
+    scenario: Scenario, segments: UniformSegments, start_s: float, end_s: float
+) -> bool:
+    """Whether one circle covers the goal with its tolerance during [start_s, end_s].
 
-    The distance to uniform motion is convex in t: it is largest at the ends of each leg.
+    The distance to uniform motion is convex in t: it is largest at the ends of a segment.
     """
     gx, gy = scenario.goal_m
-    meanwhile = (segments.t0 <= end_s) & (segments.t1 >= begin_s)
+    active = (segments.t0 <= end_s) & (segments.t1 >= start_s)
     furthest = np.zeros(len(segments.t0))
-    for t in (np.maximum(segments.t0, begin_s), np.minimum(segments.t1, end_s)):
+    for t in (np.maximum(segments.t0, start_s), np.minimum(segments.t1, end_s)):
         x, y = (
             segments.x + segments.vx * (t - segments.t0),
             segments.y + segments.vy * (t - segments.t0),
         )
         furthest = np.maximum(furthest, np.hypot(x - gx, y - gy))
-    holds = furthest + GOAL_TOLERANCE_M < segments.radius
+    covers = furthest + GOAL_TOLERANCE_M < segments.radius
     return any(
-        holds[(segments.obstacle == obstacle) & meanwhile].all()
-        for obstacle in set(segments.obstacle[meanwhile].tolist())
+        covers[(segments.obstacle == obstacle) & active].all()
+        for obstacle in set(segments.obstacle[active].tolist())
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a way that is free to the shortest one next to it: shortcuts, then via points that move."""
+"""Refine a free path to a locally shortest one: shortcuts, then optimised via points (SLSQP)."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 
 from ...simulation.obstacle_motion import Walls
 from ...simulation.uniform_segments import UniformSegments
-from .polyline import gaps, lengths, one_way_gaps, pair_gaps, within
+from .polyline import gaps, lengths, pair_gaps, path_gaps, within
 from .tangent_search import CLEAR_M
 
-_NEAR_M = 1.5  # obstacle legs further away are looked at only in the end
-_PAIR_M = 0.05  # pairs of legs closer than this are constraints
+_NEAR_M = 1.5  # obstacle segments further away are checked only in the end
+_PAIR_M = 0.05  # pairs of segments closer than this are constraints
 _BEND_RAD = 0.12  # a sharper bend becomes several: r a^3 / 12 longer than the arc
 _DIFFERENCE_M = 1e-7
-_MOST_POINTS = 40  # SLSQP's time grows with their cube; a way that has to wait has many
+_MAX_POINTS = 40  # SLSQP's time grows with their cube; a path that has to wait has many
 
 
 def refine(
-    way: np.ndarray, speed_mps: float, segments: UniformSegments, inside: Walls | None = None
+    path: np.ndarray, speed_mps: float, segments: UniformSegments, inside: Walls | None = None
 ) -> np.ndarray | None:
-    """The shortest free polyline (p, 2) found next to a way, None when the way is not free."""
-    if not _free(way, speed_mps, segments):
+    """The shortest free polyline (p, 2) found near a path; None when the path is not free."""
+    if not _free(path, speed_mps, segments):
         return None
-    best = _shortcut(way, speed_mps, segments)
+    best = _shortcut(path, speed_mps, segments)
     for split in (False, True):
         trial = _bend_finer(best) if split else best
         if trial is None:
@@ -44,10 +44,10 @@ def _free(points: np.ndarray, speed_mps: float, segments: UniformSegments) -> bo
 
 
 def _shortcut(points: np.ndarray, speed_mps: float, segments: UniformSegments) -> np.ndarray:
-    """Leave out via points, the one that saves most first, while the way stays free."""
+    """Remove via points, the one that saves most first, while the path stays free."""
     while len(points) > 2:
         k = np.arange(1, len(points) - 1)
-        trials = np.stack([np.delete(points, one, axis=0) for one in k])
+        trials = np.stack([np.delete(points, i, axis=0) for i in k])
         free = gaps(trials, speed_mps, segments).min(axis=(1, 2)) >= 0.0
         if not free.any():
             return points
@@ -57,21 +57,21 @@ def _shortcut(points: np.ndarray, speed_mps: float, segments: UniformSegments) -
 
 
 def _bend_finer(points: np.ndarray) -> np.ndarray | None:
-    """Put three via points in the place of every sharp bend; None without one."""
+    """Replace every sharp bend by three via points; None without one."""
     finer = [points[0]]
-    for before, here, after in zip(points, points[1:], points[2:]):
-        a, b = here - before, after - here
+    for before, point, after in zip(points, points[1:], points[2:]):
+        a, b = point - before, after - point
         la, lb = math.hypot(*a), math.hypot(*b)
         if la < 1e-6 or lb < 1e-6:
-            finer.append(here)
+            finer.append(point)
             continue
         bend = abs(math.atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]))
         if bend < _BEND_RAD:
-            finer.append(here)
+            finer.append(point)
             continue
-        back = min(0.3 * bend, 0.4 * la)  # about half the arc round a circle of 0.6 m
-        on = min(0.3 * bend, 0.4 * lb)
-        finer += [here - a * (back / la), here, here + b * (on / lb)]
+        before_m = min(0.3 * bend, 0.4 * la)  # about half the arc round a circle of 0.6 m
+        after_m = min(0.3 * bend, 0.4 * lb)
+        finer += [point - a * (before_m / la), point, point + b * (after_m / lb)]
     finer.append(points[-1])
     return np.array(finer) if len(finer) > len(points) else None
 
@@ -80,7 +80,7 @@ def _tighten(
     points: np.ndarray, speed_mps: float, segments: UniformSegments, inside: Walls | None
 ) -> np.ndarray | None:
     """Minimise the length over the via points (SLSQP); None when the result is not free."""
-    if not 2 < len(points) <= _MOST_POINTS:
+    if not 2 < len(points) <= _MAX_POINTS:
         return None
     near = gaps(points[None], speed_mps, segments)[0].min(axis=0) < _NEAR_M
     local = UniformSegments(*(column[near] for column in segments))
@@ -100,7 +100,7 @@ def _tighten(
 
 
 class _Problem:
-    """Length of a polyline with fixed ends, subject to the gaps of some pairs of legs."""
+    """Length of a polyline with fixed ends, subject to the gaps of some pairs of segments."""
 
     def __init__(
         self,
@@ -112,9 +112,8 @@ class _Problem:
     ) -> None:
         self.points, self.v, self.margin = points, speed_mps, margin
         self.rows, columns = np.nonzero(pairs)
-        self.segments = UniformSegments(
-            *(values[columns] for values in segments)
-        )  # one for each pair
+        # One segment for each pair.
+        self.segments = UniformSegments(*(values[columns] for values in segments))
         first, last = self.points[0].tolist(), self.points[-1].tolist()
         self._ends = [tuple(first)], [tuple(last)]
         self._plain = (
@@ -123,7 +122,7 @@ class _Problem:
         )
 
     def solve(self, inside: Walls | None) -> np.ndarray:
-        """The via points that SLSQP ends with, feasible or not."""
+        """The polyline at which SLSQP ends, feasible or not."""
         from scipy.optimize import minimize
 
         bounds = None
@@ -155,7 +154,7 @@ class _Problem:
         return float(lengths(self.full(x[None]))[0])
 
     def length_gradient(self, x: np.ndarray) -> np.ndarray:
-        """Of length(): at every via point, unit vector in minus unit vector out."""
+        """Gradient of length(): at every via point, unit vector in minus unit vector out."""
         step = np.diff(self.full(x[None])[0], axis=0)
         unit = step / np.maximum(np.sqrt((step * step).sum(axis=1)), 1e-9)[:, None]
         gradient: np.ndarray = (unit[:-1] - unit[1:]).ravel()
@@ -165,10 +164,10 @@ class _Problem:
         """Gaps of the pairs above the margin, metres."""
         (first, last), (rows, segments), via = self._ends, self._plain, x.tolist()
         points = first + list(zip(via[::2], via[1::2])) + last
-        return np.array(one_way_gaps(points, self.v, rows, segments)) - self.margin
+        return np.array(path_gaps(points, self.v, rows, segments)) - self.margin
 
     def slack_gradient(self, x: np.ndarray) -> np.ndarray:
-        """Of slack(), (pairs, via coordinates), by differences, all at once."""
+        """Gradient of slack(), (pairs, via coordinates), by finite differences."""
         trials = np.concatenate([x[None], x + _DIFFERENCE_M * np.eye(len(x))])
         slacks = self._slacks(trials)
         gradient: np.ndarray = ((slacks[1:] - slacks[0]) / _DIFFERENCE_M).T

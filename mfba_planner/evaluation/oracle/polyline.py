@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many trajectories at once: straight legs at constant speed against legs of obstacles."""
+"""Polylines at constant speed: lengths, and gaps to segments of obstacle motion; batched."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...core.geometry import Point
 from ...simulation.obstacle_motion import Walls
 from ...simulation.uniform_segments import UniformSegments
 
-Leg = tuple[float, float, float, float, float, float, float]  # Legs, but for the obstacle
+Segment = tuple[float, float, float, float, float, float, float]  # UniformSegments[:7]
 FAR_M = 9.0  # gap reported for a pair that never moves at the same time
 
 
@@ -24,42 +24,42 @@ def lengths(points: np.ndarray) -> np.ndarray:
 
 
 def gaps(points: np.ndarray, speed_mps: float, segments: UniformSegments) -> np.ndarray:
-    """Smallest gap (b, p - 1, m) in metres of every robot leg to every obstacle leg."""
-    x, y, begin, end, ux, uy = (column[:, :, None] for column in _edges(points, speed_mps))
-    return edge_gaps(x, y, begin, end, ux, uy, segments)
+    """Smallest gap (b, p - 1, m) in metres of every robot edge to every obstacle segment."""
+    x, y, start, end, ux, uy = (column[:, :, None] for column in _edges(points, speed_mps))
+    return edge_gaps(x, y, start, end, ux, uy, segments)
 
 
 def pair_gaps(
     points: np.ndarray, speed_mps: float, rows: np.ndarray, segments: UniformSegments
 ) -> np.ndarray:
-    """Smallest gap (b, m) of robot leg rows[k] to obstacle leg k only, the same bits as gaps()."""
-    x, y, begin, end, ux, uy = (column[:, rows] for column in _edges(points, speed_mps))
-    return edge_gaps(x, y, begin, end, ux, uy, segments)
+    """Smallest gap (b, m) of robot edge rows[k] to obstacle segment k, bit for bit as gaps()."""
+    x, y, start, end, ux, uy = (column[:, rows] for column in _edges(points, speed_mps))
+    return edge_gaps(x, y, start, end, ux, uy, segments)
 
 
-def one_way_gaps(
-    points: Sequence[Point], speed_mps: float, rows: Sequence[int], segments: Sequence[Leg]
+def path_gaps(
+    points: Sequence[Point], speed_mps: float, rows: Sequence[int], segments: Sequence[Segment]
 ) -> list[float]:
-    """pair_gaps() of one polyline in plain floats, the same bits.
+    """pair_gaps() of one polyline in plain floats, bit for bit.
 
-    Refinement asks for it most often, and arrays of a handful of numbers take ten times as long.
+    Refinement calls it most often; small arrays would take ten times as long.
     """
     edges, travelled = [], 0.0
     for (x, y), (x1, y1) in pairwise(points):
         dx, dy = x1 - x, y1 - y
-        way = math.sqrt(dx * dx + dy * dy)
-        travelled += way
-        end, per_m = travelled / speed_mps, speed_mps / max(way, 1e-12)
-        edges.append((x, y, end - way / speed_mps, end, dx * per_m, dy * per_m))
+        length = math.sqrt(dx * dx + dy * dy)
+        travelled += length
+        end, per_m = travelled / speed_mps, speed_mps / max(length, 1e-12)
+        edges.append((x, y, end - length / speed_mps, end, dx * per_m, dy * per_m))
     found = []
     for row, (t0, t1, ox, oy, vx, vy, radius) in zip(rows, segments):
-        x, y, begin, end, ux, uy = edges[row]
-        low = max(begin, t0)
+        x, y, start, end, ux, uy = edges[row]
+        low = max(start, t0)
         span = min(end, t1) - low
         if span < 0.0:
             found.append(FAR_M)
             continue
-        qx, qy, since, ahead = ux - vx, uy - vy, low - t0, low - begin
+        qx, qy, since, ahead = ux - vx, uy - vy, low - t0, low - start
         px = x + ux * ahead - ox - vx * since
         py = y + uy * ahead - oy - vy * since
         s = min(max(-(px * qx + py * qy) / max(qx * qx + qy * qy, 1e-300), 0.0), span)
@@ -70,34 +70,34 @@ def one_way_gaps(
 
 
 def _edges(points: np.ndarray, speed_mps: float) -> tuple[np.ndarray, ...]:
-    """The robot's legs, all (b, p - 1): x, y, begin, end, velocity."""
+    """The robot's edges, all (b, p - 1): x, y, start, end, velocity."""
     step = points[:, 1:] - points[:, :-1]
     dx, dy = step[:, :, 0], step[:, :, 1]
-    way = np.sqrt(dx * dx + dy * dy)
-    end = np.cumsum(way, axis=1) / speed_mps
-    begin = end - way / speed_mps
-    per_m = speed_mps / np.maximum(way, 1e-12)
-    return points[:, :-1, 0], points[:, :-1, 1], begin, end, dx * per_m, dy * per_m
+    length = np.sqrt(dx * dx + dy * dy)
+    end = np.cumsum(length, axis=1) / speed_mps
+    start = end - length / speed_mps
+    per_m = speed_mps / np.maximum(length, 1e-12)
+    return points[:, :-1, 0], points[:, :-1, 1], start, end, dx * per_m, dy * per_m
 
 
 def edge_gaps(
     x: np.ndarray,
     y: np.ndarray,
-    begin: np.ndarray,
+    start: np.ndarray,
     end: np.ndarray,
     ux: np.ndarray,
     uy: np.ndarray,
     segments: UniformSegments,
 ) -> np.ndarray:
-    """Smallest gap of robot legs (from x, y at begin, velocity u, until end) to obstacle legs.
+    """Smallest gap of robot edges (from x, y at start, velocity u, until end) to segments.
 
-    The m obstacle legs are broadcast over the robot's arrays: their last axis is 1, or m.
+    The m segments are broadcast over the robot's arrays, whose last axis is 1 or m.
     """
-    low = np.maximum(begin, segments.t0)
+    low = np.maximum(start, segments.t0)
     span = np.minimum(end, segments.t1) - low
     qx, qy = ux - segments.vx, uy - segments.vy
     since = low - segments.t0
-    ahead = low - begin
+    ahead = low - start
     px = x + ux * ahead - segments.x - segments.vx * since
     py = y + uy * ahead - segments.y - segments.vy * since
     qq = np.maximum(qx * qx + qy * qy, 1e-300)
@@ -110,7 +110,7 @@ def edge_gaps(
 
 
 def within(area: Walls | None, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Which points lie in a rectangle; all when there is none."""
+    """Which points lie in a rectangle; all of them without a rectangle."""
     if area is None:
         return np.ones(np.shape(x), dtype=bool)
     (x0, y0), (x1, y1) = area.lower_m, area.upper_m

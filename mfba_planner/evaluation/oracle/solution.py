@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the oracle hands out."""
+"""Results of the oracle: certificate, waypoints, solution."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ...core.geometry import Point
 
 
 class Certificate(Enum):
-    """What is known about a world for a robot of one speed."""
+    """Whether a world can be crossed by a robot of one speed."""
 
-    FEASIBLE = "feasible"  # a trajectory at constant speed is at hand, checked independently
-    INFEASIBLE = "infeasible"  # proven for a time grid: not even slowing and waiting help
+    FEASIBLE = "feasible"  # a trajectory at constant speed was found and checked independently
+    INFEASIBLE = "infeasible"  # proven on a time grid, also for slowing down and waiting
     UNDECIDED = "undecided"
 
 
 class Waypoint(NamedTuple):
-    """Where the robot is when, in seconds and metres."""
+    """A time and the robot's position, in seconds and metres."""
 
     t_s: float
     x: float

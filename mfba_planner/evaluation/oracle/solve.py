@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The oracle itself: straight line, tangents, refinement, proof, lattice, independent check."""
+"""Solve a world: straight line, tangent search, refinement, infeasibility proof, lattice."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...simulation.scenario import Scenario
 from ...simulation.uniform_segments import UniformSegments, uniform_segments
 from .independent_check import inspect
 from .infeasibility_proof import unreachable
-from .lattice_search import LatticeParams, lattice_ways
+from .lattice_search import LatticeParams, lattice_paths
 from .path_refinement import refine
 from .polyline import gaps, lengths
 from .solution import Certificate, Solution, Waypoint
@@ -36,13 +36,13 @@ def solve(
     """The shortest collision-free trajectory found at constant speed, with full knowledge.
 
     The robot may cross walls, as in every run; inside keeps its centre within a rectangle
-    (start and goal have to lie in it). Raises ConfigError for a speed that is none.
+    (start and goal have to lie in it). Raises ConfigError for a speed that is not above 0.
     """
     if not (math.isfinite(speed_mps) and speed_mps > 0.0):
         raise ConfigError(f"speed_mps={speed_mps}: no speed; give a number above 0")
     task = _Task(scenario, speed_mps, params or SearchParams(), inside)
     reason = ""
-    for points in task.ways():
+    for points in task.paths():
         waypoints = _timed(scenario, points, speed_mps)
         smallest, reason = inspect(scenario, waypoints, speed_mps)
         if not reason:
@@ -57,16 +57,16 @@ def solve(
         certificate=Certificate.INFEASIBLE if task.proof else Certificate.UNDECIDED,
         speed_mps=speed_mps,
         straight_m=task.straight_m,
-        reason=task.proof or reason or "no way found, and no proof that there is none",
+        reason=task.proof or reason or "no path found, and no proof that there is none",
     )
 
 
 def _timed(scenario: Scenario, points: np.ndarray, speed_mps: float) -> tuple[Waypoint, ...]:
-    """Waypoints along a polyline from t = 0 on; the ends are the scenario's own."""
-    places = [scenario.start_m, *map(tuple, points[1:-1].tolist()), scenario.goal_m]
+    """Waypoints along a polyline from t = 0 on; its ends are the scenario's start and goal."""
+    corners = [scenario.start_m, *map(tuple, points[1:-1].tolist()), scenario.goal_m]
     waypoints = [Waypoint(0.0, *scenario.start_m)]
     travelled = 0.0
-    for before, (x, y) in zip(places, places[1:]):
+    for before, (x, y) in zip(corners, corners[1:]):
         travelled += math.dist(before, (x, y))
         waypoints.append(Waypoint(travelled / speed_mps, x, y))
     return tuple(waypoints)
@@ -77,7 +77,7 @@ def _length(points: np.ndarray) -> float:
 
 
 class _Task:
-    """One world for one speed: what has been tried, what was found."""
+    """State of the search in one world for one speed."""
 
     def __init__(
         self, scenario: Scenario, speed_mps: float, params: SearchParams, inside: Walls | None
@@ -88,12 +88,12 @@ class _Task:
         self.active: set[int] = set()
         self.proof = ""
 
-    def ways(self) -> Iterator[np.ndarray]:
-        """Ways worth a check, the best first; each effort is made when the last one failed."""
+    def paths(self) -> Iterator[np.ndarray]:
+        """Candidate paths, best first; a costlier search runs only when the last one failed."""
         limit_s = self.scenario.time_limit_s
         straight_s = self.straight_m / self.v
         if straight_s > limit_s:
-            self.proof = f"the straight way alone takes {straight_s:g} s of {limit_s:g} s"
+            self.proof = f"the straight path alone takes {straight_s:g} s of {limit_s:g} s"
             return
         horizon_s = min(limit_s, 1.5 * straight_s + 5.0)
         segments = uniform_segments(self.scenario, horizon_s)
@@ -103,14 +103,14 @@ class _Task:
             return
         self.active |= touched
         if found := self._refined(self._by_tangents(segments), segments):
-            yield from self._seconded(found, segments)
+            yield from self._compared_with_lattice(found, segments)
             return
         segments = uniform_segments(self.scenario, limit_s)
         self.proof = unreachable(self.scenario, self.v, segments)
         if self.proof:
             return
         if horizon_s < limit_s and (found := self._refined(self._by_tangents(segments), segments)):
-            yield from self._seconded(found, segments)
+            yield from self._compared_with_lattice(found, segments)
             return
         for times in (1.25, 2.5, 5.0):
             until_s = min(limit_s, times * straight_s)
@@ -118,47 +118,49 @@ class _Task:
                 yield from found
                 return
 
-    def _refined(self, ways: list[np.ndarray], segments: UniformSegments) -> list[np.ndarray]:
-        """The ways, refined, the best first."""
-        tried = (refine(way, self.v, segments, self.inside) for way in ways)
+    def _refined(self, paths: list[np.ndarray], segments: UniformSegments) -> list[np.ndarray]:
+        """The refined paths, shortest first."""
+        tried = (refine(path, self.v, segments, self.inside) for path in paths)
         return sorted((points for points in tried if points is not None), key=_length)
 
-    def _seconded(self, ways: list[np.ndarray], segments: UniformSegments) -> list[np.ndarray]:
-        """Ask the lattice too where the tangents' way is long.
+    def _compared_with_lattice(
+        self, paths: list[np.ndarray], segments: UniformSegments
+    ) -> list[np.ndarray]:
+        """The paths, and those of the lattice search where the tangent path is long.
 
-        Such a robot is early for a gap that opens, and how it spends the time it has left is
-        what tangents know least about.
+        A long path often has to wait for a gap to open; the tangent search handles waiting
+        poorly.
         """
-        best_m = _length(ways[0])
+        best_m = _length(paths[0])
         if best_m <= _LONG * self.straight_m:
-            return ways
+            return paths
         params = _FINE if best_m <= _VERY_LONG * self.straight_m else _COARSE
         others = self._refined(self._by_lattice(segments, best_m / self.v, params), segments)
-        return sorted([*ways, *others], key=_length)
+        return sorted([*paths, *others], key=_length)
 
-    def _touched(self, way: np.ndarray, segments: UniformSegments) -> set[int]:
-        """Obstacles that a way runs into."""
-        gap = gaps(way[None], self.v, segments)[0]
+    def _touched(self, path: np.ndarray, segments: UniformSegments) -> set[int]:
+        """Obstacles that a path touches."""
+        gap = gaps(path[None], self.v, segments)[0]
         return set(segments.obstacle[(gap < CLEAR_M / 2.0).any(axis=0)].tolist())
 
     def _by_tangents(self, segments: UniformSegments) -> list[np.ndarray]:
-        """Shortest ways among a few obstacles; whom the best one touches joins them.
+        """Shortest paths among active obstacles; obstacles the best one touches become active.
 
-        What is shortest among some obstacles and free of all is shortest among all.
+        A path shortest among some obstacles and free of all is shortest among all.
         """
         start, goal = self.scenario.start_m, self.scenario.goal_m
         while True:
-            some = segments.of(sorted(self.active))
-            ways = Search(start, goal, self.v, some, self.params, self.inside).ways()
-            if not ways:
+            subset = segments.select(sorted(self.active))
+            paths = Search(start, goal, self.v, subset, self.params, self.inside).paths()
+            if not paths:
                 return []
-            touched = self._touched(ways[0], segments)
+            touched = self._touched(paths[0], segments)
             if not touched - self.active:
-                return [way for way in ways if not self._touched(way, segments)]
+                return [path for path in paths if not self._touched(path, segments)]
             self.active |= touched
 
     def _by_lattice(
         self, segments: UniformSegments, limit_s: float, params: LatticeParams
     ) -> list[np.ndarray]:
         start, goal = self.scenario.start_m, self.scenario.goal_m
-        return lattice_ways(start, goal, self.v, segments, limit_s, params, self.inside)
+        return lattice_paths(start, goal, self.v, segments, limit_s, params, self.inside)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Long computations in parts: resumable, anywhere, the same whoever computes them."""
+"""Studies: long computations in chunks; resumable, on any executor, with the same result."""

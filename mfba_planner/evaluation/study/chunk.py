@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a study is made of: parts that can be computed anywhere with the same result."""
+"""Chunk: a unit of work of a study, computed in any process with the same result."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-Columns = Mapping[str, list[Any]]  # of equal lengths; whole and other numbers, text
+Columns = Mapping[str, list[Any]]  # of equal lengths; int, float, str
 
 
 class Chunk(Protocol):
-    """Some work of a study; it travels to a worker and its columns come back."""
+    """A unit of work of a study; it is pickled to a worker, which returns its columns."""
 
     @property
     def name(self) -> str:
-        """Name of its own within the study, fit for a file."""
+        """Unique name within the study, usable as a file name."""
 
     @property
     def cost(self) -> float:
-        """Time it takes, in about milliseconds, for a progress bar."""
+        """Estimated time in milliseconds, for a progress bar."""
 
     def facts(self) -> Mapping[str, Any]:
-        """What decides the numbers, as plain values."""
+        """All inputs that determine the result, as plain values."""
 
     def run(self) -> Columns:
         """Compute it."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finished parts on disk: written whole, checked when read, of one study and one version."""
+"""Finished chunks of a study on disk: written atomically, checked when read, of one version."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ANOTHER = "give another --out"
 
 
 class Store:
-    """A directory of finished parts that an interrupted study goes on from."""
+    """A directory of finished chunks, from which an interrupted study is resumed."""
 
     def __init__(
         self,
@@ -34,9 +34,9 @@ class Store:
         command: str,
         packages: Sequence[str],
     ) -> None:
-        """Open or make it; OutputError when it is of another version, study or kind.
+        """Open or create it. Raises OutputError for results of another version, study or command.
 
-        command names the study to users; packages are the folders whose code decides the numbers.
+        command is named in messages; packages are the folders whose code determines the results.
         """
         self.directory = directory
         folder = directory / CHUNKS
@@ -55,18 +55,18 @@ class Store:
             ) from None
 
     def read(self, chunk: Chunk) -> Columns | None:
-        """A finished part; None when it is not there or not whole, and so to be computed."""
+        """The columns of a chunk; None when missing or damaged."""
         return read_chunk(self.directory, chunk.name)
 
     def write(self, chunk: Chunk, columns: Columns) -> None:
-        """Keep a finished part; what stood in its place was not whole."""
+        """Write a finished chunk; replaces a damaged file."""
         path = self.directory / CHUNKS / f"{chunk.name}.json"
         path.unlink(missing_ok=True)
         write_new(path, _text({"columns": columns, "sha256": digest(columns)}))
 
 
 def read_chunk(directory: Path, name: str) -> Columns | None:
-    """The finished part of that name; None when it is not there or not whole."""
+    """The columns of the chunk of that name; None when missing or damaged."""
     try:
         data = json.loads((directory / CHUNKS / f"{name}.json").read_text(encoding="utf-8"))
         columns: Columns = data["columns"]
@@ -79,7 +79,7 @@ def read_chunk(directory: Path, name: str) -> Columns | None:
 def manifest(
     chunks: Sequence[Chunk], facts: Mapping[str, Any], packages: Sequence[str]
 ) -> dict[str, Any]:
-    """All that decides the numbers: versions, the code itself, what is run with what."""
+    """All that determines the results: versions, code digest, facts, chunks."""
     return {
         "schema_version": SCHEMA_VERSION,
         "mfba_planner": __version__,
@@ -92,7 +92,7 @@ def manifest(
 
 
 def read_manifest(directory: Path, command: str) -> dict[str, Any]:
-    """What a directory of results says of itself. Raises OutputError."""
+    """Read the manifest of a directory of results. Raises OutputError."""
     try:
         found = json.loads((directory / MANIFEST).read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
@@ -126,8 +126,8 @@ def digest(data: Any) -> str:
 
 @cache
 def code_digest(*packages: str) -> str:
-    """SHA-256 over the sources in some folders of this package, those inside them included."""
-    root = Path(__file__).parents[1]
+    """SHA-256 over the sources in some folders of mfba_planner, recursively."""
+    root = Path(__file__).parents[2]
     found = hashlib.sha256()
     for path in sorted(path for name in packages for path in (root / name).rglob("*.py")):
         found.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts computed by any concurrent.futures executor; by default processes of this machine."""
+"""Compute chunks on any concurrent.futures executor; by default on local processes."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .chunk import Chunk, Columns
 from .chunk_store import Store
 
 MAX_WORKERS = 256
-TRIES = 3  # of a part whose worker dies
+TRIES = 3  # of a chunk whose worker dies
 
 P = TypeVar("P", bound=Chunk)
 Done = Callable[[P], None]
 
 
 class WorkerDied(Exception):  # noqa: N818
-    """The process that computed a part has gone; the part may be computed elsewhere."""
+    """The process that computed a chunk died; the chunk may be computed again."""
 
 
 def check_workers(workers: int) -> None:
-    """Raise ConfigError for a number of workers that cannot be."""
+    """Raise ConfigError for a number of workers out of range."""
     if not 1 <= workers <= MAX_WORKERS:
         raise ConfigError(f"--workers={workers}: out of range; give 1 to {MAX_WORKERS}")
 
@@ -44,12 +44,12 @@ def compute(
     done: Done[P] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Columns]:
-    """Compute (or read back) every part; {name of the part: its columns}.
+    """Compute (or read from the store) every chunk: {name of the chunk: its columns}.
 
-    done hears of each part, in no certain order; say of each worker that died. Whatever ends
-    this early leaves the parts that were finished in the store. An executor is used as it is
-    and left open; workers counts otherwise. Raises ConfigError for a number of workers that
-    cannot be, MfbaError for a part whose workers died TRIES times.
+    done is called with each finished chunk, in any sequence; say with a message when a worker
+    died. An early end leaves the finished chunks in the store. A given executor is left open,
+    and workers is ignored. Raises ConfigError for workers out of range, MfbaError for a chunk
+    whose worker died TRIES times.
     """
     check_workers(workers)
     found: dict[str, Columns] = {}
@@ -76,37 +76,37 @@ def _computed(
         yield from ((chunk, chunk.run()) for chunk in chunks)
         return
     died: Counter[str] = Counter()
-    left = {chunk.name: chunk for chunk in chunks}
-    while left:
-        suspects = [chunk for chunk in left.values() if died[chunk.name]]
-        # What was under way when a worker died is tried again alone: then it is known.
-        batch = suspects[:1] or list(left.values())
+    remaining = {chunk.name: chunk for chunk in chunks}
+    while remaining:
+        suspects = [chunk for chunk in remaining.values() if died[chunk.name]]
+        # Chunks that ran when a worker died are tried again one by one, to find the cause.
+        batch = suspects[:1] or list(remaining.values())
         for chunk, outcome in _batch(batch, workers, executor):
             if isinstance(outcome, WorkerDied):
                 died[chunk.name] += 1
-                _report(chunk, died[chunk.name], alone=len(batch) == 1, say=say)
+                _report(chunk, died[chunk.name], single=len(batch) == 1, say=say)
             else:
-                del left[chunk.name]
+                del remaining[chunk.name]
                 yield chunk, outcome
 
 
-def _report(chunk: Chunk, times: int, *, alone: bool, say: Callable[[str], None]) -> None:
-    if alone and times >= TRIES:
+def _report(chunk: Chunk, times: int, *, single: bool, say: Callable[[str], None]) -> None:
+    if single and times >= TRIES:
         raise MfbaError(
             f"{chunk.name}: a worker process died {times} times on it (out of memory?); run again "
-            "with fewer --workers, finished parts are kept"
+            "with fewer --workers; finished chunks are kept"
         )
-    say(f"{chunk.name}: its worker process may have died; trying it again alone")
+    say(f"{chunk.name}: its worker process may have died; running it again alone")
 
 
 def _batch(
     chunks: Sequence[P], workers: int, executor: Executor | None
 ) -> Iterator[tuple[P, Columns | WorkerDied]]:
-    """Ends early where a worker has died: of what was not yet begun nothing is told."""
+    """Ends early after a worker died: chunks that were not started have no result."""
     if executor is not None:
         yield from _gathered(chunks, executor, len(chunks))
         return
-    # Spawned, not forked: the parent may have threads, and every platform does the same.
+    # Spawned, not forked: the parent may have threads; and the same on every platform.
     workers = min(workers, len(chunks))
     own = ProcessPoolExecutor(
         workers,
@@ -116,7 +116,7 @@ def _batch(
     try:
         yield from _gathered(chunks, own, workers + 1)
     except BaseException:
-        # A worker that a Ctrl-C met while it started may never end; what it does is not needed.
+        # A worker interrupted by Ctrl-C while starting may hang; its results are not needed.
         for child in multiprocessing.active_children():
             child.kill()
         raise
@@ -127,7 +127,7 @@ def _batch(
 def _gathered(
     chunks: Sequence[P], executor: Executor, at_once: int
 ) -> Iterator[tuple[P, Columns | WorkerDied]]:
-    """Hand out at_once parts, and one more for each that comes back."""
+    """Submit at_once chunks, and one more for each that finishes."""
     waiting = iter(chunks)
     running: dict[Future[Columns], P] = {}
     died = False
@@ -158,13 +158,13 @@ def _outcome(future: Future[Columns]) -> Columns | WorkerDied:
 
 
 def belong_to_the_parent() -> None:
-    """Leave Ctrl-C, which reaches all processes of a terminal, to the parent; end with it."""
+    """Worker set-up: ignore Ctrl-C, which the parent handles; exit when the parent dies."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
 
 
 def _end_with_the_parent() -> None:
-    """Idle workers of a parent that was killed would wait for ever."""
+    """Exit when the parent does: idle workers of a killed parent would wait for ever."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Worlds without number: seeded generators and the suites they are known by."""
+"""Suites: named, seeded generators of worlds."""
 
 from .named_suites import Suite, suite, suite_names
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hostile worlds: obstacles placed and aimed at the robot's straight trip.
+"""Adversarial worlds: obstacles aimed at the robot's straight trip.
 
-Nothing here reacts: every motion is a closed-form function of t, aimed beforehand at where a
-robot that goes straight would be. All are slower than the robot and, with the margins chosen
-here, a way past them nearly always exists; the oracle says where not.
+No obstacle reacts: every motion is a closed-form function of t, aimed at where a robot on the
+straight line would be. All are slower than the robot, and with the margins chosen here a free path
+nearly always exists; the oracle certifies it.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from ...simulation.obstacle_motion import Obstacle, Turn
 from .trip import OBSTACLE_RADIUS_M, ROBOT_RADIUS_M, Trip, leaves_room
 
 ENLARGED_M = OBSTACLE_RADIUS_M + ROBOT_RADIUS_M
-_MARGIN_M = 0.3  # room around start and goal at t = 0
+_MARGIN_M = 0.3  # free space around start and goal at t = 0
 _SPEEDS = (0.25, 0.6)  # of the obstacles, as shares of the robot's speed
 
 Family = Callable[[Trip, np.random.Generator], Iterator[Obstacle]]
 
 
 def pincers(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
-    """Pairs that come from both sides and shut where the robot would be at that moment."""
+    """Pairs that come from both sides and meet where the robot would be at that time."""
     pairs = int(rng.integers(2, 5))
     for number in range(pairs):
         t = trip.time_s * (number + rng.uniform(0.4, 0.9)) / pairs
@@ -38,7 +38,7 @@ def pincers(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
 
 
 def streams(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
-    """Lanes of traffic across the way, in both directions, with gaps hardly wide enough."""
+    """Lanes of traffic across the straight trip, in both directions, with narrow gaps."""
     lanes = int(rng.integers(2, 5))
     for number in range(lanes):
         along = trip.length_m * (number + rng.uniform(0.5, 0.9)) / lanes
@@ -46,7 +46,7 @@ def streams(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
         speed = trip.speed_mps * rng.uniform(*_SPEEDS)
         heading = trip.heading(-side * math.pi / 2.0 + rng.uniform(-0.3, 0.3))
         spacing = rng.uniform(1.5, 2.8)
-        # who passes the middle of the lane between 6 s before and after the robot
+        # obstacles that cross the trip from about 6 s before to 6 s after the robot
         middle = trip.beside(along, 0.0)
         t = along / trip.speed_mps
         phase = rng.uniform(0.0, 1.0)
@@ -56,7 +56,7 @@ def streams(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
 
 
 def chasers(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
-    """Hunters that aim anew every 1.5 s at where the robot's straight trip can be met."""
+    """Obstacles that aim every 1.5 s at where they can meet the robot's straight trip."""
     for _ in range(int(rng.integers(4, 8))):
         side = 1.0 if rng.random() < 0.5 else -1.0
         center = trip.beside(rng.uniform(2.0, trip.length_m - 1.0), side * rng.uniform(1.0, 4.0))
@@ -67,13 +67,13 @@ def chasers(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
 def _chaser(trip: Trip, center: Point, speed: float, rng: np.random.Generator) -> Obstacle:
     every_s, end_s = 1.5, 1.5 * trip.time_s
     segments: list[Turn] = []
-    here, t = center, 0.0
+    position, t = center, 0.0
     while t < end_s:
-        heading = _lead(trip, here, t, speed) + rng.normal(0.0, math.radians(8.0))
+        heading = _lead(trip, position, t, speed) + rng.normal(0.0, math.radians(8.0))
         segments.append(
             Turn(at_s=t, speed_mps=speed, heading_rad=math.remainder(heading, math.tau))
         )
-        here, t = towards(here, heading, speed * every_s), t + every_s
+        position, t = towards(position, heading, speed * every_s), t + every_s
     return Obstacle(
         center_m=center,
         radius_m=OBSTACLE_RADIUS_M,
@@ -83,18 +83,18 @@ def _chaser(trip: Trip, center: Point, speed: float, rng: np.random.Generator) -
     )
 
 
-def _lead(trip: Trip, here: Point, t: float, speed: float) -> float:
-    """Heading to the first point of the trip that can be reached in time, or at the robot."""
+def _lead(trip: Trip, position: Point, t: float, speed: float) -> float:
+    """Heading to the first point of the trip reachable in time, else to the robot."""
     ahead = t
     while ahead < trip.time_s:
-        if distance(here, trip.at(ahead)) <= speed * (ahead - t):
-            return bearing(here, trip.at(ahead))
+        if distance(position, trip.at(ahead)) <= speed * (ahead - t):
+            return bearing(position, trip.at(ahead))
         ahead += 0.1
-    return bearing(here, trip.at(t))
+    return bearing(position, trip.at(t))
 
 
 def corridor(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
-    """Two rows of posts along the way, with somebody coming towards the robot between them."""
+    """Two rows of posts along the trip, with obstacles coming towards the robot between them."""
     half = rng.uniform(1.3, 1.8)
     for k in range(12):
         for side in (1.0, -1.0):
@@ -107,7 +107,7 @@ def corridor(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
 
 
 def closing_gap(trip: Trip, rng: np.random.Generator) -> Iterator[Obstacle]:
-    """Two rows that slide together across the way; the gap shuts about when the robot comes."""
+    """Two rows that close across the trip, at about the time the robot arrives."""
     along = rng.uniform(5.0, 12.0)
     shut_s = along / trip.speed_mps * rng.uniform(0.6, 1.2)
     speed = trip.speed_mps * rng.uniform(*_SPEEDS)
@@ -128,7 +128,9 @@ FAMILIES: dict[str, Family] = {
 }
 
 
-def hostile(family: str, trip: Trip, rng: np.random.Generator) -> tuple[Obstacle, ...]:
+def adversarial_obstacles(
+    family: str, trip: Trip, rng: np.random.Generator
+) -> tuple[Obstacle, ...]:
     """The obstacles of a world of this family, without those too near start or goal at t = 0."""
     return tuple(
         obstacle

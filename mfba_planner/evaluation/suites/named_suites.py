@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Named suites: world k of a suite is the same whatever else is generated."""
+"""The named suites; world k of a suite depends only on the suite, its seed and k."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from ...core.errors import ConfigError
 from ...core.options import did_you_mean
 from ...simulation.scenario import Scenario
-from .adversarial_worlds import FAMILIES, hostile
+from .adversarial_worlds import FAMILIES, adversarial_obstacles
 from .random_crowds import CrowdParams, Motion, crowd
 from .trip import ROOM, Trip, scenario
 
@@ -24,23 +24,23 @@ _Make = Callable[["Suite", int, float], Scenario]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Suite:
-    """Worlds 0, 1, 2, ... of one kind; number is the suite's own place in the seeds."""
+    """Worlds 0, 1, 2, ... of one kind; number is the suite's own index in the seeds."""
 
     name: str
     description: str
     number: int
     make: _Make
-    distinct: int | None = None  # how many differ; None: all
+    distinct: int | None = None  # number of different worlds; None: all differ
     seed: int = 0
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Travel to another process by name: how worlds are made cannot be pickled."""
+        """Pickle by name, as `make` cannot be pickled."""
         return suite, (self.name, self.seed)
 
     def world(self, k: int, speed_mps: float = SPEED_MPS) -> Scenario:
-        """World k for a robot of this speed (only hostile worlds depend on it).
+        """World k for a robot of this speed (only adversarial worlds depend on it).
 
-        Raises ConfigError for a negative k or a speed that is no speed.
+        Raises ConfigError for a negative k, or a speed that is not above 0.
         """
         if k < 0:
             raise ConfigError(f"k={k}: negative; worlds are counted from 0")
@@ -49,7 +49,7 @@ class Suite:
         return self.make(self, self.world_number(k), speed_mps)
 
     def world_number(self, k: int) -> int:
-        """The smallest number with the same world as k: repeats differ in the planner's seed."""
+        """The smallest number with the same world as k; repeats differ in the planner's seed."""
         return k if self.distinct is None else k % self.distinct
 
     def stream(self, k: int) -> np.random.Generator:
@@ -60,7 +60,7 @@ class Suite:
 
 
 def suite(name: str, seed: int = 0) -> Suite:
-    """Return the suite of this name; ConfigError with the nearest name for an unknown one."""
+    """The suite of this name. Raises ConfigError, with the nearest name, for an unknown one."""
     if name not in _SUITES:
         raise ConfigError(f"{name!r}: no such suite; {did_you_mean(name, list(_SUITES))}")
     if seed < 0:
@@ -69,7 +69,7 @@ def suite(name: str, seed: int = 0) -> Suite:
 
 
 def suite_names() -> list[str]:
-    """Names of all suites, in the order in which they are reported."""
+    """Names of all suites, as listed in reports."""
     return list(_SUITES)
 
 
@@ -85,16 +85,16 @@ def _paper(_: Suite, k: int, __: float) -> Scenario:
 def _crowd(params: CrowdParams) -> _Make:
     walls = ROOM if params.walled else None
 
-    def make(of: Suite, k: int, _: float) -> Scenario:
-        return scenario(f"{of.name}-{k}", crowd(params, of.stream(k)), walls)
+    def make(source: Suite, k: int, _: float) -> Scenario:
+        return scenario(f"{source.name}-{k}", crowd(params, source.stream(k)), walls)
 
     return make
 
 
-def _adversarial(of: Suite, k: int, speed_mps: float) -> Scenario:
+def _adversarial(source: Suite, k: int, speed_mps: float) -> Scenario:
     family = list(FAMILIES)[k % len(FAMILIES)]
-    obstacles = hostile(family, Trip(speed_mps=speed_mps), of.stream(k))
-    return scenario(f"{of.name}-{k}-{family}", obstacles)
+    obstacles = adversarial_obstacles(family, Trip(speed_mps=speed_mps), source.stream(k))
+    return scenario(f"{source.name}-{k}-{family}", obstacles)
 
 
 _DENSE = CrowdParams(
@@ -112,7 +112,7 @@ _DYNABARN = CrowdParams(
 )
 
 
-# A suite's number is for ever: another one would be another suite.
+# Never change a suite's number: it would change its worlds.
 _ALL = (
     Suite(
         name="paper",
@@ -138,7 +138,7 @@ _ALL = (
     ),
     Suite(
         name="adversarial",
-        description="in turn: " + ", ".join(FAMILIES),
+        description="cycling through " + ", ".join(FAMILIES),
         number=102,
         make=_adversarial,
     ),
@@ -149,4 +149,4 @@ _ALL = (
         make=_crowd(_DYNABARN),
     ),
 )
-_SUITES = {one.name: one for one in _ALL}
+_SUITES = {entry.name: entry for entry in _ALL}

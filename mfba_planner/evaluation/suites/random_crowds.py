@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random crowds: obstacles anywhere, with random radii, headings, speeds and turns."""
+"""Random crowds: obstacles with random positions, radii, headings, speeds and turns."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Motion(Enum):
     """How the obstacles of a crowd move."""
 
     STATIC = "static"
-    UNIFORM = "uniform"  # constant velocity in the open, bouncing between walls
+    UNIFORM = "uniform"  # constant velocity, bouncing between walls
     PIECEWISE = "piecewise"  # new heading and speed every few seconds
 
 
@@ -39,10 +39,10 @@ class CrowdParams:
     speed_min_mps: float = option(0.1, "lowest speed", unit="m/s", minimum=0.0, maximum=100.0)
     speed_max_mps: float = option(0.3, "highest speed", unit="m/s", minimum=0.0, maximum=100.0)
     motion: Motion = option(Motion.UNIFORM, "how the obstacles move")
-    static_share: float = option(0.0, "share that stands still", minimum=0.0, maximum=1.0)
+    static_share: float = option(0.0, "share of obstacles at rest", minimum=0.0, maximum=1.0)
     walled: bool = option(True, "whether walls reflect the obstacles")
     margin_m: float = option(
-        0.1, "room around start and goal at t = 0", unit="m", minimum=0.0, maximum=3.0
+        0.1, "free space around start and goal at t = 0", unit="m", minimum=0.0, maximum=3.0
     )
     turn_every_s: float = option(
         3.0, "mean time between two turns", unit="s", minimum=0.1, maximum=1000.0
@@ -51,7 +51,7 @@ class CrowdParams:
         math.pi, "largest change of heading at a turn", unit="rad", minimum=0.0, maximum=math.pi
     )
     turns_until_s: float = option(
-        120.0, "time after which nobody turns", unit="s", minimum=0.0, maximum=1e4
+        120.0, "time after which no obstacle turns", unit="s", minimum=0.0, maximum=1e4
     )
 
     def __post_init__(self) -> None:
@@ -74,14 +74,14 @@ class CrowdParams:
 def crowd(params: CrowdParams, rng: np.random.Generator) -> tuple[Obstacle, ...]:
     """Draw a crowd; obstacles may overlap each other, but not start or goal at t = 0.
 
-    Raises ConfigError when no place is left for an obstacle.
+    Raises ConfigError when there is no space left for an obstacle.
     """
-    return tuple(_one(params, rng) for _ in range(params.obstacles))
+    return tuple(_random_obstacle(params, rng) for _ in range(params.obstacles))
 
 
-def _one(params: CrowdParams, rng: np.random.Generator) -> Obstacle:
+def _random_obstacle(params: CrowdParams, rng: np.random.Generator) -> Obstacle:
     radius = rng.uniform(params.radius_min_m, params.radius_max_m)
-    center = _place(params, radius, rng)
+    center = _free_center(params, radius, rng)
     heading = rng.uniform(-math.pi, math.pi)
     still = params.motion is Motion.STATIC or rng.random() < params.static_share
     speed = 0.0 if still else rng.uniform(params.speed_min_mps, params.speed_max_mps)
@@ -93,7 +93,9 @@ def _one(params: CrowdParams, rng: np.random.Generator) -> Obstacle:
     )
 
 
-def _place(params: CrowdParams, radius_m: float, rng: np.random.Generator) -> tuple[float, float]:
+def _free_center(
+    params: CrowdParams, radius_m: float, rng: np.random.Generator
+) -> tuple[float, float]:
     (x0, y0), (x1, y1) = ROOM.lower_m, ROOM.upper_m
     for _ in range(_TRIES):
         x = rng.uniform(x0 + radius_m, x1 - radius_m)
@@ -101,7 +103,7 @@ def _place(params: CrowdParams, radius_m: float, rng: np.random.Generator) -> tu
         if leaves_room((x, y), radius_m, params.margin_m):
             return (x, y)
     raise ConfigError(
-        f"radius_max_m={params.radius_max_m:g}: no place left beside start and goal; lower it"
+        f"radius_max_m={params.radius_max_m:g}: no space left beside start and goal; lower it"
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The task of every generated world: the paper's trip, and places seen from along it."""
+"""The task of every generated world: the paper's trip, and points relative to it."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ ROOM = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 12.0))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trip:
-    """The straight way of a robot that meets nobody: the moving target of hostile worlds."""
+    """The straight trip without obstacles: the moving target of adversarial worlds."""
 
     speed_mps: float
 
     @property
     def length_m(self) -> float:
-        """Straight from start to goal."""
+        """Straight distance from start to goal."""
         return distance(START_M, GOAL_M)
 
     @property
     def time_s(self) -> float:
-        """When the goal is reached."""
+        """Time at which the goal is reached."""
         return self.length_m / self.speed_mps
 
     def at(self, t_s: float) -> Point:
-        """Where the robot is at time t; it ends at the goal."""
+        """Position at time t; it ends at the goal."""
         return self.beside(min(t_s * self.speed_mps, self.length_m), 0.0)
 
     def beside(self, along_m: float, across_m: float) -> Point:
-        """The point so far along the way and so far to its left."""
+        """The point along_m along the trip and across_m to its left."""
         dx, dy = self.unit(0.0)
         x, y = START_M
         return (x + along_m * dx - across_m * dy, y + along_m * dy + across_m * dx)
 
     def heading(self, offset_rad: float) -> float:
-        """A heading, counted from the way's own."""
+        """A heading, relative to that of the trip."""
         return math.atan2(GOAL_M[1] - START_M[1], GOAL_M[0] - START_M[0]) + offset_rad
 
     def unit(self, offset_rad: float) -> Point:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Suite x planners x seeds -> one tidy table: resumable, the same whoever computes it."""
+"""Sweeps: suite x planners x seeds to one tidy table; resumable, on any executor."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of a sweep: some runs of one planner, or the oracle's word on some worlds."""
+"""The chunks of a sweep: runs of one planner, or oracle solutions of worlds."""
 
 from __future__ import annotations
 
@@ -21,62 +21,62 @@ from .worker import Lost, each
 RUNS_AT_ONCE = 100
 WORLDS_AT_ONCE = 20
 ORACLE_PATIENCE_S = 3600.0
-DIGITS = 6  # of an optimum in metres: what is left below differs between makes of processors
+DIGITS = 6  # of an optimum in metres: further digits differ between makes of processors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Runs:
     """Some runs of one planner."""
 
-    name: str  # fit for a file
+    name: str  # usable as a file name
     runs: tuple[Run, ...]
     setting: Setting
 
     @property
     def cost(self) -> float:
-        """About, in milliseconds; planners differ."""
+        """Estimated time in milliseconds; planners differ."""
         return 12.0 * len(self.runs)
 
     def facts(self) -> Mapping[str, Any]:
-        """What decides the numbers."""
+        """All inputs that determine the result."""
         return {"runs": self.runs, **self.setting.facts()}
 
     def run(self) -> Columns:
-        """Make the runs; COLUMNS (without the oracle's) and TIMINGS."""
+        """Compute the runs: COLUMNS (without the oracle's) and TIMINGS."""
         batches: list[tuple[Run, ...]] = [(run,) for run in self.runs]
         if generates_paths_together(self.runs[0].planner, self.setting):
-            # One alone: what does a decision take?
+            # The first run on its own, to time its decisions.
             batches = [batch for batch in (self.runs[:1], self.runs[1:]) if batch]
-        found = list(self._made(batches))
+        found = list(self._rows(batches))
         names = dict.fromkeys(name for row in found for name in row)
         return {name: [row.get(name) for row in found] for name in names}
 
-    def _made(self, batches: Sequence[tuple[Run, ...]]) -> Iterator[Row]:
-        """The rows, in order; runs that are lost together are made again one by one."""
-        # All answers first: a child that hangs is there until its last one has been asked for.
-        answers = list(each(make, batches, self.setting, self.setting.patience_s))
-        for batch, answer in zip(batches, answers):
-            if not isinstance(answer, Lost):
-                yield from answer
+    def _rows(self, batches: Sequence[tuple[Run, ...]]) -> Iterator[Row]:
+        """The rows, one per run; runs of a batch that hung or died are run again one by one."""
+        # Collect all results first: a hung child is only ended when its generator is exhausted.
+        results = list(each(make, batches, self.setting, self.setting.patience_s))
+        for batch, result in zip(batches, results):
+            if not isinstance(result, Lost):
+                yield from result
             elif len(batch) == 1:
-                yield lost_row(batch[0], answer.why)
+                yield lost_row(batch[0], result.why)
             else:
-                yield from self._made([(run,) for run in batch])
+                yield from self._rows([(run,) for run in batch])
 
 
 def make(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
-    """Make some runs here, together where they are several; their rows and timings."""
-    begun = perf_counter()
-    alone = len(runs) == 1
-    all_played = [run_one(runs[0], setting, whole=False)] if alone else run_together(runs, setting)
-    made = [(played.times_ns, made_row(run, played)) for run, played in zip(runs, all_played)]
-    wall_ms = 1e3 * (perf_counter() - begun) / len(runs)
+    """Compute runs in this process, several together; their rows with timings."""
+    started = perf_counter()
+    single = len(runs) == 1
+    done = [run_one(runs[0], setting, whole=False)] if single else run_together(runs, setting)
+    made = [(completed.times_ns, made_row(run, completed)) for run, completed in zip(runs, done)]
+    wall_ms = 1e3 * (perf_counter() - started) / len(runs)
     return [{**timing_row(times_ns, wall_ms), **row} for times_ns, row in made]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Optima:
-    """The oracle's word on some worlds, by their number."""
+    """Oracle solutions of some worlds, by world number."""
 
     suite: str
     suite_seed: int
@@ -85,76 +85,78 @@ class Optima:
 
     @property
     def name(self) -> str:
-        """Fit for a file."""
+        """Name, usable as a file name."""
         return f"{self.suite}-oracle-{self.worlds[0]}-{len(self.worlds)}"
 
     @property
     def cost(self) -> float:
-        """About, in milliseconds; worlds differ."""
+        """Estimated time in milliseconds; worlds differ."""
         return 150.0 * len(self.worlds)
 
     def facts(self) -> Mapping[str, Any]:
-        """What decides the numbers."""
+        """All inputs that determine the result."""
         return {"suite_seed": self.suite_seed, "speed_mps": self.speed_mps}
 
     def run(self) -> Columns:
-        """Ask the oracle. Raises MfbaError for a world over which it takes too long."""
+        """Solve the worlds. Raises MfbaError for a world that takes too long."""
         found = []
-        for world, answer in zip(self.worlds, each(judge, self.worlds, self, ORACLE_PATIENCE_S)):
-            if isinstance(answer, Lost):
+        for world, result in zip(
+            self.worlds, each(solve_world, self.worlds, self, ORACLE_PATIENCE_S)
+        ):
+            if isinstance(result, Lost):
                 raise MfbaError(
-                    f"{self.suite}, world {world}: the oracle {answer.why}; leave that world out, "
+                    f"{self.suite}, world {world}: the oracle {result.why}; leave that world out, "
                     "or give --no-oracle"
                 )
-            found.append(answer)
+            found.append(result)
         return {name: [row[name] for row in found] for name in found[0]}
 
 
-def judge(world: int, of: Optima) -> Row:
-    """The oracle's word on one world."""
-    scenario = suite(of.suite, of.suite_seed).world(world, of.speed_mps)
-    solution = solve(scenario, of.speed_mps)
+def solve_world(world: int, optima: Optima) -> Row:
+    """The oracle's columns of one world."""
+    scenario = suite(optima.suite, optima.suite_seed).world(world, optima.speed_mps)
+    solution = solve(scenario, optima.speed_mps)
     return {
         "world": world,
         "certificate": solution.certificate.value,
         "optimum_m": round(solution.length_m, DIGITS),
-        "survivability": survivability(scenario, of.speed_mps).share,
+        "survivability": survivability(scenario, optima.speed_mps).share,
     }
 
 
-def chunks_of(order: SweepSpec) -> list[Runs | Optima]:
-    """All parts of a sweep; what they are does not depend on who computes them."""
-    at_once = max(1, RUNS_AT_ONCE // order.seeds)
-    chunks: list[Runs | Optima] = [*(_optima(order) if order.oracle else ())]
-    for planner in order.planners:
-        for first in order.world_range[::at_once]:
-            worlds = range(first, min(first + at_once, order.world_range.stop))
+def chunks_of(spec: SweepSpec) -> list[Runs | Optima]:
+    """All chunks of a sweep; independent of workers and executor."""
+    at_once = max(1, RUNS_AT_ONCE // spec.seeds)
+    chunks: list[Runs | Optima] = [*(_optima(spec) if spec.oracle else ())]
+    for planner in spec.planners:
+        for first in spec.world_range[::at_once]:
+            worlds = range(first, min(first + at_once, spec.world_range.stop))
             chunks.append(
                 Runs(
-                    name=f"{order.suite}-{_plain(planner)}-{first}-{len(worlds)}",
-                    runs=tuple(order.runs(planner, worlds)),
-                    setting=order.setting_of(planner),
+                    name=f"{spec.suite}-{_plain(planner)}-{first}-{len(worlds)}",
+                    runs=tuple(spec.runs(planner, worlds)),
+                    setting=spec.setting_of(planner),
                 )
             )
     return chunks
 
 
-def _optima(order: SweepSpec) -> Iterator[Optima]:
-    worlds = suite(order.suite, order.setting.suite_seed)
-    numbers = sorted({worlds.world_number(k) for k in order.world_range})
-    for begin in range(0, len(numbers), WORLDS_AT_ONCE):
+def _optima(spec: SweepSpec) -> Iterator[Optima]:
+    worlds = suite(spec.suite, spec.setting.suite_seed)
+    numbers = sorted({worlds.world_number(k) for k in spec.world_range})
+    for first in range(0, len(numbers), WORLDS_AT_ONCE):
         yield Optima(
-            suite=order.suite,
-            suite_seed=order.setting.suite_seed,
-            worlds=tuple(numbers[begin : begin + WORLDS_AT_ONCE]),
-            speed_mps=order.setting.params.speed_mps,
+            suite=spec.suite,
+            suite_seed=spec.setting.suite_seed,
+            worlds=tuple(numbers[first : first + WORLDS_AT_ONCE]),
+            speed_mps=spec.setting.params.speed_mps,
         )
 
 
 def gather(
     chunks: list[Runs | Optima], found: Mapping[str, Columns]
 ) -> tuple[list[Row], list[Row]]:
-    """A row for each run, and one for each world that the oracle was asked about."""
+    """A row for each run, and a row for each world that the oracle solved."""
     runs: list[Row] = []
     optima: list[Row] = []
     for chunk in chunks:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table's columns: what each means, and one row of them from a run."""
+"""Columns of the sweep table: type and meaning of each, and the row of a run."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from .sweep_spec import Run
 Row = dict[str, Any]
 FAILED = "failed"
 
-# name: (type, meaning); empty where it does not apply, inf for never
+# name: (type, meaning); empty where not applicable, inf for never
 _KEY: dict[str, tuple[type, str]] = {
     "suite": (str, "suite of worlds"),
     "world": (int, "number of the world in its suite"),
     "planner": (str, "planner"),
     "seed": (int, "seed of the planner and of sensor noise"),
 }
-_MADE: dict[str, tuple[type, str]] = {
-    "outcome": (str, "goal_reached, time_limit, or failed: the planner's own fault"),
-    "failure": (str, "the planner's fault and its tick, empty without one"),
+_RUN: dict[str, tuple[type, str]] = {
+    "outcome": (str, "goal_reached, time_limit, or failed (a fault of the planner)"),
+    "failure": (str, "tick and fault of the planner, empty without a fault"),
     "success": (bool, "goal reached without collision"),
     "length_m": (float, "path length (eq. 1), m"),
     "time_s": (float, "simulated time of the run, s"),
-    "time_to_goal_s": (float, "the same, inf unless the goal was reached, s"),
+    "time_to_goal_s": (float, "simulated time to the goal, inf if not reached, s"),
     "ticks": (int, "decisions"),
     "collisions": (int, "contacts, one per obstacle and unbroken run of ticks"),
-    "hits_moving": (int, "of these, robot into obstacle: it moved as contact began"),
+    "hits_moving": (int, "of these, robot into obstacle: the robot moved when contact started"),
     "hits_standing": (int, "of these, obstacle into standing robot"),
     "first_contact_with": (int, "obstacle of the first contact, from 1; 0 is none"),
-    "first_contact_s": (float, "begin of the step that leads to it, s"),
+    "first_contact_s": (float, "start of the step in which it occurs, s"),
     "min_clearance_m": (float, "smallest gap between edges, continuous in time, m"),
     "mean_clearance_m": (float, "smallest gap of each step, mean over the steps, m"),
-    "min_ttc_s": (float, "smallest time to collision, both going on as in the step, s"),
+    "min_ttc_s": (float, "smallest time to collision at the velocities of a step, s"),
     "turning_rad": (float, "sum of all turns, rad"),
     "curvature_radpm": (float, "turning / length, rad/m"),
     "heading_changes": (int, "turns of more than 15 degrees"),
@@ -55,53 +55,56 @@ _MADE: dict[str, tuple[type, str]] = {
     "obstacles": (int, "obstacles of the world"),
     "straight_m": (float, "distance from start to goal, m"),
 }
-_JUDGED: dict[str, tuple[type, str]] = {
-    "certificate": (str, "the oracle's: feasible, infeasible or undecided; empty without it"),
-    "survivability": (float, "share of places where nobody touches a standing robot"),
+_ORACLE: dict[str, tuple[type, str]] = {
+    "certificate": (str, "of the oracle: feasible, infeasible or undecided; empty without oracle"),
+    "survivability": (float, "share of positions where no obstacle touches a standing robot"),
     "optimum_m": (float, "shortest collision-free path at constant speed, full knowledge, m"),
     "gap": (float, "length / optimum - 1, where the goal was reached"),
     "spl": (float, "success weighted by path length, against the optimum"),
     "barn": (float, "BARN score, against the optimum at full speed"),
 }
-_OF_CONDUCT = [field.name for field in fields(RunMotion) if field.name in _MADE]
-_OF_RESULT = [field.name for field in fields(Result) if field.name in _MADE]
-COLUMNS = {**_KEY, **_MADE, **_JUDGED}
-# Clocks differ from run to run: these stand in a table of their own.
+_FROM_MOTION = [field.name for field in fields(RunMotion) if field.name in _RUN]
+_FROM_RESULT = [field.name for field in fields(Result) if field.name in _RUN]
+COLUMNS = {**_KEY, **_RUN, **_ORACLE}
+# Wall times differ from run to run, so these are in a separate table.
 TIMINGS: dict[str, tuple[type, str]] = {
     **_KEY,
-    "decision_us": (float, "decision time, median of the ticks, us; none of runs made at once"),
-    "decision_max_us": (float, "longest decision, us; none likewise"),
-    "wall_ms": (float, "wall time of the whole run, ms; its share of those made at once"),
+    "decision_us": (
+        float,
+        "decision time, median of the ticks, us; empty for runs computed together",
+    ),
+    "decision_max_us": (float, "longest decision, us; empty likewise"),
+    "wall_ms": (float, "wall time of the run, ms; an equal share for runs computed together"),
 }
 
 
-def made_row(run: Run, played: PlayedRun) -> Row:
-    """What a run says of itself, without the oracle."""
-    result, run_motion = assess(played.episode)
-    scenario = played.episode.scenario
+def made_row(run: Run, completed: PlayedRun) -> Row:
+    """The row of a run, without the oracle's columns."""
+    result, run_motion = assess(completed.episode)
+    scenario = completed.episode.scenario
     row = {
-        **dict.fromkeys(_MADE),
+        **dict.fromkeys(_RUN),
         **run._asdict(),
-        **{name: getattr(run_motion, name) for name in _OF_CONDUCT},
-        **{name: getattr(result, name) for name in _OF_RESULT},
-        "outcome": FAILED if played.fault else result.outcome.value,
-        "failure": played.fault_at,
+        **{name: getattr(run_motion, name) for name in _FROM_MOTION},
+        **{name: getattr(result, name) for name in _FROM_RESULT},
+        "outcome": FAILED if completed.fault else result.outcome.value,
+        "failure": completed.fault_at,
         "time_to_goal_s": time_to_goal_s(result),
         "encounters": len(result.encounters),
         "obstacles": len(scenario.obstacles),
         "straight_m": distance(scenario.start_m, scenario.goal_m),
     }
-    return {name: row[name] for name in (*_KEY, *_MADE)}
+    return {name: row[name] for name in (*_KEY, *_RUN)}
 
 
 def lost_row(run: Run, failure: str) -> Row:
-    """The row of a run that told nothing of itself: it hung, or its process died."""
-    row = {**dict.fromkeys((*_KEY, *_MADE)), **run._asdict()}
+    """The row of a run that hung or whose process died: no figures."""
+    row = {**dict.fromkeys((*_KEY, *_RUN)), **run._asdict()}
     return {**row, "outcome": FAILED, "failure": failure, "success": False}
 
 
 def timing_row(times_ns: tuple[int, ...], wall_ms: float) -> Row:
-    """What the machine's clock says of a run."""
+    """The wall times of a run."""
     times = times_ns or (math.nan,)
     return {
         "decision_us": statistics.median(times) / 1e3,
@@ -111,8 +114,8 @@ def timing_row(times_ns: tuple[int, ...], wall_ms: float) -> Row:
 
 
 def judged(row: Row, optimum: Mapping[str, Any] | None, speed_mps: float) -> Row:
-    """The row with what the oracle says of its world (None: it was not asked)."""
-    found: Row = {**row, **dict.fromkeys(_JUDGED)}
+    """The row with the oracle's columns (optimum None: a sweep without oracle)."""
+    found: Row = {**row, **dict.fromkeys(_ORACLE)}
     if optimum is None:
         return {**found, "certificate": ""}
     found |= {name: optimum[name] for name in ("certificate", "survivability")}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why a run ended as it did, in words: the first contact and what led to it, or the delay."""
+"""Explain a run in words: its first contact and the decisions before it, or its delay."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from ..contacts_and_clearances import RunMotion
 from ..metrics import Result, assess, within_range
 from .single_run import PlayedRun
 
-BEFORE = 6  # decisions that are shown
+BEFORE = 6  # decisions shown
 
 
-def _headline(played: PlayedRun, result: Result, run_motion: RunMotion) -> str:
-    """How it ended, in one line."""
-    episode = played.episode
-    if played.fault:
-        return f"the planner failed at {played.fault_at}"
+def _headline(completed: PlayedRun, result: Result, run_motion: RunMotion) -> str:
+    """How the run ended, in one line."""
+    episode = completed.episode
+    if completed.fault:
+        return f"the planner failed at {completed.fault_at}"
     if result.collisions:
         number, index = run_motion.first_contact_with, _index(episode, run_motion) or 0
         did = "ran into" if _moves(episode, index) else "stood still and was hit by"
@@ -34,12 +34,12 @@ def _headline(played: PlayedRun, result: Result, run_motion: RunMotion) -> str:
         return f"the robot {did} obstacle {number} at {run_motion.first_contact_s:.2f} s{more}"
     if result.outcome is Outcome.GOAL_REACHED:
         return f"goal reached without collision after {result.length_m:.3f} m"
-    left = distance(episode.ticks[-1].pose.position, episode.scenario.goal_m)
-    return f"{left:.2f} m left to the goal when time was up ({result.time_s:.1f} s)"
+    remaining_m = distance(episode.ticks[-1].pose.position, episode.scenario.goal_m)
+    return f"{remaining_m:.2f} m left to the goal when time was up ({result.time_s:.1f} s)"
 
 
 def contact_index(episode: Episode) -> int | None:
-    """The tick (from 0) at which the step begins that leads to the first contact."""
+    """The tick (from 0) that starts the step of the first contact; None without one."""
     return _index(episode, assess(episode)[1])
 
 
@@ -49,23 +49,23 @@ def _index(episode: Episode, run_motion: RunMotion) -> int | None:
     return times.index(contact_s) if contact_s in times else None
 
 
-def explain(played: PlayedRun) -> list[str]:
-    """Lines that tell what happened and why, the headline first."""
-    episode = played.episode
+def explain(completed: PlayedRun) -> list[str]:
+    """Lines of text that explain a run, the headline first."""
+    episode = completed.episode
     result, run_motion = assess(episode)
-    lines = [_headline(played, result, run_motion)]
+    lines = [_headline(completed, result, run_motion)]
     if not episode.ticks:
         return lines
     index = _index(episode, run_motion)
     if index is not None:
         number = run_motion.first_contact_with
         lines += [*_contact(episode, index, number), "", *_table(episode, index, number)]
-    elif played.fault:
+    elif completed.fault:
         last = len(episode.ticks) - 1
         lines += ["", "the last decisions that were followed:", *_table(episode, last, 0)]
     elif episode.outcome is not Outcome.GOAL_REACHED:
         lines += [
-            *_held_up(episode, result),
+            *_time_use(episode, result),
             *_passes(result, run_motion),
             "",
             *_table(episode, len(episode.ticks) - 1, 0),
@@ -76,34 +76,35 @@ def explain(played: PlayedRun) -> list[str]:
 
 
 def _contact(episode: Episode, index: int, number: int) -> Iterator[str]:
-    """The moment of the first contact, who moved how, and since when it could be seen."""
+    """The first contact: time, motion of both, and since when the obstacle was within SR."""
     tick = episode.ticks[index]
     time_s = episode.time_s(tick.stamp_ns)
-    step = _step(episode, index, number)
-    here, there = tick.pose.position, _center(episode, number, time_s)
+    ttc = _time_to_contact(episode, index, number)
+    position, center = tick.pose.position, _center(episode, number, time_s)
     scenario = episode.scenario
     obstacle = velocity_at(scenario.obstacles[number - 1], time_s, scenario.walls)
-    closing = _closing(here, there, tick.velocity, obstacle)
+    closing = _closing_speed(position, center, tick.velocity, obstacle)
     yield (
         f"contact: in the step after tick {index} ({time_s:.2f} s)"
-        + (f", {step:.2f} s into it" if math.isfinite(step) else "")
+        + (f", {ttc:.2f} s into it" if math.isfinite(ttc) else "")
         + f"; gap at the tick {_gap(episode, index, number):.3f} m"
     )
     yield (
         f"motion: robot {math.hypot(*tick.velocity):.2f} m/s, obstacle {math.hypot(*obstacle):.2f}"
-        f" m/s, closing at {closing:.2f} m/s; the obstacle is {_side(here, there, tick.velocity)}"
+        f" m/s, closing at {closing:.2f} m/s; "
+        f"the obstacle is {_side(position, center, tick.velocity)}"
     )
     reach = episode.sensor.sensing_range_m
-    seen = index
-    while seen > 0 and number in within_range(episode, episode.ticks[seen - 1]):
-        seen -= 1
+    first = index
+    while first > 0 and number in within_range(episode, episode.ticks[first - 1]):
+        first -= 1
     if number not in within_range(episode, tick):
         yield f"known: the obstacle was not within SR ({reach:g} m) at the decision before contact"
     else:
-        ago = time_s - episode.time_s(episode.ticks[seen].stamp_ns)
+        ago = time_s - episode.time_s(episode.ticks[first].stamp_ns)
         yield (
-            f"known: within SR ({reach:g} m) since tick {seen}, {ago:.2f} s before; then the gap "
-            f"was {_gap(episode, seen, number):.3f} m"
+            f"known: within SR ({reach:g} m) since tick {first}, {ago:.2f} s before; then the gap "
+            f"was {_gap(episode, first, number):.3f} m"
         )
     others = [str(n) for n in within_range(episode, tick) if n != number]
     if others:
@@ -119,21 +120,21 @@ def _table(episode: Episode, index: int, number: int) -> Iterator[str]:
         tick = episode.ticks[k]
         line = f"{k:>5} {episode.time_s(tick.stamp_ns):>6.2f}s  {tick.mode.value:<19}"
         if number:
-            ttc = _step(episode, k, number)
-            told = f"{ttc:>6.2f}s" if math.isfinite(ttc) else f"{'-':>7}"
-            line += f" {_gap(episode, k, number):>6.3f}m {told}"
+            ttc = _time_to_contact(episode, k, number)
+            ttc_text = f"{ttc:>6.2f}s" if math.isfinite(ttc) else f"{'-':>7}"
+            line += f" {_gap(episode, k, number):>6.3f}m {ttc_text}"
         yield f"{line}  {tick.reason}{_bits(tick)}"
 
 
-def _held_up(episode: Episode, result: Result) -> Iterator[str]:
-    """What it did with its time."""
+def _time_use(episode: Episode, result: Result) -> Iterator[str]:
+    """Share of each mode, and how near the robot came to the goal."""
     counts = Counter(tick.mode.value for tick in episode.ticks)
     shares = [f"{mode} {count / result.ticks:.0%}" for mode, count in counts.most_common()]
     yield f"modes: {', '.join(shares)}"
     goal = episode.scenario.goal_m
     nearest = min(distance(tick.pose.position, goal) for tick in episode.ticks)
     yield (
-        f"way: {result.length_m:.2f} m travelled, never nearer to the goal than {nearest:.2f} m; "
+        f"path: {result.length_m:.2f} m travelled, never nearer to the goal than {nearest:.2f} m; "
         f"{len(result.encounters)} obstacles met"
     )
 
@@ -165,8 +166,8 @@ def _moves(episode: Episode, index: int) -> bool:
     return math.hypot(*episode.ticks[index].velocity) > 0.0
 
 
-def _step(episode: Episode, index: int, number: int) -> float:
-    """Time to collision with one obstacle, going on as in the step after a tick."""
+def _time_to_contact(episode: Episode, index: int, number: int) -> float:
+    """Time to collision with one obstacle at the velocities of the step after a tick."""
     ticks = episode.ticks[index : index + 2]
     if len(ticks) < 2:
         return math.inf
@@ -176,18 +177,18 @@ def _step(episode: Episode, index: int, number: int) -> float:
     return float(steps.contact_s[0, number - 1])
 
 
-def _closing(here: Point, there: Point, robot: Point, obstacle: Point) -> float:
+def _closing_speed(position: Point, center: Point, robot: Point, obstacle: Point) -> float:
     """Speed at which the distance shrinks, m/s."""
-    away = distance(here, there) or 1.0
-    ux, uy = (there[0] - here[0]) / away, (there[1] - here[1]) / away
+    away = distance(position, center) or 1.0
+    ux, uy = (center[0] - position[0]) / away, (center[1] - position[1]) / away
     return (robot[0] - obstacle[0]) * ux + (robot[1] - obstacle[1]) * uy
 
 
-def _side(here: Point, there: Point, velocity: Point) -> str:
-    """Where it is as seen along the way."""
+def _side(position: Point, center: Point, velocity: Point) -> str:
+    """Direction of the obstacle relative to the velocity."""
     if not any(velocity):
-        return f"{math.degrees(bearing(here, there)):.0f} degrees from +x"
-    turn = math.degrees(wrap_angle(bearing(here, there) - bearing((0.0, 0.0), velocity)))
+        return f"{math.degrees(bearing(position, center)):.0f} degrees from +x"
+    turn = math.degrees(wrap_angle(bearing(position, center) - bearing((0.0, 0.0), velocity)))
     if abs(turn) <= 45.0:
         return "ahead"
     if abs(turn) >= 135.0:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A planner that is not trusted: every decision is looked at before the robot moves."""
+"""Sandbox for untrusted planners: every decision is checked before the robot moves."""
 
 from __future__ import annotations
 
@@ -15,29 +15,28 @@ SPEED_SLACK = 1e-6  # a tick is a whole number of nanoseconds
 
 
 class PlannerFault(Exception):  # noqa: N818
-    """What a planner did that ends its run, in words."""
+    """A fault of a planner that ends its run; its text says which."""
 
 
 class HungError(BaseException):
-    """An alarm went off while a planner decided; no `except Exception` of its own stops it."""
+    """A planner hung until an alarm; a BaseException, so that the planner does not catch it."""
 
 
 class PlannerSandbox:
-    """Passes on what a planner decides; PlannerFault where it must not be followed.
+    """Checks and records the decisions of a planner; raises PlannerFault for an invalid one.
 
-    decisions are those that were followed, times_ns what each took by the machine's clock, and
-    planner who decides, None before take().
+    decisions holds the valid ones, times_ns the wall time of each; planner is None before take().
     """
 
     def __init__(self, params: PlannerParams) -> None:
-        """Start without a planner, with what it was told."""
+        """Start without a planner, with its parameters."""
         self.planner: PathPlanner | None = None
         self._limit_mps = params.speed_mps * (1.0 + SPEED_SLACK)
         self.decisions: list[Decision] = []
         self.times_ns: list[int] = []
 
-    def take(self, make: Callable[[], PathPlanner]) -> PathPlanner:
-        """Make the planner; return it. Raises PlannerFault, and MfbaErrors as they are."""
+    def make_planner(self, make: Callable[[], PathPlanner]) -> PathPlanner:
+        """Make and return the planner. Raises PlannerFault; MfbaError is passed on."""
         try:
             self.planner = made = make()
         except MfbaError:
@@ -47,14 +46,14 @@ class PlannerSandbox:
         return made
 
     def plan(self, obs: Observation) -> Decision:
-        """Ask the planner. Raises PlannerFault."""
+        """The planner's decision. Raises PlannerFault for an invalid one."""
         assert self.planner is not None
-        begun = perf_counter_ns()
+        start_ns = perf_counter_ns()
         try:
             decision = self.planner.plan(obs)
         except Exception as error:
             raise PlannerFault(_raised(error)) from error
-        self.times_ns.append(perf_counter_ns() - begun)
+        self.times_ns.append(perf_counter_ns() - start_ns)
         fault = self._fault(decision, obs)
         if fault:
             raise PlannerFault(fault)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A directory of `mfba sweep`, read back: what was ordered, and the rows that are finished."""
+"""Read a directory of `mfba sweep`: its specification and the finished rows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .table import build
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadSweep:
-    """What a directory holds; of an interrupted sweep the finished part."""
+    """The contents of a directory; of an interrupted sweep, the finished rows."""
 
     order: SweepSpec
     rows: list[Row]
@@ -29,29 +29,29 @@ class ReadSweep:
 
 
 def read_sweep(directory: Path) -> ReadSweep:
-    """Read it. Raises InputError for anything else, OutputError for a damaged manifest."""
+    """Read a sweep. Raises InputError for no sweep, OutputError for a damaged manifest."""
     if not directory.is_dir():
         raise InputError(f"{directory}: no such directory; give one that `mfba sweep` has made")
     facts = read_manifest(directory, COMMAND)
     try:
-        order = _order(facts)
+        spec = _spec(facts)
     except (KeyError, TypeError, AttributeError, ConfigError) as error:
         raise InputError(
             f"{directory}: not of this version's `{COMMAND}` ({error}); sweep again"
         ) from None
-    chunks = chunks_of(order)
+    chunks = chunks_of(spec)
     found = {chunk.name: read_chunk(directory, chunk.name) for chunk in chunks}
     finished = [chunk for chunk in chunks if found[chunk.name] is not None]
-    rows, _ = build(order, finished, {name: c for name, c in found.items() if c is not None})
+    rows, _ = build(spec, finished, {name: c for name, c in found.items() if c is not None})
     return ReadSweep(
-        order=order, rows=rows, code_changed=facts.get("code") != code_digest(*PACKAGES)
+        order=spec, rows=rows, code_changed=facts.get("code") != code_digest(*PACKAGES)
     )
 
 
-def _order(facts: dict[str, Any]) -> SweepSpec:
-    told = dict(facts["setting"])
-    params = override(PlannerParams(), told.pop("params"))
-    sensor = override(SensorParams(), told.pop("sensor"))
+def _spec(facts: dict[str, Any]) -> SweepSpec:
+    setting = dict(facts["setting"])
+    params = override(PlannerParams(), setting.pop("params"))
+    sensor = override(SensorParams(), setting.pop("sensor"))
     return SweepSpec(
         suite=facts["suite"],
         planners=tuple(facts["planners"]),
@@ -59,6 +59,6 @@ def _order(facts: dict[str, Any]) -> SweepSpec:
         first=facts["first"],
         seeds=facts["seeds"],
         oracle=facts["oracle"],
-        setting=Setting(params=params, sensor=sensor, **told),
+        setting=Setting(params=params, sensor=sensor, **setting),
         own={name: override(PlannerParams(), options) for name, options in facts["own"].items()},
     )

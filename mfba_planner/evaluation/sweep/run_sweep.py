@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A whole sweep: parts, store, executor, table."""
+"""Run a sweep: chunks, store, executor, table."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ from .sweep_spec import SweepSpec
 from .table import build, sorted_hash
 
 COMMAND = "mfba sweep"
-PACKAGES = ("core", "oracle", "planners", "sweep", "worlds")  # their code decides the numbers
+# The folders whose code determines the results.
+PACKAGES = ("core", "evaluation", "perception", "planning", "scenarios", "simulation", "swarm")
 CONNECT_S = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Swept:
-    """What came of a sweep."""
+    """The result of a sweep: rows and timings."""
 
     order: SweepSpec
     rows: list[Row]
@@ -35,32 +36,32 @@ class Swept:
 
     @property
     def hash(self) -> str:
-        """Sorted hash of the table."""
+        """Hash of the table, independent of the sequence of rows."""
         return sorted_hash(self.rows)
 
 
-def spec_facts(order: SweepSpec) -> dict[str, Any]:
-    """What the directory of a sweep says of it."""
+def spec_facts(spec: SweepSpec) -> dict[str, Any]:
+    """The specification as plain data, for the manifest."""
     return {
-        "suite": order.suite,
-        "planners": list(order.planners),
-        "first": order.first,
-        "worlds": order.worlds,
-        "seeds": order.seeds,
-        "oracle": order.oracle,
-        "setting": order.setting.facts(),
-        "own": {name: flatten(params) for name, params in order.own.items()},
+        "suite": spec.suite,
+        "planners": list(spec.planners),
+        "first": spec.first,
+        "worlds": spec.worlds,
+        "seeds": spec.seeds,
+        "oracle": spec.oracle,
+        "setting": spec.setting.facts(),
+        "own": {name: flatten(params) for name, params in spec.own.items()},
     }
 
 
-def open_store(directory: Path, order: SweepSpec) -> Store:
-    """The directory of a sweep, new or to go on in. Raises OutputError as Store does."""
-    chunks = chunks_of(order)
-    return Store(directory, chunks, spec_facts(order), command=COMMAND, packages=PACKAGES)
+def open_store(directory: Path, spec: SweepSpec) -> Store:
+    """The store of a sweep, new or resumed. Raises OutputError as Store does."""
+    chunks = chunks_of(spec)
+    return Store(directory, chunks, spec_facts(spec), command=COMMAND, packages=PACKAGES)
 
 
 def sweep(
-    order: SweepSpec,
+    spec: SweepSpec,
     *,
     workers: int = 1,
     executor: Executor | None = None,
@@ -68,21 +69,21 @@ def sweep(
     done: Callable[[Chunk], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Swept:
-    """Make all runs (or read them back); the result does not depend on who makes them.
+    """Compute all runs (or read them from the store); the same result on any executor.
 
-    workers, executor, store, done and say as in study.compute, which tells what is raised.
+    workers, executor, store, done, say and errors as in study.compute_chunks.compute.
     """
-    chunks = chunks_of(order)
+    chunks = chunks_of(spec)
     found = compute(chunks, workers=workers, executor=executor, store=store, done=done, say=say)
-    rows, timings = build(order, chunks, found)
-    return Swept(order=order, rows=rows, timings=timings)
+    rows, timings = build(spec, chunks, found)
+    return Swept(order=spec, rows=rows, timings=timings)
 
 
 @contextmanager
 def dask_executor(address: str) -> Iterator[Executor]:
     """The workers of a dask.distributed scheduler, as an executor.
 
-    Raises ConfigError where distributed is missing, MfbaError where nobody answers.
+    Raises ConfigError where distributed is missing, MfbaError where no scheduler replies.
     """
     try:
         from distributed import Client
@@ -96,8 +97,8 @@ def dask_executor(address: str) -> Iterator[Executor]:
     except (OSError, TimeoutError, ValueError) as error:
         reason = " ".join(str(error).split())[:120]
         raise MfbaError(
-            f"--scheduler {address}: cannot be reached ({reason}); give tcp://HOST:PORT of one "
-            "that runs"
+            f"--scheduler {address}: cannot be reached ({reason}); give tcp://HOST:PORT of a "
+            "running scheduler"
         ) from None
     with client:
         yield client.get_executor(pure=False)

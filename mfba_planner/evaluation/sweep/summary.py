@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sweep's table says of each planner, and of pairs of them on the same worlds."""
+"""Summary of a sweep: figures of each planner, and paired comparisons on the same worlds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..oracle import Certificate
 from ..statistics import Interval, Paired, estimate, generator, mean, paired, rate
 from .columns import FAILED, Row
 
-REASONS = 3  # of failure that are named
+REASONS = 3  # of failure that are named in reports
 Value = Callable[[Row], float]
 
 
@@ -22,9 +22,9 @@ Value = Callable[[Row], float]
 class Standing:
     """One planner's figures; rates with Wilson's, means with bootstrap intervals (95 %).
 
-    certified is the success rate on worlds for which the oracle holds a trajectory. gap,
+    certified is the success rate on worlds that the oracle certifies as feasible. gap,
     gap_95 (95th percentile), length, time and clearance are over successes, means over worlds;
-    spl and barn over all worlds that have an optimum. None where there is nothing to tell.
+    spl and barn over all worlds that have an optimum. None without such runs.
     """
 
     planner: str
@@ -64,31 +64,31 @@ class Versus:
 
 
 def standings(rows: Sequence[Row], timings: Sequence[Row]) -> list[Standing]:
-    """A Standing for each planner, in the table's order."""
+    """A Standing for each planner, as they come in the table."""
     names = list(dict.fromkeys(row["planner"] for row in rows))
     return [
-        _standing(name, k, [r for r in rows if r["planner"] == name], timings)
+        _summary(name, k, [r for r in rows if r["planner"] == name], timings)
         for k, name in enumerate(names)
     ]
 
 
-def _standing(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -> Standing:
-    good = [row for row in rows if row["success"]]
+def _summary(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -> Standing:
+    successes = [row for row in rows if row["success"]]
     certified = [r for r in rows if r["certificate"] == Certificate.FEASIBLE.value]
-    gaps = by_world([row for row in good if row["gap"] is not None], lambda row: row["gap"])
+    gaps = by_world([row for row in successes if row["gap"] is not None], lambda row: row["gap"])
     times = [
         t["decision_us"] for t in timings if t["planner"] == name and _is_number(t["decision_us"])
     ]
 
-    def over(some: list[Row], column: str, place: int) -> Interval | None:
-        values = list(by_world(some, lambda row: row[column]).values())
-        return mean(np.array(values), generator(number, place)) if values else None
+    def over(subset: list[Row], column: str, key: int) -> Interval | None:
+        values = list(by_world(subset, lambda row: row[column]).values())
+        return mean(np.array(values), generator(number, key)) if values else None
 
-    judged = [row for row in rows if row["spl"] is not None]
+    rated = [row for row in rows if row["spl"] is not None]
     return Standing(
         planner=name,
         runs=len(rows),
-        success=rate(len(good), len(rows)),
+        success=rate(len(successes), len(rows)),
         certified=rate(sum(row["success"] for row in certified), len(certified))
         if certified
         else None,
@@ -98,16 +98,16 @@ def _standing(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -
         hits_standing=sum(row["hits_standing"] or 0 for row in rows),
         timeouts=sum(row["outcome"] == "time_limit" for row in rows),
         failures=tuple(_reasons(rows).most_common()),
-        length_m=over(good, "length_m", 0),
-        time_s=over(good, "time_s", 5),
-        gap=over([row for row in good if row["gap"] is not None], "gap", 1),
+        length_m=over(successes, "length_m", 0),
+        time_s=over(successes, "time_s", 5),
+        gap=over([row for row in successes if row["gap"] is not None], "gap", 1),
         gap_95=estimate(np.array(list(gaps.values())), _percentile_95, generator(number, 6))
         if gaps
         else None,
-        spl=over(judged, "spl", 2),
-        barn=over(judged, "barn", 3),
+        spl=over(rated, "spl", 2),
+        barn=over(rated, "barn", 3),
         clearance_m=over(
-            [r for r in good if _is_number(r["min_clearance_m"])], "min_clearance_m", 4
+            [r for r in successes if _is_number(r["min_clearance_m"])], "min_clearance_m", 4
         ),
         decision_us=float(np.median(times)) if times else None,
     )
@@ -136,7 +136,7 @@ def by_world(rows: Sequence[Row], value: Value) -> dict[int, float]:
 
 
 def comparisons(rows: Sequence[Row]) -> list[Versus]:
-    """Each planner against each one named before it."""
+    """Each planner against each one listed before it."""
     names = list(dict.fromkeys(row["planner"] for row in rows))
     return [versus(rows, name, other) for k, name in enumerate(names) for other in names[:k]]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sweep is: which worlds, planners and seeds, seen how; and the runs it is made of."""
+"""Specification of a sweep: worlds, planners, seeds, perception; and its list of runs."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """All that decides how a run goes, but for which run it is.
+    """All that determines a run, except its Run.
 
-    patience_s is the wall time after which a run counts as hanging; no other number of a run
-    depends on a clock.
+    patience_s is the wall time after which a run counts as hung; nothing else in a run depends
+    on a clock.
     """
 
     params: PlannerParams = field(default_factory=lambda: PlannerParams(speed_mps=SPEED_MPS))
@@ -53,7 +53,7 @@ class Setting:
     patience_s: float = PATIENCE_S
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for what cannot be."""
+        """Raise ConfigError for an invalid value."""
         self.observer(0)
         if not 0.0 < self.patience_s <= LONGEST_S:
             raise ConfigError(
@@ -65,7 +65,7 @@ class Setting:
         return suite(run.suite, self.suite_seed).world(run.world, self.params.speed_mps)
 
     def observer(self, seed: int, *, sectors: bool = True) -> Perception:
-        """What a planner gets to see."""
+        """The perception of a run with this seed."""
         return Perception(
             self.perception,
             noise_m=self.noise_m,
@@ -79,7 +79,7 @@ class Setting:
         return make_planner(run.planner, self.params, self.sensor, run.seed)
 
     def facts(self) -> dict[str, Any]:
-        """As plain values."""
+        """All values as plain data."""
         return {
             **asdict(self),
             "params": flatten(self.params),
@@ -89,10 +89,10 @@ class Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepSpec:
-    """Worlds first .. first + worlds - 1 of a suite, each planner in each, seeds 0 .. seeds - 1.
+    """Each planner in worlds first .. first + worlds - 1 of a suite, with seeds 0 .. seeds - 1.
 
-    Where a suite repeats its worlds, each round of them has the next seed; seeds is 1 there.
-    own holds the options of planners whose options are not the setting's, by name.
+    Where a suite repeats its worlds, each round has the next seed, and seeds is 1. own holds, by
+    name, the parameters of planners that differ from the setting's.
     """
 
     suite: str
@@ -105,7 +105,7 @@ class SweepSpec:
     own: Mapping[str, PlannerParams] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for what cannot be, with the nearest name where one is unknown."""
+        """Raise ConfigError for an invalid value, with the nearest name for an unknown one."""
         for name, value, least in (
             ("--worlds", self.worlds, 1),
             ("--first", self.first, 0),
@@ -127,13 +127,13 @@ class SweepSpec:
                 raise ConfigError(f"--planner {name}: given twice; name each planner once")
 
     def setting_of(self, planner: str) -> Setting:
-        """How the runs of one planner go."""
+        """The setting of the runs of one planner."""
         own = self.own.get(planner)
         return self.setting if own is None else replace(self.setting, params=own)
 
     @property
     def world_range(self) -> range:
-        """The worlds."""
+        """Numbers of the worlds."""
         return range(self.first, self.first + self.worlds)
 
     def run_seeds(self, world: int) -> range:
@@ -143,7 +143,7 @@ class SweepSpec:
         return range(first, first + self.seeds)
 
     def runs(self, planner: str, worlds: range) -> list[Run]:
-        """Runs of one planner in some worlds, in the table's order."""
+        """Runs of one planner in some worlds, sorted as in the table."""
         return [
             Run(self.suite, world, planner, seed)
             for world in worlds
@@ -152,20 +152,20 @@ class SweepSpec:
 
 
 def make_planner(name: str, params: PlannerParams, sensor: SensorParams, seed: int) -> PathPlanner:
-    """A fresh planner of ours by name, or anybody's as MODULE:NAME, called as ours are.
+    """A new planner: a registered name, or MODULE:NAME with the same signature.
 
-    Raises ConfigError for what is unknown.
+    Raises ConfigError for an unknown one.
     """
     return _factory(name)(params, sensor, seed)
 
 
 def own_preset(name: str, params: PlannerParams) -> PlannerParams:
-    """The options that a planner is made for, else the given ones. Raises as make_planner()."""
+    """The preset parameters of a planner, else the given ones. Raises as make_planner()."""
     return preset_of(_factory(name), params)
 
 
 def _factory(name: str) -> Factory:
-    """What makes a planner; modules are also looked for in the working directory."""
+    """The factory of a planner; modules are also searched in the working directory."""
     if ":" not in name:
         return known(name)
     module_name, _, attribute = name.partition(":")

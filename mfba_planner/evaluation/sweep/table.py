@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sweep's table: rows in order, their hash, and the files they go into."""
+"""The sweep table: sorted rows, their hash, and CSV and Parquet files."""
 
 from __future__ import annotations
 
@@ -24,36 +24,36 @@ Kinds = Mapping[str, tuple[type, str]]
 
 
 def build(
-    order: SweepSpec, chunks: list[Runs | Optima], found: Mapping[str, Columns]
+    spec: SweepSpec, chunks: list[Runs | Optima], found: Mapping[str, Columns]
 ) -> tuple[list[Row], list[Row]]:
-    """The table's rows and the timings' rows, in the order of suite, world, planner, seed."""
+    """Rows of the table and of the timings, sorted by suite, world, planner, seed."""
     runs, optima = gather(chunks, found)
     by_world = {row["world"]: row for row in optima}
-    worlds = suite(order.suite, order.setting.suite_seed)
-    place = {name: k for k, name in enumerate(order.planners)}
-    runs.sort(key=lambda row: (row["world"], place[row["planner"]], row["seed"]))
-    speed = order.setting.params.speed_mps
+    worlds = suite(spec.suite, spec.setting.suite_seed)
+    rank = {name: k for k, name in enumerate(spec.planners)}
+    runs.sort(key=lambda row: (row["world"], rank[row["planner"]], row["seed"]))
+    speed = spec.setting.params.speed_mps
     rows = []
     for row in runs:
-        optimum = by_world.get(worlds.world_number(row["world"])) if order.oracle else None
-        rows.append(_in_order(judged(row, optimum, speed), COLUMNS))
-    return rows, [_in_order(row, TIMINGS) for row in runs]
+        optimum = by_world.get(worlds.world_number(row["world"])) if spec.oracle else None
+        rows.append(_columns_of(judged(row, optimum, speed), COLUMNS))
+    return rows, [_columns_of(row, TIMINGS) for row in runs]
 
 
-def _in_order(row: Row, kinds: Kinds) -> Row:
+def _columns_of(row: Row, kinds: Kinds) -> Row:
     return {name: row.get(name) for name in kinds}
 
 
 def sorted_hash(rows: Sequence[Row]) -> str:
-    """SHA-256 of the rows whatever their order, every float to its last bit."""
+    """SHA-256 of the sorted rows, every float to its last bit."""
     lines = sorted(json.dumps(row, sort_keys=True) for row in rows)
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
 def write(path: Path, rows: Sequence[Row], kinds: Kinds) -> None:
-    """Write a .csv or .parquet, whole; one that is there must hold just that.
+    """Write a .csv or .parquet atomically; an existing file must have the same content.
 
-    Raises OutputError for one that does not, ConfigError where pyarrow is missing.
+    Raises OutputError where it differs, ConfigError where pyarrow is missing.
     """
     data = to_parquet(rows, kinds) if path.suffix == ".parquet" else to_csv(rows, kinds)
     try:
@@ -62,13 +62,13 @@ def write(path: Path, rows: Sequence[Row], kinds: Kinds) -> None:
         if not path.is_file():
             raise
         raise OutputError(
-            f"{path}: is not what the finished runs say (cut short or edited); move it away and "
+            f"{path}: differs from the finished runs (cut short or edited); move it away and "
             "call again, nothing will be computed twice"
         ) from None
 
 
 def to_csv(rows: Sequence[Row], kinds: Kinds) -> bytes:
-    """Text; empty for what does not apply, inf for never, true and false."""
+    """CSV: empty where not applicable, inf for never, true and false."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(kinds)
@@ -83,7 +83,7 @@ def _cell(value: Any) -> Any:
 
 
 def to_parquet(rows: Sequence[Row], kinds: Kinds) -> bytes:
-    """The same with types; null for what does not apply."""
+    """Parquet: typed columns, null where not applicable."""
     try:
         import pyarrow
         from pyarrow import parquet

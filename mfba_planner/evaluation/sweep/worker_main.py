@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The process that work is done in; started by keeper.py, spoken to through a pipe."""
+"""Main program of a worker process; started by worker.py, controlled through a pipe."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from ...core.child_process import end_with_parent
-from . import chunks as _parts  # noqa: F401  # now: later it would be taken for slow work
+from . import chunks as _chunks  # noqa: F401  # imported now, so that its time does not count as work
 
-MANY = 50_000  # new objects before the collector looks for cycles: runs are large and have none
+MANY = 50_000  # new objects before garbage collection: runs are large and have no cycles
 
 
 def main(descriptor: int) -> None:
-    """Do what is asked for until the pipe is closed."""
+    """Work on requests until the pipe is closed."""
     gc.set_threshold(MANY)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is the parent's matter
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the parent
     end_with_parent(int(os.environ["MFBA_PARENT"]))
-    # Whoever has heard enough closes the pipe.
+    # The parent closes the pipe to end this process.
     with Connection(descriptor) as pipe, suppress(EOFError, OSError):
         pipe.send(True)
         while True:
-            _answer(pipe, *pipe.recv())
+            _work(pipe, *pipe.recv())
 
 
-def _answer(
+def _work(
     pipe: Connection, work: Callable[[Any, Any], Any], items: tuple[Any, ...], shared: Any
 ) -> None:
     for item in items:
         try:
-            answer = work(item, shared)
+            result = work(item, shared)
         except Exception as error:
             pipe.send(error)
             return
-        pipe.send(answer)
+        pipe.send(result)
 
 
 if __name__ == "__main__":
