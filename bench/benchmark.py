@@ -22,10 +22,10 @@ from pathlib import Path
 from benchmark_costs import measure_costs, measure_rates
 from benchmark_page import PER_MINUTE, render
 from benchmark_pictures import write_pictures
-from benchmark_runs import HEADLINE, Counts, Results, say
+from benchmark_runs import HEADLINE, Counts, Results, warn
 
 from mfba_planner.core.outputs import new_run_directory
-from mfba_planner.evaluation.study.compute_chunks import belong_to_the_parent
+from mfba_planner.evaluation.study.compute_chunks import initialize_worker
 from mfba_planner.evaluation.suites import suite_names
 
 ROOT = Path(__file__).parents[1]
@@ -40,7 +40,7 @@ def _pool(workers: int) -> Iterator[Executor | None]:
         yield None
         return
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, context, initializer=belong_to_the_parent)
+    pool = ProcessPoolExecutor(workers, context, initializer=initialize_worker)
     try:
         yield pool
     finally:
@@ -97,7 +97,7 @@ def main(args: list[str] | None = None) -> None:
     out = found.out or new_run_directory(stem="benchmark")
     target = found.docs / "benchmark.md"
     _between(target.read_text(encoding="utf-8"), "")  # before the work is done
-    say(f"results go to {out}")
+    warn(f"results go to {out}")
     with _pool(found.workers) as executor:
         results = Results(out, found.workers, executor, found.first)
         results.make_all(suites, counts)

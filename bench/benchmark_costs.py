@@ -22,7 +22,7 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.types import Observation, PathPlanner
 from mfba_planner.evaluation.sweep.run_sweep import sweep
 from mfba_planner.evaluation.sweep.sweep_spec import SweepSpec
-from mfba_planner.evaluation.sweep.worker import Lost, each
+from mfba_planner.evaluation.sweep.worker import Lost, run_in_worker
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_registry import make
 
@@ -67,19 +67,19 @@ def measure_rates(
     found: dict[str, list[float]] = {entry.label: [] for entry in entries}
     for _ in range(RATE_ROUNDS):
         for entry in entries:
-            order = SweepSpec(
+            spec = SweepSpec(
                 suite=RATE_SUITE, planners=(entry.planner,), worlds=worlds, oracle=False,
                 setting=entry.setting,
             )  # fmt: skip
             begun = time.perf_counter()
-            sweep(order, workers=workers, executor=executor)
+            sweep(spec, workers=workers, executor=executor)
             found[entry.label].append(60.0 * worlds / (time.perf_counter() - begun))
     return found
 
 
 def measure_costs(rounds: int) -> Costs:
     """Measure in a process like those that runs are made in: with one thread."""
-    (found,) = each(_measure, [rounds], None, PATIENCE_S)
+    (found,) = run_in_worker(_measure, [rounds], None, PATIENCE_S)
     if isinstance(found, Lost):
         raise SystemExit(f"the measurement of cost {found.why}")
     return found

@@ -25,14 +25,14 @@ from benchmark_runs import (
 )
 
 from mfba_planner.evaluation.statistics import Interval
-from mfba_planner.evaluation.sweep.summary import Standing
+from mfba_planner.evaluation.sweep.summary import PlannerSummary
 from mfba_planner.evaluation.sweep.table import sorted_hash
 from mfba_planner.report.sweep_tables import (
     NOTE,
     VERSUS_NOTE,
     markdown,
     percent,
-    standing_table,
+    summary_table,
     versus_table,
 )
 
@@ -85,7 +85,7 @@ def render(
             for entry in entries
         ]
         if found:
-            blocks += [f"## {title}", standing_table(found)]
+            blocks += [f"## {title}", summary_table(found)]
     if any(suite in STRIPPED for suite in suites):
         blocks.append("![ablation](images/benchmark-ablation.png)")
     blocks += ["## What a decision costs", _costs(costs)]
@@ -129,7 +129,7 @@ def _words(entries: Sequence[Entry]) -> str:
     return ", ".join(entry.label for entry in entries)
 
 
-def _named(prefix: str, standing: Standing) -> Standing:
+def _named(prefix: str, standing: PlannerSummary) -> PlannerSummary:
     return replace(standing, planner=f"{prefix}: {standing.planner}")
 
 
@@ -142,7 +142,7 @@ def _suite(results: Results, suite: str, counts: Counts) -> str:
         for entry in entries
         for standing in [results.standing(suite, entry, worlds, case)]
     ]
-    return standing_table(found)
+    return summary_table(found)
 
 
 def verdict(found: Interval, target: float, *, at_least: bool) -> str:

@@ -22,7 +22,7 @@ from mfba_planner.evaluation.sweep.sweep_spec import Run
 from mfba_planner.report import style
 from mfba_planner.report.figure_sheet import EDGE, Sheet, to_bytes
 from mfba_planner.report.run_figure import run_figure
-from mfba_planner.report.tick_figure import moment_png
+from mfba_planner.report.tick_figure import tick_png
 
 PAPER, PREDICTIVE, ORCA = LEAD
 LOOKS: dict[str, dict[str, Any]] = {
@@ -213,12 +213,12 @@ def _example(
         return
     suite, world = found[0]
     run = Run(suite, world, loser.planner, 0)
-    played = run_one(run, loser.setting)
-    headline = explain(played)[0]
-    index = contact_index(played.episode)
+    completed = run_one(run, loser.setting)
+    headline = explain(completed)[0]
+    index = contact_index(completed.episode)
     assert index is not None, "it collided in the sweep"
     file = f"benchmark-{winner.label}-wins.png"
-    (images / file).write_bytes(moment_png(played.episode, index, str(run), [headline]))
+    (images / file).write_bytes(tick_png(completed.episode, index, str(run), [headline]))
     directory = results.directories[suite, loser.planner, loser.setting]
     words = f"Worlds where {winner.label} arrives and {loser.label} collides: {len(found)}"
     yield Example(f"{words}. The first: {headline}", f"mfba show {directory} {run}", file)

@@ -13,15 +13,15 @@ from mfba_planner.evaluation.study.chunk_store import Store
 from mfba_planner.evaluation.study.compute_chunks import compute
 from mfba_planner.evaluation.suites import suite as suite_of
 from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
-from mfba_planner.evaluation.sweep.chunks import Optima, chunks_of
-from mfba_planner.evaluation.sweep.columns import Row, judged
+from mfba_planner.evaluation.sweep.chunks import OracleChunk, chunks_of
+from mfba_planner.evaluation.sweep.columns import Row, with_optimum
 from mfba_planner.evaluation.sweep.run_sweep import open_store, sweep
-from mfba_planner.evaluation.sweep.summary import Standing, Versus, standings, versus
+from mfba_planner.evaluation.sweep.summary import PlannerSummary, Versus, planner_summaries, versus
 from mfba_planner.evaluation.sweep.sweep_spec import Setting, SweepSpec
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive import preset
 
-ORACLE = ("core", "oracle", "worlds")  # their code decides the optima
+ORACLE = ("core", "evaluation", "scenarios", "simulation")  # their code decides the optima
 HEADLINE = ("random-10", "random-20", "random-30", "adversarial")  # suites with --worlds
 CROWDS = ("random-10", "random-20", "random-30")  # seen in several ways
 STRIPPED = ("random-20", "random-30", "adversarial")  # in which ingredients are left out
@@ -110,19 +110,21 @@ class Results:
         self.directories: dict[tuple[str, str, Setting], Path] = {}
         self._found: dict[tuple[str, str, Setting], tuple[list[Row], list[Row]]] = {}
         self._optima: dict[str, dict[int, Row]] = {}
-        self._standings: dict[tuple[str, Entry, int, int, bool], Standing] = {}
+        self._standings: dict[tuple[str, Entry, int, int, bool], PlannerSummary] = {}
 
     def judge(self, suite: str, worlds: int) -> None:
         """Ask the oracle about a suite."""
-        order = SweepSpec(
+        spec = SweepSpec(
             suite=suite, planners=("straight",), worlds=worlds, first=self.first, setting=FINE
         )
-        chunks = [part for part in chunks_of(order) if isinstance(part, Optima)]
+        chunks = [part for part in chunks_of(spec) if isinstance(part, OracleChunk)]
         facts = {"suite": suite, "first": self.first, "worlds": worlds}
         store = Store(
             self.out / f"{suite}-optima", chunks, facts, command="benchmark", packages=ORACLE
         )
-        found = compute(chunks, workers=self.workers, executor=self.executor, store=store, say=say)
+        found = compute(
+            chunks, workers=self.workers, executor=self.executor, store=store, warn=warn
+        )
         columns = [found[part.name] for part in chunks]
         rows = [dict(zip(some, values)) for some in columns for values in zip(*some.values())]
         self._optima[suite] = {row["world"]: row for row in rows}
@@ -130,30 +132,30 @@ class Results:
     def make(self, suite: str, entry: Entry, worlds: int) -> None:
         """Make the runs of one line."""
         key = (suite, entry.planner, entry.setting)
-        order = SweepSpec(
+        spec = SweepSpec(
             suite=suite, planners=(entry.planner,), worlds=worlds, first=self.first,
             oracle=False, setting=entry.setting,
         )  # fmt: skip
         plain = "".join(c if c.isalnum() or c in ".-" else "-" for c in entry.label)
         self.directories[key] = self.out / f"{suite}-{plain}"
-        store = open_store(self.directories[key], order)
-        swept = sweep(order, workers=self.workers, executor=self.executor, store=store, say=say)
-        say(f"{suite}: {entry.label}, {worlds} worlds")
+        store = open_store(self.directories[key], spec)
+        swept = sweep(spec, workers=self.workers, executor=self.executor, store=store, warn=warn)
+        warn(f"{suite}: {entry.label}, {worlds} worlds")
         optima, number = self._optima[suite], suite_of(suite).world_number
         rows = [
-            judged(row, optima[number(row["world"])], entry.setting.params.speed_mps)
+            with_optimum(row, optima[number(row["world"])], entry.setting.params.speed_mps)
             for row in swept.rows
         ]
         self._found[key] = rows, swept.timings
 
     def standing(
         self, suite: str, entry: Entry, worlds: int, case: int = 0, *, timed: bool = False
-    ) -> Standing:
+    ) -> PlannerSummary:
         """Figures of one line over the first so many worlds (of the paper's: of one case)."""
         key = (suite, entry, worlds, case, timed)
         if key not in self._standings:  # bootstrapping thousands of worlds takes seconds
             rows, timings = (self.of(kind, suite, entry, worlds, case) for kind in (0, 1))
-            (self._standings[key],) = standings(_timed(rows) if timed else rows, timings)
+            (self._standings[key],) = planner_summaries(_timed(rows) if timed else rows, timings)
         return self._standings[key]
 
     def versus(
@@ -208,6 +210,6 @@ def of_suite(entries: tuple[Entry, ...], suite: str) -> tuple[Entry, ...]:
     return entries if suite in where else ()
 
 
-def say(line: str) -> None:
+def warn(line: str) -> None:
     """A word to whoever watches."""
     print(line, file=sys.stderr, flush=True)

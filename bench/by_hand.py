@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from mfba_planner.launcher.graph_monitor import Monitor
+from mfba_planner.launcher.graph_monitor import GraphMonitor
 from mfba_planner.launcher.node_processes import NodeProcesses
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.ros.interface import topics
@@ -39,7 +39,7 @@ class ByHand:
 
     def __enter__(self) -> ByHand:
         domain = self._stack.enter_context(private_domain())
-        self.monitor = self._stack.enter_context(Monitor(domain))
+        self.monitor = self._stack.enter_context(GraphMonitor(domain))
         hear = lambda name, line: self._lines.append(f"{name}: {line}")  # noqa: E731
         self.crew = self._stack.enter_context(NodeProcesses(hear, lambda: False))
         self._deadline = time.monotonic() + TIMEOUT_S
@@ -66,15 +66,15 @@ class ByHand:
             due = time.monotonic() + delay_s
             self.until(lambda due=due: time.monotonic() >= due, "delay")  # type: ignore[misc]
             self.crew.start({name: self.told[name]}, {})
-        for name, question in self.monitor.ask_ready(ALL).items():
-            ready = lambda q=question: (a := q.answer()) is not None and a.success  # noqa: E731
+        for name, question in self.monitor.call_ready(ALL).items():
+            ready = lambda q=question: (a := q.response()) is not None and a.success  # noqa: E731
             self.until(ready, f"{name} ready")
-        self.monitor.listen()
-        self.until(self.monitor.ask_pause(False).answer, "pause")
+        self.monitor.subscribe()
+        self.until(self.monitor.call_pause(False).response, "pause")
 
     def tick(self) -> int:
         """The last tick that was decided, -1 before the first."""
-        self.monitor.take_in()
+        self.monitor.poll()
         now = self.monitor.progress()
         return now.stamp_ns // self._tick_ns - 1 if now else -1
 

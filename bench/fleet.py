@@ -33,7 +33,7 @@ from mfba_planner.simulation.planner_observations import (
     observe_sectors,
 )
 from mfba_planner.simulation.robot_model import Lidar, Robot
-from mfba_planner.simulation.scenario import Member, Scenario
+from mfba_planner.simulation.scenario import FleetRobot, Scenario
 
 JITTER_DEG = 8.0  # of 36 between two robots
 JITTER_STREAM = 7  # spawn key of the places' SeedSequence children
@@ -47,7 +47,7 @@ def circle(robots: int, radius_m: float, seed: int, robot: Robot) -> Scenario:
     for k, turn in enumerate(jitter.tolist()):
         angle = 2.0 * math.pi * k / robots + math.radians(JITTER_DEG) * turn
         x, y = radius_m * math.cos(angle), radius_m * math.sin(angle)
-        members.append(Member(name=f"robot{k}", start_m=(x, y), goal_m=(-x, -y)))
+        members.append(FleetRobot(name=f"robot{k}", start_m=(x, y), goal_m=(-x, -y)))
     return Scenario(
         name="swap",
         start_m=members[0].start_m,

@@ -21,7 +21,7 @@ from mfba_planner.core.types import NANO
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.ros_domain import claim_domain
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.odometry_jump import is_jump_reason
+from mfba_planner.planning.odometry_jump import is_odometry_jump
 from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
 from mfba_planner.planning.predictive import preset
 from mfba_planner.recording.read_episode import read_episode
@@ -87,7 +87,7 @@ def main() -> None:
             episode = play(scenario, params, k)
             arrived += episode.outcome is Outcome.GOAL_REACHED
             clean += evaluate(episode).success
-            noticed += any(is_jump_reason(tick.reason) for tick in episode.ticks)
+            noticed += any(is_odometry_jump(tick.reason) for tick in episode.ticks)
             if k < found.graph:
                 equal += by_graph(scenario, params, k) == digest(episode.ticks)
         graph = f"; graph: {equal} of {found.graph} digests equal" if found.graph else ""

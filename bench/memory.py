@@ -20,7 +20,7 @@ os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 from mfba_planner.core.geometry import distance
 from mfba_planner.core.types import NANO
-from mfba_planner.launcher.graph_monitor import Monitor, Question
+from mfba_planner.launcher.graph_monitor import GraphMonitor, ServiceCall
 from mfba_planner.launcher.node_processes import NodeProcesses
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.planning.planner_params import PlannerParams
@@ -57,7 +57,7 @@ def measure(ticks: int) -> dict[str, list[float]]:
     with (
         tempfile.TemporaryDirectory() as root,
         private_domain() as domain,
-        Monitor(domain) as monitor,
+        GraphMonitor(domain) as monitor,
         NodeProcesses(lambda name, line: None, lambda: False) as crew,
     ):
         told = node_parameters(config, peers)
@@ -68,16 +68,16 @@ def measure(ticks: int) -> dict[str, list[float]]:
         told["planner"] |= {"view_period_s": told["world_sim"]["view_period_s"]}
         told[RECORDER] = {"output": f"{root}/bag", "nodes": ",".join(NODES), "sim_time": True}
         crew.start({RECORDER: told.pop(RECORDER), **told}, {})
-        for question in monitor.ask_ready(peers).values():
+        for question in monitor.call_ready(peers).values():
             agreed(crew, monitor, question)
-        monitor.listen()
-        agreed(crew, monitor, monitor.ask_pause(False))
+        monitor.subscribe()
+        agreed(crew, monitor, monitor.call_pause(False))
         history: dict[str, list[float]] = {c.name: [] for c in crew.children}
         due, begun = float(WARM_UP), time.monotonic()
         while due <= ticks:
             time.sleep(0.05)
             crew.check()
-            monitor.take_in()
+            monitor.poll()
             now = monitor.progress()
             tick = now.stamp_ns // config.planner.tick_ns if now else 0
             if tick >= due:
@@ -92,9 +92,9 @@ def measure(ticks: int) -> dict[str, list[float]]:
     return history
 
 
-def agreed(crew: NodeProcesses, monitor: Monitor, question: Question) -> None:
+def agreed(crew: NodeProcesses, monitor: GraphMonitor, question: ServiceCall) -> None:
     """Ask until the answer is yes."""
-    while (answer := question.answer()) is None or not answer.success:
+    while (response := question.response()) is None or not response.success:
         crew.check()
         monitor.spin(0.02)
 

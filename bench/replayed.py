@@ -45,7 +45,7 @@ def decide_again(config: RunConfig, bag: Path, root: Path, domain: int) -> tuple
     context = Context()
     context.init(domain_id=domain)
     graph = Graph(context)
-    decisions = graph.hear(topics.DECISION)
+    decisions = graph.collect(topics.DECISION)
     env = {"ROS_DOMAIN_ID": str(domain)}
     arguments = ["--ros-args", "--params-file", str(root / "planner.yaml")]
     try:

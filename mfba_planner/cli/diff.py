@@ -10,9 +10,9 @@ from ..core.errors import BagError
 from ..core.options import flatten
 from ..core.outputs import bag_in
 from ..evaluation.metrics import evaluate
-from ..recording.omitted_decisions import tell
+from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import Recording, read_recording
-from ..recording.robot_topics import of_robot
+from ..recording.robot_topics import with_robot_name
 from ..report.result_table import comparison_text
 from ..simulation.decision_digest import digest
 from ..simulation.episode import Episode
@@ -36,8 +36,8 @@ def main(args: list[str]) -> int:
             f"{parsed.right}: holds other robots than {parsed.left}; name one that both have with "
             "--robot"
         )
-    tell(bags[0], left_recording.missed)
-    tell(bags[1], right_recording.missed)
+    print_omissions(bags[0], left_recording.omitted)
+    print_omissions(bags[1], right_recording.omitted)
     differ = [
         _compare(parsed, robot, left_recording, right_recording)
         for robot in left_recording.episodes
@@ -52,16 +52,16 @@ def _compare(
     left, right = left_recording.episodes[robot], right_recording.episodes[robot]
     divergence = first_divergence(left.ticks, right.ticks)
     if divergence is None:
-        same_omissions = left_recording.missed.get(robot) == right_recording.missed.get(robot)
+        same_omissions = left_recording.omitted.get(robot) == right_recording.omitted.get(robot)
         text = f"{len(left.ticks)} decisions, digest {digest(left.ticks)}"
         verdict = "identical" if same_omissions else "identical but for what is left out"
-        print(of_robot(robot, f"{verdict}, {text}"))
+        print(with_robot_name(robot, f"{verdict}, {text}"))
         return not same_omissions
     for name, a, b in _settings(left, right):
-        print(of_robot(robot, f"{name}: {a} against {b}"))
+        print(with_robot_name(robot, f"{name}: {a} against {b}"))
     names = (str(parsed.left), str(parsed.right))
     print(comparison_text((names[0], evaluate(left)), (names[1], evaluate(right))))
-    print(of_robot(robot, f"first difference at tick {divergence.tick}:"))
+    print(with_robot_name(robot, f"first difference at tick {divergence.tick}:"))
     print("\n".join(side_by_side(divergence, *names)))
     return True
 

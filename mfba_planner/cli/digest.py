@@ -8,9 +8,9 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.outputs import bag_in
-from ..recording.omitted_decisions import tell
+from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import summaries
-from ..recording.robot_topics import NO_NAMESPACE, chosen
+from ..recording.robot_topics import NO_NAMESPACE, select_robots
 from ..report.result_json import read_result
 
 
@@ -35,10 +35,10 @@ def main(args: list[str]) -> int:
 
 def _digests(path: Path, robots: list[str]) -> dict[str, str]:
     if path.suffix == ".json":
-        chosen(path, [NO_NAMESPACE], robots)
+        select_robots(path, [NO_NAMESPACE], robots)
         return {NO_NAMESPACE: str(read_result(path)["digest"])}
     bag = bag_in(path)
     runs = summaries(bag, robots)
     # To stderr, so that stdout has digest lines only.
-    tell(bag, {name: run.missed for name, run in runs.items()}, sys.stderr)
+    print_omissions(bag, {name: run.omitted for name, run in runs.items()}, sys.stderr)
     return {name: run.digest for name, run in runs.items()}

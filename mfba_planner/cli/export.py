@@ -15,8 +15,8 @@ from ..core.errors import BagError, ConfigError
 from ..core.outputs import bag_in, new_file
 from ..recording.bag_reader import BagReader
 from ..recording.decisions import robots_with_decisions
-from ..recording.omitted_decisions import tell
-from ..recording.robot_topics import chosen
+from ..recording.omitted_decisions import print_omissions
+from ..recording.robot_topics import select_robots
 from ..recording.tick_table import COLUMNS, Row, read_rows
 
 BATCH = 5000  # rows in memory at a time
@@ -39,16 +39,16 @@ def main(args: list[str]) -> int:
     write = writers.get(parsed.table.suffix)
     if write is None:
         raise ConfigError(f"{parsed.table}: unknown table format; give a name in .csv or .parquet")
-    missed: dict[str, str] = {}
+    omitted: dict[str, str] = {}
     with BagReader(bag_in(parsed.bag)) as reader:
-        robots = chosen(reader.path, robots_with_decisions(reader), parsed.robots)
-        rows = read_rows(reader, robots, missed)
+        robots = select_robots(reader.path, robots_with_decisions(reader), parsed.robots)
+        rows = read_rows(reader, robots, omitted)
         first = next(rows, None)
         if first is None:
             raise BagError(f"{parsed.bag}: holds no decision to export; give another bag")
         with new_file(parsed.table) as file:
             count = write(file, list(first), chain([first], rows))
-    tell(reader.path, missed)
+    print_omissions(reader.path, omitted)
     print(f"wrote {parsed.table}: {count} rows")
     return 0
 

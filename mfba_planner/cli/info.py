@@ -9,7 +9,7 @@ from ..core.outputs import bag_in
 from ..launcher.run_result import show
 from ..recording.bag_info import describe, format_info
 from ..recording.configuration import ATTACHMENT_NAME
-from ..recording.omitted_decisions import tell
+from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import Summary, summaries
 from ..recording.robot_topics import NO_NAMESPACE
 from ..report.fleet_table import fleet_text
@@ -32,7 +32,7 @@ def main(args: list[str]) -> int:
         else:
             print()
             _print_runs(runs)
-            tell(bag, {robot: run.missed for robot, run in runs.items()})
+            print_omissions(bag, {robot: run.omitted for robot, run in runs.items()})
     return 0
 
 

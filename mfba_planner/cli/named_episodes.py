@@ -19,9 +19,9 @@ from ..core.outputs import bag_in
 from ..core.resources import scenario_names
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
-from ..recording.omitted_decisions import tell
+from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import Recording, read_recording
-from ..recording.robot_topics import NO_NAMESPACE, chosen
+from ..recording.robot_topics import NO_NAMESPACE, select_robots
 from ..report.result_json import read_result
 from ..scenarios.scenario_files import load_scenario
 from ..simulation.decision_digest import digest
@@ -74,9 +74,9 @@ def _recording(path: Path, robots: Sequence[str]) -> Recording:
         path = path / _RESULT
     if path.suffix != ".json":
         recording = read_recording(bag, robots)
-        tell(bag, recording.missed)
+        print_omissions(bag, recording.omitted)
         return recording
-    chosen(path, [NO_NAMESPACE], robots)
+    select_robots(path, [NO_NAMESPACE], robots)
     episode = _simulate_result(path)
     return Recording(episode.scenario, episode.seed, {NO_NAMESPACE: episode}, {})
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.outputs import bag_in
-from ..recording.omitted_decisions import tell
+from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import read_recording
 
 
@@ -19,8 +19,8 @@ def main(args: list[str]) -> int:
     parser.add_robots()
     parsed = parser.parse(args)
     bag = bag_in(parsed.bag)
-    scenario, seed, runs, missed = read_recording(bag, parsed.robots)
-    tell(bag, missed)
+    scenario, seed, runs, omitted = read_recording(bag, parsed.robots)
+    print_omissions(bag, omitted)
     # The drawing modules take long to import: only after the bag has been read.
     if len(runs) == 1:
         from ..report.run_figure import draw_run

@@ -14,11 +14,11 @@ from ..core.argument_parser import Parser
 from ..core.errors import InputError
 from ..core.outputs import new_run_directory, refuse_existing, write_new
 from ..evaluation.oracle import solve
-from ..evaluation.sweep.columns import Row, made_row
+from ..evaluation.sweep.columns import Row, run_row
 from ..evaluation.sweep.explain_run import contact_index, explain
 from ..evaluation.sweep.planner_sandbox import HungError
 from ..evaluation.sweep.read_sweep import ReadSweep, read_sweep
-from ..evaluation.sweep.single_run import PlayedRun, run_one
+from ..evaluation.sweep.single_run import CompletedRun, run_one
 from ..evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, own_preset, read_run
 
 _DESCRIPTION = """Repeat a run of a sweep and explain its outcome.
@@ -69,19 +69,19 @@ def _failure_text(row: Row) -> str:
 
 def _show_run(swept: ReadSweep | None, argument: str, out: Path | None, *, bag: bool) -> int:
     run, row = _find_run(swept, argument)
-    setting = swept.order.setting_of(run.planner) if swept else _default_setting(run)
+    setting = swept.spec.setting_of(run.planner) if swept else _default_setting(run)
     # Raises ConfigError for a bad run.
     SweepSpec(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)
     directory = refuse_existing(out or new_run_directory(stem="show"))
     with _time_limit(setting.patience_s):
-        played = run_one(run, setting)
-    lines = [str(run), *explain(played), *_oracle_lines(played, setting)]
+        completed = run_one(run, setting)
+    lines = [str(run), *explain(completed), *_oracle_lines(completed, setting)]
     if swept is not None and swept.code_changed:
         lines.append("note: the code has changed since the sweep; its result may differ")
-    if row is not None and not _is_same(row, made_row(run, played)):
+    if row is not None and not _is_same(row, run_row(run, completed)):
         lines.append("note: the sweep's run had another result; see the row of its table")
     print("\n".join(lines))
-    names = _write(directory, run, played, lines, bag=bag)
+    names = _write(directory, run, completed, lines, bag=bag)
     print(f"wrote {directory}: {', '.join(names)}")
     return 0
 
@@ -129,28 +129,28 @@ def _time_limit(limit_s: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def _oracle_lines(played: PlayedRun, setting: Setting) -> Iterator[str]:
-    solution = solve(played.episode.scenario, setting.params.speed_mps)
+def _oracle_lines(completed: CompletedRun, setting: Setting) -> Iterator[str]:
+    solution = solve(completed.episode.scenario, setting.params.speed_mps)
     length = f", {solution.length_m:.3f} m" if solution.waypoints else ""
     yield f"oracle: {solution.certificate.value} at {solution.speed_mps:g} m/s{length}"
 
 
 def _write(
-    directory: Path, run: Run, played: PlayedRun, lines: list[str], *, bag: bool
+    directory: Path, run: Run, completed: CompletedRun, lines: list[str], *, bag: bool
 ) -> list[str]:
-    episode = played.episode
+    episode = completed.episode
     directory.mkdir(parents=True)
     names = ["explanation.txt"]
     write_new(directory / names[0], ("\n".join(lines) + "\n").encode())
     if not episode.ticks:
         return names
     from ..report.run_figure import draw_run
-    from ..report.tick_figure import moment_png
+    from ..report.tick_figure import tick_png
 
     draw_run(episode, directory / "run.png")
     index = contact_index(episode)
     index = len(episode.ticks) - 1 if index is None else index
-    write_new(directory / "moment.png", moment_png(episode, index, str(run), lines[1:2]))
+    write_new(directory / "moment.png", tick_png(episode, index, str(run), lines[1:2]))
     names += ["run.png", "moment.png"]
     if bag:
         from ..ros.interface.episode_to_bag import write_episode_bag

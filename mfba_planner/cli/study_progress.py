@@ -53,7 +53,7 @@ def run_with_progress(
 ) -> dict[str, Sample]:
     """Run the plan with a progress bar."""
     with progress(chunks, store.directory) as done:
-        return run_plan(chunks, workers=workers, store=store, done=done, say=print_status)
+        return run_plan(chunks, workers=workers, store=store, done=done, warn=print_status)
 
 
 def print_status(line: str) -> None:

@@ -19,7 +19,7 @@ from ..evaluation.suites import suite_names
 from ..evaluation.suites.named_suites import SPEED_MPS
 from ..evaluation.sweep.chunks import chunks_of
 from ..evaluation.sweep.columns import COLUMNS, TIMINGS
-from ..evaluation.sweep.run_sweep import Swept, dask_executor, open_store, sweep
+from ..evaluation.sweep.run_sweep import SweepResult, dask_executor, open_store, sweep
 from ..evaluation.sweep.sweep_spec import PATIENCE_S, Setting, SweepSpec, own_preset
 from ..evaluation.sweep.table import write
 from ..launcher.set_option import add_set_argument, with_settings
@@ -52,7 +52,7 @@ def main(args: list[str]) -> int:
             executor=executor,
             store=store,
             done=done,
-            say=print_status,
+            warn=print_status,
         )
     names = [f"table.{parsed.format}", "timings.csv"]
     write(directory / names[0], swept.rows, COLUMNS)
@@ -193,15 +193,15 @@ def _non_default(params: Any, default: Any) -> Iterator[tuple[str, Scalar]]:
     )
 
 
-def _report(swept: Swept, directory: Path) -> None:
+def _report(swept: SweepResult, directory: Path) -> None:
     from rich.console import Console
 
-    from ..evaluation.sweep.summary import comparisons, standings
+    from ..evaluation.sweep.summary import comparisons, planner_summaries
     from ..report.sweep_tables import tables, to_markdown
     from ..report.terminal_output import print_encodable
 
-    spec = swept.order
-    ranking, pairs = standings(swept.rows, swept.timings), comparisons(swept.rows)
+    spec = swept.spec
+    ranking, pairs = planner_summaries(swept.rows, swept.timings), comparisons(swept.rows)
     title = f"{spec.suite}: {spec.worlds} worlds from {spec.first} on, {spec.seeds} seeds each"
     facts = [f"`{command_line(spec)}`", f"sorted hash of the table `{swept.hash}`"]
     write_same(directory / "report.md", to_markdown(ranking, pairs, title, facts).encode())

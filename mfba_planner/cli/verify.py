@@ -14,7 +14,7 @@ from ..core.outputs import bag_in
 from ..launcher.set_option import add_set_argument, with_settings
 from ..recording.bag_reader import BagReader
 from ..recording.read_episode import read_recording
-from ..recording.robot_topics import NO_NAMESPACE, of_robot
+from ..recording.robot_topics import NO_NAMESPACE, with_robot_name
 from ..simulation.episode import Episode, Outcome, stamp_of
 from ..simulation.simulate import simulate, simulate_fleet
 from ..verification.compare_decisions import Divergence, first_divergence, side_by_side
@@ -73,7 +73,7 @@ def _print_report(robot: str, report: Report) -> None:
         _print_divergence(report.divergence, "recorded", "recomputed", robot)
     elif not report.faults:
         text = f"identical, {len(report.recorded)} decisions, digest {report.digest}"
-        print(of_robot(robot, text))
+        print(with_robot_name(robot, text))
 
 
 def _print_divergence(
@@ -82,7 +82,7 @@ def _print_divergence(
     decision = divergence.left or divergence.right
     assert decision is not None
     text = f"first difference at tick {divergence.tick}, stamp {decision.stamp_ns} ns:"
-    print(of_robot(robot, text))
+    print(with_robot_name(robot, text))
     print("\n".join(side_by_side(divergence, left, right)))
 
 
@@ -92,7 +92,7 @@ def _verdict(robot: str, report: Report) -> str:
         failures.append(f"tick {report.divergence.tick} is not what the planner decides")
     if report.faults:
         failures.append(f"{len(report.faults)} faults, the first: {report.faults[0]}")
-    return of_robot(robot, f"not identical: {'; '.join(failures)}")
+    return with_robot_name(robot, f"not identical: {'; '.join(failures)}")
 
 
 def _simulate_again(
@@ -141,12 +141,12 @@ def _compare_closed_loop(bag: Path, robot: str, recorded: Episode, simulated: Ep
     divergence = first_divergence(recorded.ticks, simulated.ticks)
     if divergence:
         _print_divergence(divergence, "recorded", "simulated again", robot)
-        text = of_robot(robot, f"tick {divergence.tick} differs from the simulated world")
+        text = with_robot_name(robot, f"tick {divergence.tick} differs from the simulated world")
         raise BagError(
             f"{bag}: {text}; see above "
             "(expected if the robot was moved or the recorded world was not simulated)"
         )
-    print(of_robot(robot, f"closed loop: identical, {len(simulated.ticks)} ticks"))
+    print(with_robot_name(robot, f"closed loop: identical, {len(simulated.ticks)} ticks"))
 
 
 def _compare_what_if(
@@ -156,7 +156,7 @@ def _compare_what_if(
     from ..report.result_table import comparison_text
 
     change = " ".join(parsed.settings)
-    print(f"\n{of_robot(robot, f'what if {change}')}")
+    print(f"\n{with_robot_name(robot, f'what if {change}')}")
     print(comparison_text(("recorded", evaluate(recorded)), ("what if", evaluate(simulated))))
     divergence = first_divergence(recorded.ticks, simulated.ticks)
     if divergence:

@@ -13,8 +13,8 @@ from ..core.geometry import Point
 from ..launcher.set_option import with_settings
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
-from ..recording.robot_topics import NO_NAMESPACE, of_robot
-from ..verification.redecide import Redecided, Robot, redecide_recording
+from ..recording.robot_topics import NO_NAMESPACE, with_robot_name
+from ..verification.redecide import RedecideParams, RedecideResult, redecide_recording
 from ..verification.verify_bag import Report
 
 SHOWN = 10  # faults printed at most
@@ -78,13 +78,13 @@ def report(bag: Path, parsed: argparse.Namespace) -> int:
     return 0
 
 
-def _robot(parsed: argparse.Namespace) -> Robot:
+def _robot(parsed: argparse.Namespace) -> RedecideParams:
     from ..ros.node_parameters import VirtualSensorSettings  # a bag of mfba does not need it
 
     planner, sensor = with_settings(PlannerParams(), SensorParams(), parsed.settings)
     values = {"robot_radius_m": parsed.robot_radius, "scan_yaw": parsed.scan_yaw}
     settings = VirtualSensorSettings(**{k: v for k, v in values.items() if v is not None})
-    return Robot(
+    return RedecideParams(
         robot_radius_m=settings.robot_radius_m,
         scan_yaw_rad=parsed.scan_yaw,
         goal=_goal(parsed.goal),
@@ -104,11 +104,11 @@ def _goal(goal: list[float] | None) -> Point | None:
     return (goal[0], goal[1])
 
 
-def print_remarks(report: Report | Redecided, robot: str = NO_NAMESPACE) -> None:
+def print_remarks(report: Report | RedecideResult, robot: str = NO_NAMESPACE) -> None:
     """Print the notes, then at most SHOWN faults."""
     for note in report.notes:
-        print(of_robot(robot, f"note: {note}"))
+        print(with_robot_name(robot, f"note: {note}"))
     for fault in report.faults[:SHOWN]:
-        print(of_robot(robot, f"fault: {fault}"))
+        print(with_robot_name(robot, f"fault: {fault}"))
     if len(report.faults) > SHOWN:
-        print(of_robot(robot, f"fault: ... and {len(report.faults) - SHOWN} more"))
+        print(with_robot_name(robot, f"fault: ... and {len(report.faults) - SHOWN} more"))

@@ -28,20 +28,24 @@ def wrap_angle(angle_rad: float) -> float:
     return math.pi if wrapped == -math.pi else wrapped
 
 
-def half_turn(yaw_rad: float) -> Point:
+def quaternion_from_yaw(yaw_rad: float) -> Point:
     """(z, w) of the unit quaternion of a planar rotation (REP-103)."""
     return (math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad))
 
 
-def yaw_of(x: float, y: float, z: float, w: float) -> float:
+def yaw_from_quaternion(x: float, y: float, z: float, w: float) -> float:
     """Yaw of a quaternion that must not be 0, but need not be normalized."""
     norm = x * x + y * y + z * z + w * w
     return math.atan2(2.0 * (w * z + x * y) / norm, 1.0 - 2.0 * (y * y + z * z) / norm)
 
 
-def carried(pose: Pose2D) -> Pose2D:
+def pose_as_in_message(pose: Pose2D) -> Pose2D:
     """The pose after yaw -> quaternion -> yaw, as in a message: the last bit may differ."""
-    return Pose2D(pose.x, pose.y, yaw_of(0.0, 0.0, *half_turn(pose.yaw))) if pose.yaw else pose
+    return (
+        Pose2D(pose.x, pose.y, yaw_from_quaternion(0.0, 0.0, *quaternion_from_yaw(pose.yaw)))
+        if pose.yaw
+        else pose
+    )
 
 
 def distance(a: Point, b: Point) -> float:

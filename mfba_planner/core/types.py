@@ -69,13 +69,13 @@ class Observation:
     sensed: tuple[int, Pose2D] | None = None
 
 
-Refused = str  # the reason why an input was refused, in place of the input
+RefusalReason = str  # the reason why an input was refused, in place of the input
 
 
 def observe(
     stamp_ns: int,
-    pose: Pose2D | Refused,
-    ranges_m: Ranges | Refused,
+    pose: Pose2D | RefusalReason,
+    ranges_m: Ranges | RefusalReason,
     goal: Point | None,
     last_pose: Pose2D,
     age_ns: int = 0,

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.geometry import Pose2D, distance
 from ..core.types import NANO, Decision, Mode
-from ..planning.odometry_jump import is_jump_reason
+from ..planning.odometry_jump import is_odometry_jump
 from ..simulation.batched_motion import Array, Motion, StepClearances
 from ..simulation.episode import Episode, Outcome
 from .contacts_and_clearances import DrivenPath, ObstaclePasses, RunMotion
@@ -157,7 +157,7 @@ class MetricsAccumulator:
         ticks = self._block
         if len(ticks) == self._evaluated:
             return
-        driven = np.array([not is_jump_reason(tick.reason) for tick in ticks[1:]], dtype=bool)
+        driven = np.array([not is_odometry_jump(tick.reason) for tick in ticks[1:]], dtype=bool)
         self._extend_path(ticks[self._evaluated :])
         times_s, positions_m = self._times_and_positions(ticks)
         steps = self._motion.steps(times_s, positions_m)
@@ -177,7 +177,7 @@ class MetricsAccumulator:
         """Add ticks to the path; a new path starts where the robot was kidnapped."""
         first = 0
         for number, tick in enumerate(ticks):
-            if is_jump_reason(tick.reason):
+            if is_odometry_jump(tick.reason):
                 if number > first:
                     self._path.add([tick.pose.position for tick in ticks[first:number]])
                 self._path.interrupt()
@@ -200,7 +200,7 @@ def steps_driven(episode: Episode) -> list[tuple[Decision, Decision]]:
         for tick, pose in zip_longest(episode.ticks, episode.truth)
     ]
     pairs = pairwise(ticks if len(ticks) > 1 else ticks * 2)
-    return [(a, replace(b, pose=a.pose) if is_jump_reason(b.reason) else b) for a, b in pairs]
+    return [(a, replace(b, pose=a.pose) if is_odometry_jump(b.reason) else b) for a, b in pairs]
 
 
 def tick_clearances(episode: Episode) -> list[list[float]]:
@@ -211,7 +211,7 @@ def tick_clearances(episode: Episode) -> list[list[float]]:
     positions_m = np.array([tick.pose.position for tick in moments]).T
     gaps_m = motion.steps(times_s, positions_m).gap_m
     for k, (_, b) in enumerate(steps):
-        if is_jump_reason(b.reason):  # the next step starts elsewhere
+        if is_odometry_jump(b.reason):  # the next step starts elsewhere
             at_rest_m = positions_m[:, [k, k]]
             gaps_m[k] = motion.steps(times_s[k : k + 2], at_rest_m).gap_m[0]
     return [[float(gap) for gap in row] for row in gaps_m]

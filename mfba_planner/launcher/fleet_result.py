@@ -7,7 +7,7 @@ import sys
 
 from ..core.errors import MfbaError
 from ..evaluation.metrics import evaluate
-from ..recording.omitted_decisions import tell
+from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import read_recording
 from ..report.fleet_table import fleet_text, why_no_success
 from .run import Run
@@ -24,12 +24,12 @@ def finish_fleet_run(run: Run, failure: str = "") -> None:
 
     directory, config = run.directory, run.request.config
     recording = read_recording(directory.bag)
-    tell(directory.bag, recording.missed)
+    print_omissions(directory.bag, recording.omitted)
     runs = recording.episodes
     results = [evaluate(episode) for episode in runs.values()]
     extra = {"fleet_seed": config.seed, "wall_s": run.wall_s, "failure": failure or None}
     for name, episode in runs.items():
-        left_out = {"left_out": recording.missed[name]} if name in recording.missed else {}
+        left_out = {"left_out": recording.omitted[name]} if name in recording.omitted else {}
         write_result(directory.path / f"{name}.json", result_to_dict(episode, extra | left_out))
     if run.request.picture:
         draw_fleet(config.scenario, config.seed, runs, directory.picture)

@@ -16,7 +16,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import SetBool, Trigger
 
-from ..recording.from_messages import points, stamp_ns
+from ..recording.from_messages import parse_points, stamp_ns
 from ..recording.robot_topics import NO_NAMESPACE
 from ..ros.endpoints.robot_namespace import below
 from ..ros.interface import topics
@@ -38,7 +38,7 @@ class Progress:
     distance_m: float
 
 
-class Question:
+class ServiceCall:
     """A service call that is sent again until a response comes; it never blocks."""
 
     def __init__(self, client: Client, request: Any) -> None:
@@ -48,7 +48,7 @@ class Question:
         self._future: Any = None
         self._sent_at = 0.0
 
-    def answer(self) -> Any:
+    def response(self) -> Any:
         """Return the response, once; None while there is none."""
         now = time.monotonic()
         if self._future is not None and self._future.done():
@@ -62,7 +62,7 @@ class Question:
         return None
 
 
-class Monitor:
+class GraphMonitor:
     """A ROS node that watches the run; no other node waits for it."""
 
     def __init__(self, domain_id: int, robots: Sequence[str] = (NO_NAMESPACE,)) -> None:
@@ -83,7 +83,7 @@ class Monitor:
         self._decisions: dict[str, bytes] = {}
         self._ticks: dict[str, int] = {}
 
-    def __enter__(self) -> Monitor:
+    def __enter__(self) -> GraphMonitor:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -95,24 +95,26 @@ class Monitor:
     def spin(self, timeout_s: float) -> None:
         """Handle one service response within timeout_s, and the newest message of each topic."""
         self._executor.spin_once(timeout_sec=timeout_s)
-        self.take_in()
+        self.poll()
 
-    def take_in(self) -> None:
+    def poll(self) -> None:
         """Take the newest message of each topic, without waiting."""
         self._polled.poll()
 
-    def ask_ready(self, nodes: Iterable[str]) -> dict[str, Question]:
+    def call_ready(self, nodes: Iterable[str]) -> dict[str, ServiceCall]:
         """A call of ~/ready for each node."""
         return {
-            name: Question(self._node.create_client(Trigger, f"{name}/ready"), Trigger.Request())
+            name: ServiceCall(
+                self._node.create_client(Trigger, f"{name}/ready"), Trigger.Request()
+            )
             for name in nodes
         }
 
-    def ask_pause(self, paused: bool) -> Question:
+    def call_pause(self, paused: bool) -> ServiceCall:
         """A call of world_sim/pause, to pause or to resume."""
-        return Question(self._pause, SetBool.Request(data=paused))
+        return ServiceCall(self._pause, SetBool.Request(data=paused))
 
-    def listen(self) -> None:
+    def subscribe(self) -> None:
         """Subscribe to the run; only when all are ready, or readiness would wait for this node."""
         for robot in self._robots:
             self._subscribe(robot, topics.DECISION, PROGRESS_QOS, self._on_decision)
@@ -156,7 +158,7 @@ def _progress(decision: bytes) -> Progress:
     message = deserialize_message(decision, topics.DECISION.type)
     fields = {item.key: item.value for item in message.status[0].values}
     x, y, _ = map(float, fields["pose"].split(","))
-    goal = points(fields["goal"])
+    goal = parse_points(fields["goal"])
     return Progress(
         stamp_ns=stamp_ns(message.header.stamp),
         mode=fields["mode"],

@@ -10,10 +10,10 @@ from typing import Any
 
 from ..core.errors import BagError, GraphError
 from ..recording.bag_reader import BagReader
-from ..recording.robot_topics import NO_NAMESPACE, below
+from ..recording.robot_topics import NO_NAMESPACE, robot_topic
 from ..ros.interface import topics
 from ..scenarios.run_config import NODES, READY_TIMEOUT_S, graph_parameters, recorder_parameters
-from .graph_monitor import Monitor
+from .graph_monitor import GraphMonitor
 from .node_processes import NodeProcesses
 from .ros_domain import private_domain
 from .run import Run
@@ -43,7 +43,7 @@ def run_multi_process(run: Run) -> None:
     parameters = {RECORDER: recorder_parameters(config, bag, parameters)} | parameters
     with (
         private_domain() as domain,
-        Monitor(domain, config.scenario.robot_names or (NO_NAMESPACE,)) as monitor,
+        GraphMonitor(domain, config.scenario.robot_names or (NO_NAMESPACE,)) as monitor,
         NodeProcesses(run.console.print_node_line, run.stop.is_urgent) as node_processes,
     ):
         run.console.print_line(f"starting the nodes; watch with ROS_DOMAIN_ID={domain}")
@@ -57,7 +57,7 @@ class _MultiProcessDriver:
     """Waits until all nodes are ready, resumes the world, waits for the end of the run."""
 
     def __init__(
-        self, run: Run, monitor: Monitor, node_processes: NodeProcesses, nodes: Sequence[str]
+        self, run: Run, monitor: GraphMonitor, node_processes: NodeProcesses, nodes: Sequence[str]
     ) -> None:
         self._run = run
         self._monitor = monitor
@@ -69,7 +69,7 @@ class _MultiProcessDriver:
     def run(self) -> dict[str, int]:
         """Run from start to end; return each robot's number of ticks."""
         self._wait_until_ready()
-        self._monitor.listen()
+        self._monitor.subscribe()
         self._run.start()
         try:
             self._resume_world()
@@ -96,12 +96,12 @@ class _MultiProcessDriver:
 
     def _wait_until_ready(self) -> None:
         """Wait until every node is ready, so that no first message is lost."""
-        ready_calls = self._monitor.ask_ready(self._nodes)
+        ready_calls = self._monitor.call_ready(self._nodes)
         missing = dict.fromkeys(ready_calls, "no response yet")
 
         def all_ready() -> bool:
             for name in [*missing]:
-                response = ready_calls[name].answer()
+                response = ready_calls[name].response()
                 if response is not None:
                     missing[name] = response.message
                     if response.success:
@@ -116,9 +116,9 @@ class _MultiProcessDriver:
         self._node_processes.remove_parameter_files()
 
     def _resume_world(self) -> None:
-        pause_call = self._monitor.ask_pause(False)
+        pause_call = self._monitor.call_pause(False)
         self._wait(
-            pause_call.answer, RESPONSE_TIMEOUT_S, lambda: "no response from world_sim/pause"
+            pause_call.response, RESPONSE_TIMEOUT_S, lambda: "no response from world_sim/pause"
         )
 
     def _wait_until_over(self) -> dict[str, int]:
@@ -127,7 +127,7 @@ class _MultiProcessDriver:
         while (ticks := self._monitor.ticks_at_end()) is None:
             self._check()
             time.sleep(POLL_PERIOD_S)
-            self._monitor.take_in()
+            self._monitor.poll()
             if self._run.console.is_progress_due() and (now := self._monitor.progress()):
                 self._run.show(now.stamp_ns // tick_ns - 1, now.distance_m, now.mode)
         return ticks
@@ -145,9 +145,9 @@ class _MultiProcessDriver:
 
     def _pause_world(self) -> None:
         """Pause the world, if it runs, so that the bag ends with a whole tick."""
-        pause_call = self._monitor.ask_pause(True)
+        pause_call = self._monitor.call_pause(True)
         deadline = time.monotonic() + PAUSE_TIMEOUT_S
-        while pause_call.answer() is None and time.monotonic() < deadline:
+        while pause_call.response() is None and time.monotonic() < deadline:
             if self._run.stop.is_urgent() or not self._node_processes.is_running(topics.WORLD_SIM):
                 return
             self._monitor.spin(POLL_PERIOD_S)
@@ -159,7 +159,7 @@ def require_complete(directory: RunDirectory, ticks: Mapping[str, int]) -> None:
         counts = {name: topic.message_count for name, topic in reader.topics.items()}
     every_tick = [topic for topic in topics.GRAPH if topic.every_tick]
     for robot, topic in itertools.product(ticks, every_tick):
-        name = topic.name if topic.name.startswith("/") else below(robot, f"/{topic.name}")
+        name = topic.name if topic.name.startswith("/") else robot_topic(robot, f"/{topic.name}")
         if (found := counts.get(name, 0)) < ticks[robot]:
             raise BagError(
                 f"{directory.bag}: incomplete, {found} of {ticks[robot]} messages on {name}; "

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..core.errors import MfbaError
 from ..core.geometry import distance
 from ..evaluation.metrics import Result, evaluate
-from ..recording.omitted_decisions import tell
+from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import read_recording
 from ..recording.robot_topics import NO_NAMESPACE
 from ..simulation.episode import Episode, Outcome
@@ -56,10 +56,10 @@ def finish_run(run: Run, episode: Episode | None, failure: str = "") -> RunResul
     left_out = ""
     if episode is None:
         recording = read_recording(directory.bag)
-        tell(directory.bag, recording.missed)
+        print_omissions(directory.bag, recording.omitted)
         episode, left_out = (
             recording.episodes[NO_NAMESPACE],
-            recording.missed.get(NO_NAMESPACE, ""),
+            recording.omitted.get(NO_NAMESPACE, ""),
         )
     result = evaluate(episode)
     speed = result.ticks / run.wall_s if run.wall_s else None

@@ -48,6 +48,6 @@ def with_odometry_jump(decision: Decision, odometry_jump_reason: str) -> Decisio
     )
 
 
-def is_jump_reason(reason: str) -> bool:
+def is_odometry_jump(reason: str) -> bool:
     """Whether a decision's reason reports an odometry jump."""
     return reason.startswith(CARRIED_OFF)

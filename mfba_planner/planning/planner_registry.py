@@ -57,10 +57,10 @@ def make(
 
     Raises ConfigError for an unknown name, with the nearest known one, and a negative seed.
     """
-    return known(name)(params or PlannerParams(), sensor or SensorParams(), seed)
+    return find_factory(name)(params or PlannerParams(), sensor or SensorParams(), seed)
 
 
-def known(name: str) -> Factory:
+def find_factory(name: str) -> Factory:
     """The factory of the planner of that name. Raises ConfigError as make() does."""
     factory = PLANNERS.get(name)
     if factory is None:

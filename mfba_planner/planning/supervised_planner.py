@@ -10,7 +10,7 @@ from ..core.errors import ConfigError
 from ..core.geometry import Point, bearing, distance, towards
 from ..core.types import NANO, Decision, Mode, Observation, PathPlanner
 from .algorithm_1 import Algorithm1
-from .odometry_jump import is_jump_reason
+from .odometry_jump import is_odometry_jump
 from .planner_params import Method, PlannerParams
 from .recovery import Phase, Recovery, advance, most_room
 from .speed_limit import allowed_speed_share
@@ -70,7 +70,7 @@ class SupervisedPlanner:
     def plan(self, obs: Observation) -> Decision:
         """Decide on one observation."""
         decision = self.inner.plan(obs)
-        if obs.goal != self._goal or is_jump_reason(decision.reason):
+        if obs.goal != self._goal or is_odometry_jump(decision.reason):
             self._forget()
             self._goal = obs.goal
         if self.params.recovery.enabled:

@@ -12,7 +12,7 @@ from ..core.types import Decision, Ranges
 from .bag_reader import BagReader, DecodedMessage
 from .from_messages import decision, sector_ranges, stamp_ns
 from .omitted_decisions import omission_text
-from .robot_topics import NO_NAMESPACE, below, messages_by_robot, of_robot
+from .robot_topics import NO_NAMESPACE, messages_by_robot, robot_topic, with_robot_name
 
 SECTORS, DECISION = "/sectors", "/planner/decision"
 MAX_WAITING = 10_000  # sectors without decision, decisions without sectors, matched stamps: each
@@ -35,13 +35,13 @@ def robots_with_decisions(reader: BagReader) -> list[str]:
 
 def require_decisions(reader: BagReader, robots: Sequence[str] = (NO_NAMESPACE,)) -> None:
     """Raise BagError if the decisions or sectors of one of these robots are missing."""
-    for topic in (below(robot, topic) for robot in robots for topic in (SECTORS, DECISION)):
+    for topic in (robot_topic(robot, topic) for robot in robots for topic in (SECTORS, DECISION)):
         if topic not in reader.topics or not reader.topics[topic].message_count:
             raise BagError(f"{reader.path}: holds no {topic}; give a bag `mfba run` recorded")
 
 
 def stream_decisions(
-    reader: BagReader, robots: Sequence[str], missed: dict[str, str]
+    reader: BagReader, robots: Sequence[str], omitted: dict[str, str]
 ) -> Iterator[RecordedDecision]:
     """Yield each robot's decisions in bag sequence, one per stamp, in one pass.
 
@@ -64,11 +64,11 @@ def stream_decisions(
             if not matching.sectors_ended_before(stamp):
                 raise _missing_sectors(reader, robot, stamp)
         if matching.decisions:
-            missed[robot] = omission_text(matching.decisions, [SECTORS])
+            omitted[robot] = omission_text(matching.decisions, [SECTORS])
 
 
 def _missing_sectors(reader: BagReader, robot: str, stamp: int) -> BagError:
-    text = of_robot(robot, f"no sectors at stamp {stamp} ns; was the bag edited?")
+    text = with_robot_name(robot, f"no sectors at stamp {stamp} ns; was the bag edited?")
     return BagError(f"{reader.path}: {text}")
 
 
@@ -105,11 +105,11 @@ class _StampMatching:
 
 
 def rising_decisions(
-    reader: BagReader, robots: Sequence[str], missed: dict[str, str]
+    reader: BagReader, robots: Sequence[str], omitted: dict[str, str]
 ) -> Iterator[RecordedDecision]:
     """As stream_decisions; also raises BagError if a robot's stamp decreases."""
     last_ns = dict.fromkeys(robots, -1)
-    for recorded in stream_decisions(reader, robots, missed):
+    for recorded in stream_decisions(reader, robots, omitted):
         stamp, before_ns = recorded.decision.stamp_ns, last_ns[recorded.robot]
         if stamp < before_ns:
             raise BagError(

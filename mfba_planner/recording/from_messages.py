@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..core.errors import FrameError, InputError
-from ..core.geometry import Point, Pose2D, yaw_of
-from ..core.types import Decision, Mode, Ranges, Refused, Scan
+from ..core.geometry import Point, Pose2D, yaw_from_quaternion
+from ..core.types import Decision, Mode, Ranges, RefusalReason, Scan
 from ..perception.sensory_vector import blind
 from ..simulation.differential_drive import command
 from ..simulation.robot_model import Base
@@ -36,7 +36,7 @@ def _finite(what: str, values: Iterable[float]) -> None:
             raise InputError(f"{what} holds {value}; send finite numbers")
 
 
-def value_or_refusal(read: Callable[[Any], T], message: Any) -> T | Refused:
+def value_or_refusal(read: Callable[[Any], T], message: Any) -> T | RefusalReason:
     """read(message), or the text of its InputError."""
     try:
         return read(message)
@@ -55,7 +55,7 @@ def pose2d(pose: Any, what: str) -> Pose2D:
     norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
     if not 1e-6 < norm < 1e6:
         raise InputError(f"{what} orientation has norm {norm:g}; send a unit quaternion (w=1)")
-    return Pose2D(p.x, p.y, yaw_of(q.x, q.y, q.z, q.w))
+    return Pose2D(p.x, p.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
 
 
 def require_frame(message: Any, frame: str, what: str, parameter: str = "odom_frame") -> None:
@@ -161,7 +161,7 @@ def body_velocity(decision: Decision, base: Base, tick_ns: int) -> tuple[float, 
     return (v[0], 0.0, v[1]) if base.turns else (*rotated(v, -decision.pose.yaw), 0.0)
 
 
-def told(twist: Any, base: Base, yaw_rad: float) -> Point:
+def command_from_twist(twist: Any, base: Base, yaw_rad: float) -> Point:
     """Twist to the command of World.step, for a base with this yaw; raises as velocity()."""
     vx, vy, wz = velocity(twist)
     return (vx, wz) if base.turns else rotated((vx, vy), yaw_rad)
@@ -172,7 +172,7 @@ def points_text(values: Iterable[Point]) -> str:
     return " ".join(f"{x!r},{y!r}" for x, y in values)
 
 
-def points(text: str) -> tuple[Point, ...]:
+def parse_points(text: str) -> tuple[Point, ...]:
     """Inverse of points_text; InputError for anything else."""
     try:
         pairs = [tuple(map(float, pair.split(","))) for pair in text.split()]
@@ -191,7 +191,7 @@ def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:
     try:
         status = diagnostics.status[0]
         fields = {item.key: item.value for item in status.values}
-        goal = points(fields["goal"])
+        goal = parse_points(fields["goal"])
         x, y, yaw = map(float, fields["pose"].split(","))
         return Decision(
             stamp_ns=stamp_ns(diagnostics.header.stamp),
@@ -203,9 +203,9 @@ def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:
             vs=tuple(map(int, fields["vs"])),
             vg=tuple(map(int, fields["vg"])),
             gap=int(fields["gap"]),
-            waypoint=points(fields["waypoint"])[0],
-            velocity=points(fields["velocity"])[0],
-            candidates=points(fields["candidates"]),
+            waypoint=parse_points(fields["waypoint"])[0],
+            velocity=parse_points(fields["velocity"])[0],
+            candidates=parse_points(fields["candidates"]),
         )
     except (KeyError, ValueError, IndexError) as error:
         raise InputError(

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TextIO
 
-from .robot_topics import of_robot
+from .robot_topics import with_robot_name
 
 
 def omission_text(stamps: Collection[int], topics: Collection[str]) -> str:
@@ -24,8 +24,8 @@ def omission_text(stamps: Collection[int], topics: Collection[str]) -> str:
     )
 
 
-def tell(path: Path, omissions: Mapping[str, str], file: TextIO | None = None) -> None:
+def print_omissions(path: Path, omissions: Mapping[str, str], file: TextIO | None = None) -> None:
     """Print the note of each robot of a bag, from the notes by robot ("": nothing to print)."""
     for robot, text in omissions.items():
         if text:
-            print(f"note: {path}: {of_robot(robot, text)}", file=file)
+            print(f"note: {path}: {with_robot_name(robot, text)}", file=file)

@@ -20,7 +20,7 @@ from ..simulation.scenario import Scenario
 from .bag_reader import BagReader
 from .decisions import rising_decisions, stream_decisions
 from .from_messages import robot_pose, stamp_ns
-from .robot_topics import NO_NAMESPACE, below, chosen, messages_by_robot
+from .robot_topics import NO_NAMESPACE, messages_by_robot, robot_topic, select_robots
 from .run_setup import read_setup, read_setups
 
 TRUTH = "/ground_truth"
@@ -32,7 +32,7 @@ class Recording(NamedTuple):
     scenario: Scenario
     seed: int
     episodes: dict[str, Episode]  # in the scenario's sequence; NO_NAMESPACE for a single robot
-    missed: dict[str, str]  # by robot: which last decisions are omitted, and why
+    omitted: dict[str, str]  # by robot: which last decisions are omitted, and why
 
 
 def read_recording(
@@ -47,10 +47,10 @@ def read_recording(
     with BagReader(path, salvage=salvage) as reader:
         scenario, seed, setups = read_setups(reader)
         names = list(setups)
-        selected = chosen(reader.path, names, robots)
+        selected = select_robots(reader.path, names, robots)
         ticks: dict[str, dict[int, Decision]] = {name: {} for name in names}
-        missed: dict[str, str] = {}
-        for recorded in stream_decisions(reader, names, missed):
+        omitted: dict[str, str] = {}
+        for recorded in stream_decisions(reader, names, omitted):
             ticks[recorded.robot].setdefault(recorded.decision.stamp_ns, recorded.decision)
         truth = _read_truth(reader, names)
     episodes = {
@@ -64,7 +64,7 @@ def read_recording(
         tick_ns = next(iter(setups.values())).planner.tick_ns
         worlds = dict(zip(names, scenarios_with_others(scenario, poses, tick_ns)))
         episodes = {name: replace(episodes[name], scenario=worlds[name]) for name in selected}
-    selected_notes = {name: text for name, text in missed.items() if name in episodes}
+    selected_notes = {name: text for name, text in omitted.items() if name in episodes}
     return Recording(scenario, seed, episodes, selected_notes)
 
 
@@ -84,7 +84,7 @@ class Summary(NamedTuple):
     episode: Episode
     result: Result
     digest: str
-    missed: str
+    omitted: str
 
 
 def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
@@ -94,9 +94,9 @@ def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
     """
     with BagReader(path, salvage=salvage) as reader:
         setup, truth = read_setup(reader), _read_truth(reader, [NO_NAMESPACE])[NO_NAMESPACE]
-        missed: dict[str, str] = {}
+        omitted: dict[str, str] = {}
         stream = (
-            recorded.decision for recorded in rising_decisions(reader, [NO_NAMESPACE], missed)
+            recorded.decision for recorded in rising_decisions(reader, [NO_NAMESPACE], omitted)
         )
         first = next(stream)  # raises BagError without decisions
         metrics, hasher = MetricsAccumulator(setup.episode((first,))), Digest()
@@ -105,7 +105,7 @@ def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
             hasher.add(tick)
     episode = setup.episode((tick,), truth)
     result = metrics.result(episode.outcome)
-    return Summary(episode, result, hasher.hexdigest(), missed.get(NO_NAMESPACE, ""))
+    return Summary(episode, result, hasher.hexdigest(), omitted.get(NO_NAMESPACE, ""))
 
 
 def summaries(
@@ -114,13 +114,13 @@ def summaries(
     """The Summary of each robot of a bag, or of those named; raises as read_recording()."""
     with BagReader(path, salvage=salvage) as reader:
         names = list(read_setups(reader).by_robot)
-        chosen(reader.path, names, robots)
+        select_robots(reader.path, names, robots)
     if names == [NO_NAMESPACE]:
         return {NO_NAMESPACE: summarize(path, salvage=salvage)}
     # The robots are moving obstacles of each other, so all are read before any is evaluated.
     recorded = read_recording(path, robots, salvage=salvage)
     return {
-        name: Summary(e, evaluate(e), digest(e.ticks), recorded.missed.get(name, ""))
+        name: Summary(e, evaluate(e), digest(e.ticks), recorded.omitted.get(name, ""))
         for name, e in recorded.episodes.items()
     }
 
@@ -128,12 +128,12 @@ def summaries(
 def _read_truth(reader: BagReader, robots: Sequence[str]) -> dict[str, dict[int, Pose2D]]:
     """The true pose of each robot by stamp; empty if the bag has no ground truth."""
     recorded: dict[str, dict[int, Pose2D]] = {robot: {} for robot in robots}
-    if not any(below(robot, TRUTH) in reader.topics for robot in robots):
+    if not any(robot_topic(robot, TRUTH) in reader.topics for robot in robots):
         return recorded
     for robot, message in messages_by_robot(reader, robots, [TRUTH]):
         odom = message.message
         try:
             recorded[robot][stamp_ns(odom.header.stamp)] = robot_pose(odom)
         except InputError as error:
-            raise BagError(f"{reader.path}: {below(robot, TRUTH)}: {error}") from None
+            raise BagError(f"{reader.path}: {robot_topic(robot, TRUTH)}: {error}") from None
     return recorded

@@ -15,7 +15,7 @@ from .qos_profiles import OfferedQos
 UNKNOWN_DEPTH = 1000  # messages; rosbag2 records depth 0 if the middleware does not report it
 
 
-class Due(NamedTuple):
+class DueMessage(NamedTuple):
     """One message to replay: CDR bytes, and log time in ns, not before the start of the replay."""
 
     topic: str
@@ -23,7 +23,7 @@ class Due(NamedTuple):
     time_ns: int
 
 
-def begin_ns(bag: BagReader, start_offset_s: float) -> int:
+def replay_start_ns(bag: BagReader, start_offset_s: float) -> int:
     """The log time at which the replay starts. Raises ConfigError beyond the end of the bag."""
     offset_ns = round(start_offset_s * 1e9)
     if offset_ns > bag.duration_ns:
@@ -39,18 +39,18 @@ def due_messages(
     topics: Collection[str],
     latched: Mapping[str, int],
     start_offset_s: float = 0.0,
-) -> Iterator[Due]:
+) -> Iterator[DueMessage]:
     """The messages of `topics` sorted by log time, from the offset on.
 
     First come the newest messages before the offset of each topic in `latched` (depth by name),
     as a late subscriber would have received them. Raises BagError, ConfigError.
     """
-    start_ns = begin_ns(bag, start_offset_s)
+    start_ns = replay_start_ns(bag, start_offset_s)
     if start_offset_s > 0.0 and latched:
         for topic, data in _latched_before(bag, latched, start_ns):
-            yield Due(topic, data, start_ns)
+            yield DueMessage(topic, data, start_ns)
     for message in bag.messages(topics, start_offset_s=start_offset_s):
-        yield Due(message.topic, message.data, message.log_time_ns)
+        yield DueMessage(message.topic, message.data, message.log_time_ns)
 
 
 def _latched_before(
@@ -65,7 +65,7 @@ def _latched_before(
     return ((name, data) for _, name, data in in_sequence)
 
 
-def offer(profiles: tuple[OfferedQos, ...]) -> OfferedQos:
+def merged_qos(profiles: tuple[OfferedQos, ...]) -> OfferedQos:
     """One QoS for a topic on which several publishers were recorded.
 
     If they differ, the strongest: it matches every subscriber that one of them matched.
@@ -124,7 +124,7 @@ class Schedule:
             self._steady_ns = now_ns if self._started else None
 
     @property
-    def by_steps(self) -> bool:
+    def is_stepped(self) -> bool:
         """Whether log time advances only with the messages: stopped, or as fast as possible."""
         return self._steady_ns is None or self.rate is None
 
@@ -134,9 +134,9 @@ class Schedule:
             return self._log_ns
         return self._log_ns + round((now_ns - self._steady_ns) * self.rate)
 
-    def step_to(self, time_ns: int) -> None:
+    def advance_to(self, time_ns: int) -> None:
         """Advance to the log time of a message; does nothing while time runs."""
-        if self.by_steps:
+        if self.is_stepped:
             self._log_ns = max(self._log_ns, time_ns)
 
     def wait_ns(self, time_ns: int, now_ns: int) -> int | None:

@@ -17,7 +17,7 @@ from .bag_reader import BagReader, DecodedMessage
 NO_NAMESPACE = ""
 
 
-def below(robot: str, topic: str) -> str:
+def robot_topic(robot: str, topic: str) -> str:
     """The full name of a robot's topic in a bag, from its name at the root."""
     return f"/{robot}{topic}" if robot else topic
 
@@ -26,13 +26,15 @@ def messages_by_robot(
     reader: BagReader, robots: Sequence[str], topics: Collection[str]
 ) -> Iterator[tuple[str, DecodedMessage]]:
     """Yield (robot, message with its topic name at the root) in one pass, by log time."""
-    robot_topics = {below(robot, topic): (robot, topic) for robot in robots for topic in topics}
+    robot_topics = {
+        robot_topic(robot, topic): (robot, topic) for robot in robots for topic in topics
+    }
     for message in reader.decoded(robot_topics):
         robot, topic = robot_topics[message.topic]
         yield robot, message._replace(topic=topic)
 
 
-def chosen(path: Path, robots: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
+def select_robots(path: Path, robots: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
     """The wanted robots of a bag, all if none is named. BagError for an unknown robot."""
     for name in wanted:
         if NO_NAMESPACE in robots:
@@ -42,6 +44,6 @@ def chosen(path: Path, robots: Sequence[str], wanted: Sequence[str]) -> tuple[st
     return tuple(name for name in robots if name in wanted) if wanted else tuple(robots)
 
 
-def of_robot(robot: str, text: str) -> str:
+def with_robot_name(robot: str, text: str) -> str:
     """A line of text with the robot's name in front; unchanged for a single robot."""
     return f"{robot}: {text}" if robot else text

@@ -37,13 +37,13 @@ COLUMNS: dict[str, tuple[type, str]] = {
 }
 
 
-def read_rows(reader: BagReader, robots: Sequence[str], missed: dict[str, str]) -> Iterator[Row]:
+def read_rows(reader: BagReader, robots: Sequence[str], omitted: dict[str, str]) -> Iterator[Row]:
     """Yield the rows sorted by stamp, then in the sequence of `robots`.
 
     Omits decisions and raises BagError as rising_decisions().
     """
     first_ns: int | None = None
-    decisions = rising_decisions(reader, robots, missed)
+    decisions = rising_decisions(reader, robots, omitted)
     for stamp, group in groupby(decisions, lambda recorded: recorded.decision.stamp_ns):
         first_ns = stamp if first_ns is None else first_ns
         for recorded in sorted(group, key=lambda recorded: robots.index(recorded.robot)):

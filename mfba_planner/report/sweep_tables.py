@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from rich.table import Table
 
 from mfba_planner.evaluation.statistics import Interval
-from mfba_planner.evaluation.sweep.summary import Standing, Versus
+from mfba_planner.evaluation.sweep.summary import PlannerSummary, Versus
 
 _NONE = "-"
 HEAD = (
@@ -28,7 +28,9 @@ VERSUS_HEAD = (
 VERSUS_NOTE = "the same worlds with the same seeds; gaps where both succeeded, negative: shorter"
 
 
-def tables(summaries: Sequence[Standing], versus: Sequence[Versus], title: str) -> list[Table]:
+def tables(
+    summaries: Sequence[PlannerSummary], versus: Sequence[Versus], title: str
+) -> list[Table]:
     """Tables for a terminal."""
     found = [_table(title, HEAD, _summary_lines(summaries), NOTE)]
     if versus:
@@ -37,11 +39,11 @@ def tables(summaries: Sequence[Standing], versus: Sequence[Versus], title: str) 
 
 
 def to_markdown(
-    summaries: Sequence[Standing], versus: Sequence[Versus], title: str, facts: Sequence[str]
+    summaries: Sequence[PlannerSummary], versus: Sequence[Versus], title: str, facts: Sequence[str]
 ) -> str:
     """The same as a Markdown page; facts: lines about how the sweep was made."""
     blocks = [f"# {title}", "\n".join(f"- {fact}" for fact in facts)]
-    blocks += [standing_table(summaries), NOTE + "."]
+    blocks += [summary_table(summaries), NOTE + "."]
     failures = [
         f"- {s.planner}: {count} x {reason}" for s in summaries for reason, count in s.failures
     ]
@@ -52,7 +54,7 @@ def to_markdown(
     return "\n\n".join(blocks) + "\n"
 
 
-def standing_table(summaries: Sequence[Standing]) -> str:
+def summary_table(summaries: Sequence[PlannerSummary]) -> str:
     """One line per planner, as Markdown."""
     return markdown(HEAD, _summary_lines(summaries))
 
@@ -62,7 +64,7 @@ def versus_table(versus: Sequence[Versus]) -> str:
     return markdown(VERSUS_HEAD, _versus_lines(versus))
 
 
-def _summary_lines(summaries: Sequence[Standing]) -> Iterator[list[str]]:
+def _summary_lines(summaries: Sequence[PlannerSummary]) -> Iterator[list[str]]:
     for s in summaries:
         yield [
             s.planner,

@@ -15,7 +15,7 @@ _SIDE, _HEAD, _AXIS, _PANEL = 5.0, 0.85, 0.6, 2.6  # inches
 _AROUND = 3.0  # sensing ranges shown around the robot
 
 
-def moment_png(episode: Episode, index: int, title: str, lines: Sequence[str]) -> bytes:
+def tick_png(episode: Episode, index: int, title: str, lines: Sequence[str]) -> bytes:
     """The robot's surroundings at tick index (from 0) as PNG, with title and subtitle."""
     with style.context():
         sheet = Sheet(EDGE + _AXIS + _SIDE + EDGE + _PANEL, _AXIS + EDGE + _SIDE + _HEAD)

@@ -14,7 +14,7 @@ from ..core.geometry import Point
 from ..core.options import override
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.robot_model import Robot
-from ..simulation.scenario import Kidnapping, Member, Scenario
+from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
 
 EXAMPLE = "compare config/scenarios/case1.yaml"
 
@@ -95,11 +95,11 @@ def as_written(data: dict[str, Any]) -> Scenario:
     )
 
 
-def _member(data: Any) -> Member:
-    _require_keys(data, Member)
+def _member(data: Any) -> FleetRobot:
+    _require_keys(data, FleetRobot)
     if not isinstance(data["name"], str):
         raise UnusualError
-    return Member(
+    return FleetRobot(
         name=data["name"], start_m=_point(data["start_m"]), goal_m=_point(data["goal_m"])
     )
 

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..core.errors import ConfigError
 from ..core.options import did_you_mean
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
-from ..simulation.scenario import Kidnapping, Member, Scenario
+from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
 from .plain_data import EXAMPLE, LIMIT, parse_robot
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
@@ -94,8 +94,8 @@ class _Member(_Strict):
     start_m: _Point
     goal_m: _Point
 
-    def build(self) -> Member:
-        return Member(name=self.name, start_m=self.start_m, goal_m=self.goal_m)
+    def build(self) -> FleetRobot:
+        return FleetRobot(name=self.name, start_m=self.start_m, goal_m=self.goal_m)
 
 
 class _Scenario(_Strict):

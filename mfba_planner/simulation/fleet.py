@@ -233,7 +233,7 @@ def episodes(
     driver: str,
 ) -> tuple[Episode, ...]:
     """The Episode of each robot of a fleet."""
-    errs = fleet.scenario.robot.noise.of_odometry
+    errs = fleet.scenario.robot.noise.affects_odometry
     worlds = scenarios_with_others(
         fleet.scenario, [robot_world.poses for robot_world in fleet.robot_worlds], fleet.tick_ns
     )

@@ -13,7 +13,7 @@ import numpy as np
 from ..core.errors import ConfigError, InputError
 from ..core.geometry import Pose2D, distance
 from ..core.options import did_you_mean
-from ..core.types import Circle, Observation, Ranges, Refused, Scan, observe
+from ..core.types import Circle, Observation, Ranges, RefusalReason, Scan, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams, blind, sense_circles
 from .sensor_noise import Reading
@@ -160,7 +160,7 @@ def _sensed(world: World, reading: Reading, params: SensorParams) -> Ranges:
 def observe_sectors(world: World, sensor: SensorParams) -> Observation:
     """Observation of the paper's planner at the present tick: pose, sectors, goal."""
     reading = world.read()
-    ranges: Ranges | Refused
+    ranges: Ranges | RefusalReason
     try:
         ranges = _sensed(world, reading, sensor)
     except InputError:

@@ -109,7 +109,7 @@ class Noise:
         check(self)
 
     @property
-    def of_odometry(self) -> bool:
+    def affects_odometry(self) -> bool:
         """Whether odometry may differ from the true pose."""
         return any((self.odom_m, self.odom_rad, self.odom_loss, self.odom_latency_s))
 

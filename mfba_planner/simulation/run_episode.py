@@ -53,7 +53,7 @@ def episode_generator(
         driver="core",
         ticks=tuple(ticks),
         outcome=outcome or Outcome.INTERRUPTED,
-        truth=tuple(truth) if scenario.robot.noise.of_odometry else (),
+        truth=tuple(truth) if scenario.robot.noise.affects_odometry else (),
     )
 
 

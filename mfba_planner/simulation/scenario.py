@@ -23,7 +23,7 @@ class Kidnapping:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Member:
+class FleetRobot:
     """One robot of a fleet: its name, which is its ROS namespace, its start and its goal (m)."""
 
     name: str
@@ -60,7 +60,7 @@ class Scenario:
     description: str = ""
     robot: Robot = Robot()
     kidnappings: tuple[Kidnapping, ...] = ()
-    robots: tuple[Member, ...] = ()
+    robots: tuple[FleetRobot, ...] = ()
 
     @property
     def robot_names(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.geometry import Pose2D, carried
+from ..core.geometry import Pose2D, pose_as_in_message
 from ..core.types import NANO, Scan
 from .obstacle_motion import Walls
 from .robot_model import Robot
@@ -30,7 +30,7 @@ class Reading:
     @property
     def received(self) -> Pose2D:
         """The pose as a subscriber to the odometry receives it."""
-        return carried(self.pose)
+        return pose_as_in_message(self.pose)
 
 
 class NoisySensors:

@@ -114,7 +114,7 @@ class World:
     def read(self) -> Reading:
         """Sensor reading of the present tick; further calls in a tick return the same."""
         robot = self.scenario.robot
-        if not (robot.lidar.beams or robot.noise.of_odometry):
+        if not (robot.lidar.beams or robot.noise.affects_odometry):
             return Reading(self.pose, None)
         if self._read is None or self._read[0] != self.tick:
             surfaces: list[tuple[float, float, float]] = []

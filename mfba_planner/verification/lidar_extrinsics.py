@@ -7,7 +7,7 @@ import math
 from typing import Any, NamedTuple
 
 from ..core.errors import FrameError
-from ..core.geometry import yaw_of
+from ..core.geometry import yaw_from_quaternion
 from ..recording.bag_reader import BagReader
 
 TRANSFORMS, TF_STATIC = "tf2_msgs/msg/TFMessage", "tf_static"
@@ -80,7 +80,9 @@ class StaticFrames:
                 f"frame {frame!r}: tilted against {base!r}, so its beams leave the robot's plane "
                 "of motion; give --scan-yaw if they do not"
             )
-        return LidarExtrinsics(yaw_of(x, y, z, w), math.hypot(position[0], position[1]))
+        return LidarExtrinsics(
+            yaw_from_quaternion(x, y, z, w), math.hypot(position[0], position[1])
+        )
 
     def _poses_in_ancestors(self, frame: str) -> dict[str, Pose]:
         """The poses of a frame in itself and in all its ancestors, by frame."""

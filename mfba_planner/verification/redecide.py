@@ -12,7 +12,7 @@ from typing import Any
 
 from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point, Pose2D
-from ..core.types import Decision, Ranges, Refused, observe
+from ..core.types import Decision, Ranges, RefusalReason, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import make_planner
@@ -40,7 +40,7 @@ GOAL_TOPIC = "goal_pose"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Robot:
+class RedecideParams:
     """Parameters that a recording lacks; goal and scan_yaw_rad None: as recorded."""
 
     robot_radius_m: float
@@ -54,7 +54,7 @@ class Robot:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Redecided:
+class RedecideResult:
     """The decisions on every scan; faults are errors of the recording, notes are not."""
 
     decided: tuple[Decision, ...]
@@ -78,7 +78,7 @@ def is_foreign(reader: BagReader) -> bool:
     return not ours and {ODOMETRY, SCAN} <= types
 
 
-def redecide_recording(path: str | Path, params: Robot) -> Redecided:
+def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResult:
     """Decide on every scan with the odometry of its stamp, or the newest recorded before it.
 
     Same as virtual_sensor (source: scan) and planner on a replay of the bag, with the lidar
@@ -109,7 +109,7 @@ def _topic_name(reader: BagReader, type_name: str, wanted: str, option: str) -> 
     return found[0]
 
 
-def _goals(reader: BagReader, params: Robot) -> list[tuple[int, Point]]:
+def _goals(reader: BagReader, params: RedecideParams) -> list[tuple[int, Point]]:
     """(log time in ns, goal), sorted by time."""
     if params.goal is not None:
         return [(-1, params.goal)]
@@ -147,16 +147,16 @@ class _PoseLookup:
     """All poses of a recording, by stamp and by log time."""
 
     def __init__(self, reader: BagReader, topic: str, faults: list[str]) -> None:
-        self.by_stamp: dict[int, Pose2D | Refused] = {}
+        self.by_stamp: dict[int, Pose2D | RefusalReason] = {}
         self._times_ns: list[int] = []
-        self._all: list[tuple[int, Pose2D | Refused]] = []
+        self._all: list[tuple[int, Pose2D | RefusalReason]] = []
         for stamp, message in _rising(reader, topic, faults):
             pose = value_or_refusal(robot_pose, message.message)
             self.by_stamp[stamp] = pose
             self._times_ns.append(message.log_time_ns)
             self._all.append((stamp, pose))
 
-    def newest(self, log_time_ns: int) -> tuple[int, Pose2D | Refused] | None:
+    def newest(self, log_time_ns: int) -> tuple[int, Pose2D | RefusalReason] | None:
         """(stamp, pose) of the newest pose recorded up to a log time, None without one."""
         index = bisect_right(self._times_ns, log_time_ns)
         return self._all[index - 1] if index else None
@@ -165,7 +165,7 @@ class _PoseLookup:
 class _ScanYaw:
     """The yaw of each scan's lidar on the robot, as given or from /tf_static."""
 
-    def __init__(self, reader: BagReader, params: Robot, odom: str) -> None:
+    def __init__(self, reader: BagReader, params: RedecideParams, odom: str) -> None:
         self.notes: list[str] = []
         self._given_yaw_rad = params.scan_yaw_rad
         self._path, self._frames = reader.path, StaticFrames(reader)
@@ -196,7 +196,7 @@ class _PlannerRun:
 
     def __init__(
         self,
-        params: Robot,
+        params: RedecideParams,
         poses: _PoseLookup,
         goals: list[tuple[int, Point]],
         faults: list[str],
@@ -211,13 +211,13 @@ class _PlannerRun:
         self._pose = Pose2D(0.0, 0.0)
         self._counts: Counter[str] = Counter()
 
-    def decide_all(self, reader: BagReader, topic: str) -> Redecided:
+    def decide_all(self, reader: BagReader, topic: str) -> RedecideResult:
         decided = []
         for stamp, message in _rising(reader, topic, self._faults):
             decision = self._decide(stamp, message.log_time_ns, message.message)
             if decision is not None:
                 decided.append(decision)
-        return Redecided(
+        return RedecideResult(
             decided=tuple(decided),
             faults=tuple(self._faults),
             notes=(
@@ -246,7 +246,7 @@ class _PlannerRun:
             observation = replace(observation, scan=aligned(laser_scan(scan), yaw))
         return self._planner.plan(observation)
 
-    def _measure(self, pose: Pose2D | Refused, scan: Any) -> Ranges | Refused:
+    def _measure(self, pose: Pose2D | RefusalReason, scan: Any) -> Ranges | RefusalReason:
         if isinstance(pose, str):
             return pose
         params = self._params

@@ -30,7 +30,7 @@ from ..recording.from_messages import (
     velocity,
 )
 from ..recording.from_messages import decision as read_decision
-from ..recording.robot_topics import NO_NAMESPACE, chosen
+from ..recording.robot_topics import NO_NAMESPACE, select_robots
 from ..recording.run_setup import Setup, read_setup, read_setups
 from ..simulation.decision_digest import digest
 from .compare_decisions import Divergence, first_divergence
@@ -91,7 +91,7 @@ def verify_each(path: str | Path, robots: Sequence[str] = ()) -> dict[str, Repor
         for file in reader.file_paths:
             check_data(file)
         setups = read_setups(reader).by_robot
-        names = chosen(reader.path, list(setups), robots)
+        names = select_robots(reader.path, list(setups), robots)
         messages = read_tick_messages(reader, names)
     found = {}
     for name in names:

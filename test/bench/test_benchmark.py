@@ -96,7 +96,7 @@ def test_the_readme_s_headline_is_the_page_s(count: int) -> None:
 
 def test_paper_has_its_own_step_and_all_others_share_one(made: Path) -> None:
     steps = {
-        path.name: read_sweep(path).order.setting.params.step_length_m
+        path.name: read_sweep(path).spec.setting.params.step_length_m
         for path in (made / OUT).iterdir()
         if not path.name.endswith("optima")
     }

@@ -76,8 +76,12 @@ def test_a_repeated_sweep_computes_nothing_and_prints_the_same(
     swept: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = {path: path.stat().st_mtime_ns for path in swept.rglob("*")}
-    monkeypatch.setattr(sweep_chunks.Runs, "run", lambda _: pytest.fail("nothing is left to do"))
-    monkeypatch.setattr(sweep_chunks.Optima, "run", lambda _: pytest.fail("nothing is left to do"))
+    monkeypatch.setattr(
+        sweep_chunks.RunsChunk, "run", lambda _: pytest.fail("nothing is left to do")
+    )
+    monkeypatch.setattr(
+        sweep_chunks.OracleChunk, "run", lambda _: pytest.fail("nothing is left to do")
+    )
     assert mfba("sweep", *SMALL, "--out", str(swept)) == 0
     out, err = capsys.readouterr()
     assert {path: path.stat().st_mtime_ns for path in swept.rglob("*")} == before

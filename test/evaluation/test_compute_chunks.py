@@ -73,7 +73,7 @@ def test_a_chunk_whose_worker_dies_is_named_and_run_again(tmp_path: Path) -> Non
     deaths.write_text("2")
     messages: list[str] = []
     chunks = [Square(k, deaths if k == 3 else None) for k in range(7)]
-    assert squares(compute(chunks, workers=2, say=messages.append)) == EXPECTED
+    assert squares(compute(chunks, workers=2, warn=messages.append)) == EXPECTED
     assert "square-3: its worker process may have died; running it again alone" in messages
     assert deaths.read_text() == "-1"
 
@@ -118,7 +118,7 @@ class KilledWorker(Exception):  # noqa: N818
 def test_a_cluster_that_loses_a_worker(error: Exception) -> None:
     messages: list[str] = []
     chunks = [Square(k) for k in range(7)]
-    assert squares(compute(chunks, executor=Unlucky(error), say=messages.append)) == EXPECTED
+    assert squares(compute(chunks, executor=Unlucky(error), warn=messages.append)) == EXPECTED
     assert len(messages) == 1
 
 

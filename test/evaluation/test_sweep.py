@@ -27,7 +27,7 @@ from mfba_planner.evaluation.sweep.chunks import chunks_of, make
 from mfba_planner.evaluation.sweep.columns import COLUMNS, TIMINGS, Row
 from mfba_planner.evaluation.sweep.run_sweep import (
     PACKAGES,
-    Swept,
+    SweepResult,
     dask_executor,
     open_store,
     sweep,
@@ -37,10 +37,10 @@ from mfba_planner.evaluation.sweep.single_run import (
     run_one,
     run_together,
 )
-from mfba_planner.evaluation.sweep.summary import comparisons, standings, versus
+from mfba_planner.evaluation.sweep.summary import comparisons, planner_summaries, versus
 from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, read_run
 from mfba_planner.evaluation.sweep.table import sorted_hash, to_csv, to_parquet, write
-from mfba_planner.evaluation.sweep.worker import Lost, Worker, each
+from mfba_planner.evaluation.sweep.worker import Lost, Worker, run_in_worker
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.simulation.run_episode import run
@@ -54,7 +54,7 @@ def spec_of(**changes: Any) -> SweepSpec:
 
 
 @pytest.fixture(scope="module")
-def small() -> Swept:
+def small() -> SweepResult:
     """Ten runs, with the oracle."""
     return sweep(spec_of(oracle=True))
 
@@ -66,7 +66,7 @@ def tiny_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chunks, "WORLDS_AT_ONCE", 2)
 
 
-def test_every_run_has_one_row_and_rows_are_sorted(small: Swept) -> None:
+def test_every_run_has_one_row_and_rows_are_sorted(small: SweepResult) -> None:
     keys = [tuple(row[name] for name in Run._fields) for row in small.rows]
     assert keys == [
         ("random-3", world, planner, 0) for world in range(5) for planner in ("paper", "straight")
@@ -76,7 +76,7 @@ def test_every_run_has_one_row_and_rows_are_sorted(small: Swept) -> None:
     assert [tuple(row[name] for name in Run._fields) for row in small.timings] == keys
 
 
-def test_a_row_equals_the_metrics_of_the_run(small: Swept) -> None:
+def test_a_row_equals_the_metrics_of_the_run(small: SweepResult) -> None:
     row = next(row for row in small.rows if (row["world"], row["planner"]) == (3, "paper"))
     scenario = suite("random-3").world(3)
     params = PlannerParams(speed_mps=0.8)
@@ -95,7 +95,7 @@ def test_a_row_equals_the_metrics_of_the_run(small: Swept) -> None:
     assert (row["obstacles"], row["encounters"]) == (3, len(result.encounters))
 
 
-def test_only_decisions_of_single_runs_are_timed(small: Swept) -> None:
+def test_only_decisions_of_single_runs_are_timed(small: SweepResult) -> None:
     for row in small.timings:
         assert row["wall_ms"] > 0.0
         if row["planner"] == "paper" and row["world"] > 0:  # computed together
@@ -170,7 +170,7 @@ def test_runs_of_a_lost_batch_are_run_one_by_one(
 
 @pytest.mark.usefixtures("tiny_chunks")
 @pytest.mark.parametrize("workers", [2, 4])
-def test_processes_change_nothing(small: Swept, workers: int) -> None:
+def test_processes_change_nothing(small: SweepResult, workers: int) -> None:
     again = sweep(spec_of(oracle=True), workers=workers)
     assert again.hash == small.hash
     assert again.rows == small.rows or repr(again.rows) == repr(small.rows)
@@ -190,12 +190,12 @@ def scheduler() -> Iterator[str]:
 
 @pytest.mark.usefixtures("tiny_chunks")
 @pytest.mark.filterwarnings("default")  # warnings of dask itself
-def test_dask_changes_nothing(small: Swept, scheduler: str) -> None:
+def test_dask_changes_nothing(small: SweepResult, scheduler: str) -> None:
     with dask_executor(scheduler) as executor:
         assert sweep(spec_of(oracle=True), executor=executor).hash == small.hash
 
 
-def test_the_hash_covers_every_bit_but_not_the_sequence(small: Swept) -> None:
+def test_the_hash_covers_every_bit_but_not_the_sequence(small: SweepResult) -> None:
     rows = small.rows
     assert sorted_hash(rows[::-1]) == small.hash
     last = {**rows[-1], "length_m": np.nextafter(rows[-1]["length_m"], 99.0).item()}
@@ -288,8 +288,8 @@ def test_a_planner_that_hangs_or_dies_loses_only_its_run(
 def test_errors_outside_the_planner_are_raised() -> None:
     run_of_no_suite = Run("random-4", 0, "straight", 0)
     with pytest.raises(ConfigError, match="no such suite"):
-        list(each(make, [(run_of_no_suite,)], Setting(), 60.0))
-    (rows,) = each(make, [(Run("random-3", 0, "straight", 0),)], Setting(), 60.0)
+        list(run_in_worker(make, [(run_of_no_suite,)], Setting(), 60.0))
+    (rows,) = run_in_worker(make, [(Run("random-3", 0, "straight", 0),)], Setting(), 60.0)
     assert not isinstance(rows, Lost)
     (row,) = rows
     assert row["outcome"] == "goal_reached", "the next run is not affected"
@@ -298,7 +298,7 @@ def test_errors_outside_the_planner_are_raised() -> None:
 # --- table and summary ------------------------------------------------------------------------
 
 
-def test_the_table_as_text_and_as_parquet(small: Swept, tmp_path: Path) -> None:
+def test_the_table_as_text_and_as_parquet(small: SweepResult, tmp_path: Path) -> None:
     text = list(csv.DictReader(io.StringIO(to_csv(small.rows, COLUMNS).decode())))
     (tmp_path / "t.parquet").write_bytes(to_parquet(small.rows, COLUMNS))
     table = parquet.read_table(tmp_path / "t.parquet")
@@ -315,7 +315,9 @@ def test_the_table_as_text_and_as_parquet(small: Swept, tmp_path: Path) -> None:
                 assert kind(line[name]) == value
 
 
-def test_a_table_that_was_cut_short_is_left_and_refused(small: Swept, tmp_path: Path) -> None:
+def test_a_table_that_was_cut_short_is_left_and_refused(
+    small: SweepResult, tmp_path: Path
+) -> None:
     path = tmp_path / "table.csv"
     write(path, small.rows, COLUMNS)
     whole = path.read_bytes()
@@ -327,8 +329,8 @@ def test_a_table_that_was_cut_short_is_left_and_refused(small: Swept, tmp_path: 
     assert path.read_bytes() == whole[: len(whole) // 2]
 
 
-def test_summary_of_each_planner(small: Swept) -> None:
-    paper, straight = standings(small.rows, small.timings)
+def test_summary_of_each_planner(small: SweepResult) -> None:
+    paper, straight = planner_summaries(small.rows, small.timings)
     assert (paper.planner, straight.planner) == ("paper", "straight")
     successes = [row for row in small.rows if row["planner"] == "paper" and row["success"]]
     assert paper.success.middle == len(successes) / 5

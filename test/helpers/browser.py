@@ -55,7 +55,7 @@ class Browser:
         width: int = 1400,
         height: int = 900,
         dark: bool = False,
-        calm: bool = False,
+        reduced_motion: bool = False,
     ) -> None:
         """Open a page and wait until its script has set data-ready."""
         self.command(
@@ -67,7 +67,7 @@ class Browser:
         )
         preferences = {
             "prefers-color-scheme": "dark" if dark else "light",
-            "prefers-reduced-motion": "reduce" if calm else "no-preference",
+            "prefers-reduced-motion": "reduce" if reduced_motion else "no-preference",
         }
         features = [{"name": name, "value": value} for name, value in preferences.items()]
         self.command("Emulation.setEmulatedMedia", features=features)
@@ -85,7 +85,7 @@ class Browser:
         """Run a script and return its result."""
         return self.driver.execute_script(script, *arguments)
 
-    def said(self) -> list[str]:
+    def console_messages(self) -> list[str]:
         """The messages of the console: errors and warnings."""
         return [entry["message"] for entry in self.driver.get_log("browser")]
 

@@ -29,10 +29,10 @@ class RelayedGraph:
         self.graph = graph
         self.tamper: dict[str, Tamper] = {}
         self.beams = [float("inf")] * 360
-        self.odom = graph.hear(topics.ODOM)
-        self.decisions = graph.hear(topics.DECISION)
-        self._diagnostics = graph.hear(topics.DIAGNOSTICS)
-        self.cmd_vel = graph.hear(topics.CMD_VEL)
+        self.odom = graph.collect(topics.ODOM)
+        self.decisions = graph.collect(topics.DECISION)
+        self._diagnostics = graph.collect(topics.DIAGNOSTICS)
+        self.cmd_vel = graph.collect(topics.CMD_VEL)
         self._relayed = {
             topic.name: graph.probe.create_publisher(
                 topic.type, f"tampered/{topic.name}", topic.qos

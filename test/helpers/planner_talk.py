@@ -46,11 +46,11 @@ class PlannerHarness:
         self.sectors = graph.writer(topics.SECTORS)
         self.goal = graph.writer(topics.GOAL_POSE)
         self.waypoints = graph.writer(topics.WAYPOINTS)
-        self.decisions = graph.hear(topics.DECISION)
-        self.plans = graph.hear(topics.PLAN)
-        self.goal_steps = graph.hear(topics.GOAL_STEP)
+        self.decisions = graph.collect(topics.DECISION)
+        self.plans = graph.collect(topics.PLAN)
+        self.goal_steps = graph.collect(topics.GOAL_STEP)
         stamped = parameters.get("enable_stamped_cmd_vel")
-        self.cmd_vel = graph.hear(topics.CMD_VEL, TwistStamped if stamped else None)
+        self.cmd_vel = graph.collect(topics.CMD_VEL, TwistStamped if stamped else None)
         if at:
             self.goal.publish(goal(*at))  # latched
         self.node = graph.start(PlannerNode, parameters)

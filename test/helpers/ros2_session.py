@@ -54,10 +54,10 @@ class Session:
         self._context = Context()
         self._context.init(domain_id=self.domain_id)
         self.graph = Graph(self._context)
-        self.decisions = self.graph.hear(topics.DECISION)
-        self.twists = self.graph.hear(topics.CMD_VEL)
-        self.odoms = self.graph.hear(topics.ODOM)
-        self.health = self.graph.hear(topics.DIAGNOSTICS)
+        self.decisions = self.graph.collect(topics.DECISION)
+        self.twists = self.graph.collect(topics.CMD_VEL)
+        self.odoms = self.graph.collect(topics.ODOM)
+        self.health = self.graph.collect(topics.DIAGNOSTICS)
 
     def _look_away(self) -> None:
         self.graph.close()
@@ -243,7 +243,7 @@ class Session:
     def _odoms_of(self, robot: str) -> list[Any]:
         if not robot:
             return self.odoms
-        return self.graph.hear(replace(topics.ODOM, name=f"{robot}/{topics.ODOM.name}"))
+        return self.graph.collect(replace(topics.ODOM, name=f"{robot}/{topics.ODOM.name}"))
 
     def _drive_on_a_scan(self) -> None:
         odoms, goals = self.graph.writer(topics.ODOM), self.graph.writer(topics.GOAL_POSE)

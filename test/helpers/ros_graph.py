@@ -59,7 +59,7 @@ class Graph:
             message_type or topic.type, topic.name, qos or topic.qos
         )
 
-    def hear(
+    def collect(
         self, topic: Topic, message_type: Any = None, qos: QoSProfile | None = None
     ) -> list[Any]:
         """A list that fills with the messages of a topic."""
@@ -69,7 +69,7 @@ class Graph:
         )
         return received
 
-    def hear_when(self, *topics: Topic) -> list[tuple[int, str]]:
+    def collect_times(self, *topics: Topic) -> list[tuple[int, str]]:
         """A list of (publication time, topic name) for the messages of several topics."""
         received: list[tuple[int, str]] = []
 

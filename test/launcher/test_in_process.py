@@ -168,7 +168,7 @@ def modes_of(messages: list[Any]) -> list[Mode]:
 
 
 def test_a_loop_of_stamped_twists(graph: Graph) -> None:
-    decisions = graph.hear(topics.DECISION)
+    decisions = graph.collect(topics.DECISION)
     world = start_loop(graph, "case2", 6, enable_stamped_cmd_vel=True)
     world.resume()
     run_to_the_end(graph, world)
@@ -179,7 +179,7 @@ def test_a_loop_of_stamped_twists(graph: Graph) -> None:
 
 @pytest.mark.parametrize("yaw", [1.0, -2.5, math.pi])
 def test_a_robot_with_another_yaw_takes_the_same_path(graph: Graph, yaw: float) -> None:
-    decisions = graph.hear(topics.DECISION)
+    decisions = graph.collect(topics.DECISION)
     world = start_loop(graph, "case2", 6)
     teleport(graph, 0.0, 0.0, yaw)
     world.resume()
@@ -206,7 +206,7 @@ def teleport(graph: Graph, x: float, y: float, yaw: float) -> None:
 
 def test_a_restarted_planner_continues_the_run(graph: Graph) -> None:
     parameters = node_parameters(config("case2", PlannerParams(), 7), peers=())
-    decisions = graph.hear(topics.DECISION)
+    decisions = graph.collect(topics.DECISION)
     world = graph.start(
         WorldSim, {**parameters["world_sim"], "answer_timeout_s": 0.2, "answer_retries": 1000}
     )

@@ -25,7 +25,7 @@ from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import run_fleet
 from mfba_planner.simulation.obstacle_motion import Obstacle
-from mfba_planner.simulation.scenario import Member, Scenario
+from mfba_planner.simulation.scenario import FleetRobot, Scenario
 from mfba_planner.simulation.simulate import simulate_fleet
 
 PROCESSES = ["--driver", "multi-process", "--no-picture", "--out", "run"]
@@ -37,8 +37,8 @@ PAIR = Scenario(
     goal_m=(4.0, 0.0),
     obstacles=(Obstacle(center_m=(2.0, 3.0), radius_m=0.3, speed_mps=0.1),),
     robots=(
-        Member(name="east", start_m=(0.0, 0.0), goal_m=(4.0, 0.0)),
-        Member(name="west", start_m=(3.5, 0.1), goal_m=(0.0, 0.0)),
+        FleetRobot(name="east", start_m=(0.0, 0.0), goal_m=(4.0, 0.0)),
+        FleetRobot(name="west", start_m=(3.5, 0.1), goal_m=(0.0, 0.0)),
     ),
 )
 
@@ -154,7 +154,7 @@ def test_nodes_do_not_outlive_a_killed_launcher(pair_directory: Path) -> None:
 
 def test_too_many_robots_for_discovery_are_refused(tmp_path: Path) -> None:
     robots = tuple(
-        Member(name=f"r{n}", start_m=(0.0, float(n)), goal_m=(9.0, float(n)))
+        FleetRobot(name=f"r{n}", start_m=(0.0, float(n)), goal_m=(9.0, float(n)))
         for n in range(MOST_ROBOTS + 1)
     )
     file = tmp_path / "many.json"

@@ -59,8 +59,8 @@ def lines(capsys: Capture, *args: str | Path, code: int = 0) -> list[str]:
 
 
 def test_episodes_equal_those_of_run_fleet(bag: Path, core: dict[str, Episode]) -> None:
-    scenario, seed, episodes, missed = read_recording(bag)
-    assert (scenario, seed, list(episodes), missed) == (TRIO, 5, ["a", "b", "c"], {})
+    scenario, seed, episodes, omitted = read_recording(bag)
+    assert (scenario, seed, list(episodes), omitted) == (TRIO, 5, ["a", "b", "c"], {})
     for name, episode in episodes.items():
         assert digest(episode.ticks) == digest(core[name].ticks)
         assert episode.truth == core[name].truth != ()

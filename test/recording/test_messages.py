@@ -335,13 +335,13 @@ def test_an_empty_diagnostic_is_no_decision() -> None:
 
 @given(st.lists(plane_points))
 def test_points_as_text_round_trip(some: list[tuple[float, float]]) -> None:
-    assert from_messages.points(from_messages.points_text(some)) == tuple(some)
+    assert from_messages.parse_points(from_messages.points_text(some)) == tuple(some)
 
 
 @pytest.mark.parametrize("text", ["1", "1,2,3", "a,b", "1,2 3"])
 def test_text_without_points_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="not a list of points"):
-        from_messages.points(text)
+        from_messages.parse_points(text)
 
 
 @given(st.tuples(moderate, moderate), angles)

@@ -92,34 +92,34 @@ def test_decisions_after_the_end_of_their_sectors_are_omitted(
     bag: Path, tmp_path: Path, count: int
 ) -> None:
     cut = rewrite(bag, tmp_path / "cut", without([SECTORS], *range(-count, 0)))
-    whole, (_, _, episodes, missed) = read_episode(bag), read_recording(cut)
+    whole, (_, _, episodes, omitted) = read_episode(bag), read_recording(cut)
     assert episodes[NO_NAMESPACE].ticks == whole.ticks[:-count]
     assert (whole.outcome, episodes[NO_NAMESPACE].outcome) == (
         Outcome.GOAL_REACHED,
         Outcome.INTERRUPTED,
     )
-    assert missed == {NO_NAMESPACE: expected_note(whole, count)}
+    assert omitted == {NO_NAMESPACE: expected_note(whole, count)}
     assert read_episode(cut) == episodes[NO_NAMESPACE]
-    assert summarize(cut)[2:] == (digest(whole.ticks[:-count]), missed[NO_NAMESPACE])
+    assert summarize(cut)[2:] == (digest(whole.ticks[:-count]), omitted[NO_NAMESPACE])
 
 
 def test_the_other_robots_of_a_fleet_lose_no_decisions(fleet: Path, tmp_path: Path) -> None:
     cut = rewrite(fleet, tmp_path / "cut", without(topics_of_c([SECTORS]), -1))
-    whole, (_, _, episodes, missed) = read_recording(fleet).episodes, read_recording(cut)
+    whole, (_, _, episodes, omitted) = read_recording(fleet).episodes, read_recording(cut)
     assert episodes["a"].ticks == whole["a"].ticks
     assert episodes["b"].ticks == whole["b"].ticks
     assert episodes["c"].ticks == whole["c"].ticks[:-1]
     assert episodes["c"].truth == whole["c"].truth[:-1]
-    assert missed == {"c": expected_note(whole["c"], 1)}
-    assert [s.missed for s in summaries(cut).values()] == ["", "", missed["c"]]
-    assert read_recording(cut, ["a"]).missed == {}
+    assert omitted == {"c": expected_note(whole["c"], 1)}
+    assert [s.omitted for s in summaries(cut).values()] == ["", "", omitted["c"]]
+    assert read_recording(cut, ["a"]).omitted == {}
 
 
 def test_a_bag_that_was_never_closed_is_read_alike(bag: Path, tmp_path: Path) -> None:
     cut = rewrite(bag, tmp_path / "cut", without([SECTORS], -1))
     killed = tmp_path / "killed.mcap"
     killed.write_bytes((cut / "cut_0.mcap").read_bytes()[:-200])
-    assert read_recording(killed, salvage=True).missed == read_recording(cut).missed != {}
+    assert read_recording(killed, salvage=True).omitted == read_recording(cut).omitted != {}
 
 
 @pytest.mark.parametrize("removed", [(5,), (5, -1), (0,), (-2,), tuple(range(1, 6))])
@@ -307,7 +307,7 @@ def test_diff_distinguishes_a_bag_with_omitted_decisions(
     cut = rewrite(bag, tmp_path / "cut", without(SENSOR, -1))
     ended = rewrite(cut, tmp_path / "ended", without([DECISION], -1))
     count = len(read_episode(bag).ticks) - 1
-    assert read_recording(ended).missed == {}
+    assert read_recording(ended).omitted == {}
     for left, right, code, how in (
         (cut, ended, 1, "identical but for what is left out"),
         (ended, cut, 1, "identical but for what is left out"),

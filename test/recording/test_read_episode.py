@@ -141,9 +141,9 @@ def test_a_repeated_decision_counts_once(bag: Path, tmp_path: Path) -> None:
 
 
 def test_the_summary_is_that_of_the_episode(bag: Path) -> None:
-    episode, result, found, missed = summarize(bag)
+    episode, result, found, omitted = summarize(bag)
     whole = read_episode(bag)
-    assert (result, found, missed) == (evaluate(whole), digest(whole.ticks), "")
+    assert (result, found, omitted) == (evaluate(whole), digest(whole.ticks), "")
     assert (episode.outcome, episode.ticks) == (whole.outcome, whole.ticks[-1:])
 
 

@@ -12,7 +12,12 @@ from mfba_planner.core.errors import ConfigError
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.qos_profiles import OfferedQos
-from mfba_planner.recording.replay_schedule import Schedule, begin_ns, due_messages, offer
+from mfba_planner.recording.replay_schedule import (
+    Schedule,
+    due_messages,
+    merged_qos,
+    replay_start_ns,
+)
 
 S = SECOND
 STRING = "std_msgs/msg/String"
@@ -78,26 +83,26 @@ def test_old_latched_messages_are_found(tmp_path: Path) -> None:
 
 def test_an_offset_beyond_the_end_is_refused() -> None:
     with BagReader(FOREIGN) as bag:
-        assert begin_ns(bag, bag.duration_ns / S) == bag.end_ns
+        assert replay_start_ns(bag, bag.duration_ns / S) == bag.end_ns
         with pytest.raises(ConfigError, match=r"start_offset=13.3 s: beyond the end .* 13.2021 s"):
-            begin_ns(bag, 13.3)
+            replay_start_ns(bag, 13.3)
 
 
 def test_the_qos_of_one_publisher_is_unchanged() -> None:
-    assert offer((SENSOR,)) == SENSOR
-    assert offer(()).depth == 0
+    assert merged_qos((SENSOR,)) == SENSOR
+    assert merged_qos(()).depth == 0
 
 
 def test_the_qos_of_several_publishers_is_the_strongest() -> None:
-    both = offer((SENSOR, LATCHED))
+    both = merged_qos((SENSOR, LATCHED))
     assert (both.reliability, both.durability) == ("reliable", "transient_local")
     assert (both.depth, both.deadline_ns) == (5, SENSOR.deadline_ns)
     weak = OfferedQos(reliability="best_effort", depth=1)
-    assert offer((weak, OfferedQos(reliability="best_effort", depth=7))).reliability == (
+    assert merged_qos((weak, OfferedQos(reliability="best_effort", depth=7))).reliability == (
         "best_effort"
     )
-    assert offer((weak, OfferedQos(depth=0))).depth == 0  # one of unknown depth
-    assert offer((weak, OfferedQos(history="keep_all"))).history == "keep_all"
+    assert merged_qos((weak, OfferedQos(depth=0))).depth == 0  # one of unknown depth
+    assert merged_qos((weak, OfferedQos(history="keep_all"))).history == "keep_all"
 
 
 @given(
@@ -145,14 +150,14 @@ def test_time_is_stopped_until_the_start_and_while_paused() -> None:
     schedule = Schedule(2.0, START_NS, paused=True)
     schedule.start(0)
     assert schedule.time_ns(99) == START_NS
-    assert [schedule.by_steps] == [True]
-    schedule.step_to(START_NS + 10)
-    schedule.step_to(START_NS + 4)  # never back
+    assert [schedule.is_stepped] == [True]
+    schedule.advance_to(START_NS + 10)
+    schedule.advance_to(START_NS + 4)  # never back
     assert schedule.time_ns(99) == START_NS + 10
     schedule.resume(1000)
     schedule.resume(2000)  # already running
-    assert [schedule.by_steps] == [False]
-    schedule.step_to(START_NS + 10**9)  # no effect while time runs
+    assert [schedule.is_stepped] == [False]
+    schedule.advance_to(START_NS + 10**9)  # no effect while time runs
     assert schedule.time_ns(1005) == START_NS + 20
     assert schedule.wait_ns(START_NS + 30, 1005) == 5
 
@@ -171,7 +176,7 @@ def test_as_fast_as_possible_all_is_due_and_time_follows_the_messages() -> None:
     schedule.start(0)
     assert schedule.wait_ns(START_NS + 10**15, 0) == 0
     assert schedule.time_ns(10**15) == START_NS
-    schedule.step_to(START_NS + 7)
+    schedule.advance_to(START_NS + 7)
     assert schedule.time_ns(10**15) == START_NS + 7
     schedule.rewind(START_NS + 7, START_NS, 100)
     assert schedule.time_ns(10**15) == START_NS

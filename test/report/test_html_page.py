@@ -119,7 +119,7 @@ def test_it_opens_fast_without_requests_or_console_messages(
 ) -> None:
     assert single.stat().st_size < 6_000_000
     browser.open(single)
-    assert browser.said() == []
+    assert browser.console_messages() == []
     asked = {url for url in browser.requested() if not url.startswith("data:")}
     assert asked - {"about:blank"} == {single.as_uri()}
     ready_ms = browser.run("return performance.getEntriesByName('mfba-ready')[0].startTime")
@@ -223,7 +223,7 @@ def test_bits_of_headings_are_drawn_at_their_headings(browser: Browser, tmp_path
     decision = episode.ticks[k]
     n = len(decision.vs)
     assert n == 72
-    assert browser.said() == []
+    assert browser.console_messages() == []
     assert bits(browser, "vs") == "".join(map(str, decision.vs))
     assert field(browser, "vs").replace(" ", "") == "".join(map(str, decision.vs))
     drawn = browser.run(
@@ -286,13 +286,13 @@ turn();
 
 @pytest.mark.parametrize("calm", [False, True], ids=["smooth", "calm"])
 def test_positions_are_interpolated_unless_motion_is_reduced(
-    browser: Browser, single: Path, episode: Episode, calm: bool
+    browser: Browser, single: Path, episode: Episode, reduced_motion: bool
 ) -> None:
-    browser.open(single, calm=calm)
+    browser.open(single, reduced_motion=reduced_motion)
     scrub(browser, len(episode.ticks) - 4)
     positions = {(x, y) for x, y in browser.driver.execute_async_script(POSITIONS)}
     at_ticks = {(t.pose.x, -t.pose.y) for t in episode.ticks}
-    assert (positions <= at_ticks) == calm
+    assert (positions <= at_ticks) == reduced_motion
     assert len(positions) >= 4
 
 
@@ -497,7 +497,7 @@ def test_a_fleet_is_one_scene_of_the_chosen_robot(browser: Browser, tmp_path: Pa
     runs = list(zip(names, run_fleet(replace(whole, robots=whole.robots[:8]), seed=1)))
     write_page(runs, tmp_path / "fleet.html", names)
     browser.open(tmp_path / "fleet.html")
-    assert browser.said() == []
+    assert browser.console_messages() == []
     heading = browser.run("return document.querySelector('h1').textContent")
     assert heading == "swap"
     assert shown_cards(browser) == ["1"]
@@ -543,7 +543,7 @@ def test_a_fleet_is_one_scene_of_the_chosen_robot(browser: Browser, tmp_path: Pa
         "return document.querySelectorAll('[aria-label=\"Result\"] thead th').length"
     )
     assert columns == 8
-    assert browser.said() == []
+    assert browser.console_messages() == []
 
 
 def shown_cards(browser: Browser) -> list[str]:
@@ -582,7 +582,7 @@ def test_names_are_text_and_never_markup(browser: Browser, tmp_path: Path) -> No
     path = tmp_path / "hostile.html"
     write_page([(hostile, replace(episode, ticks=ticks))], path)
     browser.open(path)
-    assert browser.said() == []
+    assert browser.console_messages() == []
     assert browser.run("return document.title") == format_values.one_line(hostile, 80)
     assert browser.run("return document.querySelectorAll('img').length") == 0
     assert field(browser, "reason") == hostile
@@ -596,7 +596,7 @@ def test_the_policy_blocks_other_scripts_and_requests(browser: Browser, single: 
         "document.head.append(s); fetch('file:///etc/hostname').catch(() => {})"
     )
     assert browser.run("return window.owned") is None
-    assert "Content Security Policy" in browser.said()[0]
+    assert "Content Security Policy" in browser.console_messages()[0]
 
 
 def test_json_cannot_end_its_script_element() -> None:
@@ -616,7 +616,7 @@ def test_a_run_of_one_tick_without_obstacles_has_a_page(browser: Browser, tmp_pa
     path = tmp_path / "page.html"
     write_page([("one", episode)], path)
     browser.open(path)
-    assert browser.said() == []
+    assert browser.console_messages() == []
     assert field(browser, "tick") == "0 of 0"
     assert field(browser, "clearance") == "–"
 

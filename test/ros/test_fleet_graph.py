@@ -18,7 +18,7 @@ from mfba_planner.ros.interface.to_messages import pose_stamped_msg
 from mfba_planner.ros.nodes.world_sim import WorldSim
 from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.simulation.obstacle_motion import Obstacle
-from mfba_planner.simulation.scenario import Member, Scenario
+from mfba_planner.simulation.scenario import FleetRobot, Scenario
 
 TICK_NS = PlannerParams().tick_ns
 TICK_S = TICK_NS * 1e-9
@@ -29,8 +29,8 @@ PAIR = Scenario(
     goal_m=(9.0, 0.0),
     obstacles=(STONE,),
     robots=(
-        Member(name="a", start_m=(0.0, 0.0), goal_m=(9.0, 0.0)),
-        Member(name="b", start_m=(0.0, 3.0), goal_m=(0.3, 3.0)),
+        FleetRobot(name="a", start_m=(0.0, 0.0), goal_m=(9.0, 0.0)),
+        FleetRobot(name="b", start_m=(0.0, 3.0), goal_m=(0.3, 3.0)),
     ),
 )
 
@@ -40,10 +40,10 @@ class Pair:
 
     def __init__(self, graph: Graph, **parameters: Any) -> None:
         self.graph = graph
-        self.clock = graph.hear(topics.CLOCK)
-        self.odom = {name: graph.hear(below(name, topics.ODOM)) for name in "ab"}
-        self.obstacles = {name: graph.hear(below(name, topics.OBSTACLES)) for name in "ab"}
-        self.ends = {name: graph.hear(below(name, topics.OUTCOME)) for name in "ab"}
+        self.clock = graph.collect(topics.CLOCK)
+        self.odom = {name: graph.collect(below(name, topics.ODOM)) for name in "ab"}
+        self.obstacles = {name: graph.collect(below(name, topics.OBSTACLES)) for name in "ab"}
+        self.ends = {name: graph.collect(below(name, topics.OUTCOME)) for name in "ab"}
         self.goal_steps = {name: graph.writer(below(name, topics.GOAL_STEP)) for name in "ab"}
         self.twists = {name: graph.writer(below(name, topics.CMD_VEL)) for name in "ab"}
         defaults = {"lockstep": True, "answer_timeout_s": 60.0, "scenario": scenario_to_json(PAIR)}

@@ -84,7 +84,7 @@ def test_a_refused_route_changes_nothing_and_is_reported(
     graph: Graph, bad: Path, kind: str, reason: str
 ) -> None:
     harness = PlannerHarness(graph, LOCKSTEP)
-    received = graph.hear(topics.DIAGNOSTICS)
+    received = graph.collect(topics.DIAGNOSTICS)
     values = fields(harness.decide(bad, odom(1), sectors(1)))
     assert values["goal"] == "10.0,5.0"
     assert values["refused_inputs"] == "1"
@@ -175,7 +175,7 @@ def test_goals_repeated_cancelled_and_replaced_are_redecided_identically(
 ) -> None:
     """On the real node with a persistent swarm; its decisions go into a bag for mfba verify."""
     parameters = {**LOCKSTEP, "seed": 2, "swarm": "persistent", "bat.iterations": 1}
-    received = {name: graph.hear(topic) for name, topic in TOPICS.items()}
+    received = {name: graph.collect(topic) for name, topic in TOPICS.items()}
     harness = PlannerHarness(graph, parameters, at=None)
     harness.decide_all(goal(*GOAL))
     at = drive(graph, harness, range(1, 6))

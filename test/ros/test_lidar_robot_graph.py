@@ -104,8 +104,8 @@ def start(graph: Graph, config: RunConfig, **more: Any) -> WorldSim:
 
 @pytest.mark.parametrize("beams", [360, 720, 1080])
 def test_the_messages_of_a_lidar_robot(graph: Graph, beams: int) -> None:
-    scans, odoms = graph.hear(topics.SCAN), graph.hear(topics.ODOM)
-    sectors, twists = graph.hear(topics.SECTORS), graph.hear(topics.CMD_VEL)
+    scans, odoms = graph.collect(topics.SCAN), graph.collect(topics.ODOM)
+    sectors, twists = graph.collect(topics.SECTORS), graph.collect(topics.CMD_VEL)
     robot = replace(SCANNING, lidar=Lidar(beams=beams, yaw_rad=1.0))
     world = start(graph, run_config(near(robot), PAPER))
     world.resume()

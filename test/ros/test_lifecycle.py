@@ -47,7 +47,7 @@ def test_by_default_it_is_active_at_once(graph: Graph) -> None:
 
 def test_without_autostart_it_changes_state_by_service(graph: Graph) -> None:
     node = graph.start(PlannerNode, {"autostart": False})
-    received = graph.hear(topics.DIAGNOSTICS)
+    received = graph.collect(topics.DIAGNOSTICS)
     assert (state(graph), node.missing()) == ("unconfigured", "unconfigured, not active")
     assert not offers(graph)
     assert not change(graph, "activate"), "not before it is configured"

@@ -123,7 +123,7 @@ def test_a_misspelt_parameter_is_named(ros_env: dict[str, str]) -> None:
 def test_a_world_without_commands_gives_up_in_one_line(
     graph: Graph, ros_env: dict[str, str]
 ) -> None:
-    odom = graph.hear(topics.ODOM)
+    odom = graph.collect(topics.ODOM)
     arguments = parameters("lockstep:=true", "answer_timeout_s:=0.1", "answer_retries:=2")
     world = start("world_sim", *arguments, env=ros_env)
     graph.until(lambda: world.poll() is not None, timeout_s=60.0)

@@ -123,7 +123,7 @@ def test_a_robot_that_looks_north_drives_east_by_moving_to_its_right(graph: Grap
 
 
 def test_the_command_is_published_first(graph: Graph) -> None:
-    published = graph.hear_when(topics.GOAL_STEP, topics.PLAN, topics.DECISION, topics.CMD_VEL)
+    published = graph.collect_times(topics.GOAL_STEP, topics.PLAN, topics.DECISION, topics.CMD_VEL)
     harness = PlannerHarness(graph, LOCKSTEP)
     for stamp in range(1, 6):
         harness.decide(odom(stamp), sectors(stamp))
@@ -329,7 +329,7 @@ def test_real_time_stops_when_only_odom_is_old(graph: Graph) -> None:
 def test_before_any_sectors_it_publishes_no_command(graph: Graph) -> None:
     harness = PlannerHarness(graph, {**REAL_TIME, "input_timeout_s": 0.01})
     harness.decide_all(odom(1))
-    clocks = graph.hear(topics.CLOCK)
+    clocks = graph.collect(topics.CLOCK)
     ticks = iter(range(1, 10**6))
     clock = graph.writer(topics.CLOCK)
 
@@ -425,7 +425,7 @@ def test_bad_parameters_are_refused_at_start(
 
 
 def test_markers_show_where_the_goal_step_leads(graph: Graph) -> None:
-    marks = graph.hear(topics.MARKERS)
+    marks = graph.collect(topics.MARKERS)
     harness = PlannerHarness(graph, {**LOCKSTEP, "view_period_s": 2e-9})
     for stamp in range(1, 6):
         harness.decide(odom(stamp), sectors(stamp, NORTH_EAST if stamp > 3 else FREE))
@@ -440,7 +440,7 @@ def test_markers_show_where_the_goal_step_leads(graph: Graph) -> None:
 
 
 def test_markers_show_ring_sectors_gap_and_mode(graph: Graph) -> None:
-    marks = graph.hear(topics.MARKERS)
+    marks = graph.collect(topics.MARKERS)
     harness = PlannerHarness(graph, {**LOCKSTEP, "view_period_s": 1e-9})
     harness.decide(odom(1, 1.0, 2.0), sectors(1))
     harness.decide(odom(2, 1.0, 2.0), sectors(2, (0.5,) * 3 + FREE[3:]))

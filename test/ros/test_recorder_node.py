@@ -249,7 +249,7 @@ def test_an_episode_in_real_time_keeps_the_decision_not_the_later_stops(
     ]
     recorder = record(graph, tmp_path / "bag")
     recorder.attach_parameters({node.get_name(): params.values(node) for node in nodes})
-    outcomes = graph.hear(topics.DECISION)
+    outcomes = graph.collect(topics.DECISION)
     graph.until(lambda: planner.goals.goal_queue.goal is not None)
     for _ in range(2):
         graph.call(Trigger, "world_sim/step")

@@ -40,7 +40,7 @@ from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.replaying import bag_player
 from mfba_planner.ros.replaying.replay_arguments import parse
 from mfba_planner.simulation.decision_digest import digest
-from mfba_planner.verification.redecide import Robot, redecide_recording
+from mfba_planner.verification.redecide import RedecideParams, redecide_recording
 
 COUNT = 40
 LATCHED_QOS = topics.LATCHED_QOS
@@ -73,7 +73,7 @@ def play(graph: Graph, replay: Replay, timeout_s: float = 20.0) -> None:
         graph.executor.spin_once(timeout_sec=0.0)
 
 
-def hear(graph: Graph, kind: Any, name: str, qos: QoSProfile | int = 1000) -> list[Any]:
+def collect(graph: Graph, kind: Any, name: str, qos: QoSProfile | int = 1000) -> list[Any]:
     received: list[Any] = []
     graph.probe.create_subscription(kind, name, received.append, qos)
     return received
@@ -93,8 +93,11 @@ def call(graph: Graph, replay: Replay, name: str) -> Trigger.Response:
 def test_every_message_arrives_unchanged_and_in_sequence(
     graph: Graph, bag: Path, line: str, depth: int
 ) -> None:
-    odoms, scans = hear(graph, Odometry, "odom", depth), hear(graph, LaserScan, "scan", depth)
-    goals = hear(graph, PoseStamped, "goal_pose", LATCHED_QOS)
+    odoms, scans = (
+        collect(graph, Odometry, "odom", depth),
+        collect(graph, LaserScan, "scan", depth),
+    )
+    goals = collect(graph, PoseStamped, "goal_pose", LATCHED_QOS)
     replay = start(graph, bag, line)
     play(graph, replay)
     assert odoms == [odometry(i) for i in range(COUNT)]
@@ -104,7 +107,7 @@ def test_every_message_arrives_unchanged_and_in_sequence(
 
 
 def test_a_bare_file_is_a_bag(graph: Graph, bag: Path) -> None:
-    odoms = hear(graph, Odometry, "odom")
+    odoms = collect(graph, Odometry, "odom")
     play(graph, start(graph, bag / "bag_0.mcap", "--rate 100"))
     assert len(odoms) == COUNT
 
@@ -133,25 +136,25 @@ def test_the_recorded_qos_is_offered(graph: Graph, tmp_path: Path) -> None:
 
 
 def test_after_an_offset_what_was_latched_is_sent_again(graph: Graph, bag: Path) -> None:
-    odoms = hear(graph, Odometry, "odom")
-    goals = hear(graph, PoseStamped, "goal_pose", LATCHED_QOS)
+    odoms = collect(graph, Odometry, "odom")
+    goals = collect(graph, PoseStamped, "goal_pose", LATCHED_QOS)
     replay = start(graph, bag, "--start-offset 0.195 --rate 50")
     play(graph, replay)
     assert odoms == [odometry(i) for i in range(20, COUNT)]
     assert len(goals) == 1
-    late = hear(graph, PoseStamped, "goal_pose", LATCHED_QOS)
+    late = collect(graph, PoseStamped, "goal_pose", LATCHED_QOS)
     graph.until(lambda: len(late) == 1)
 
 
 def test_topics_can_be_left_out_and_renamed(graph: Graph, bag: Path) -> None:
-    odoms, renamed = hear(graph, Odometry, "odom"), hear(graph, Odometry, "robot/odom")
-    scans = hear(graph, LaserScan, "scan")
+    odoms, renamed = collect(graph, Odometry, "odom"), collect(graph, Odometry, "robot/odom")
+    scans = collect(graph, LaserScan, "scan")
     play(graph, start(graph, bag, "--rate 100 --exclude scan --remap odom:=robot/odom"))
     assert (len(odoms), len(renamed), len(scans)) == (0, COUNT, 0)
 
 
 def test_it_pauses_steps_and_resumes(graph: Graph, bag: Path) -> None:
-    odoms = hear(graph, Odometry, "odom")
+    odoms = collect(graph, Odometry, "odom")
     replay = start(graph, bag, "--start-paused --rate 100 --topics odom")
     assert call(graph, replay, "pause").success
     assert not odoms
@@ -185,7 +188,7 @@ def test_a_pause_shifts_what_follows(
     """To the nanosecond: no burst, nothing skipped or late, on a machine of any speed."""
     clock = ManualClock()
     monkeypatch.setattr(bag_player, "time", clock)
-    odoms = hear(graph, Odometry, "odom")
+    odoms = collect(graph, Odometry, "odom")
     replay = start(graph, bag, "--topics odom --rate 2")
     played, period_ns = replay.player.counts, SECOND // 100 // 2
 
@@ -218,9 +221,9 @@ def test_at_the_end_a_step_is_refused(graph: Graph, bag: Path) -> None:
 
 
 def test_a_loop_restarts_with_what_is_latched(graph: Graph, bag: Path) -> None:
-    odoms = hear(graph, Odometry, "odom")
-    goals = hear(graph, PoseStamped, "goal_pose", LATCHED_QOS)
-    clocks = hear(graph, Clock, "/clock")
+    odoms = collect(graph, Odometry, "odom")
+    goals = collect(graph, PoseStamped, "goal_pose", LATCHED_QOS)
+    clocks = collect(graph, Clock, "/clock")
     replay = start(graph, bag, "--loop --rate 4 --start-offset 0.2 --clock 200")
     until(graph, replay, lambda: len(odoms) > 2 * COUNT)
     assert not replay.finished
@@ -293,7 +296,7 @@ def test_at_full_speed_a_planner_decides_every_tick_of_a_bag_longer_than_its_his
     graph: Graph, tmp_path: Path
 ) -> None:
     ticks = topics.TICK_QOS.depth + 200
-    decisions = graph.hear(topics.DECISION)
+    decisions = graph.collect(topics.DECISION)
     graph.start(PlannerNode, {"lockstep": True})
     replay = start(
         graph,
@@ -310,8 +313,8 @@ def test_at_full_speed_a_planner_decides_every_tick_of_a_bag_longer_than_its_his
 def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
     graph: Graph, line: str
 ) -> None:
-    decisions, vectors = graph.hear(topics.DECISION), graph.hear(topics.SENSORY_VECTOR)
-    sectors = graph.hear(topics.SECTORS)
+    decisions, vectors = graph.collect(topics.DECISION), graph.collect(topics.SENSORY_VECTOR)
+    sectors = graph.collect(topics.SECTORS)
     graph.start(VirtualSensor, {"source": "scan", "lockstep": True, "wait_for": "planner"})
     graph.start(PlannerNode, {"lockstep": True})
     nodes = "--inputs-of virtual_sensor planner --wait-for-subscribers"
@@ -321,7 +324,7 @@ def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
     assert (len(decisions), len(vectors)) == (133, 133)
     found = [decision(why, sector_ranges(ring)) for why, ring in zip(decisions, sectors)]
     assert {tick.mode for tick in found} == {Mode.PATH_GENERATION, Mode.OBSTACLE_AVOIDANCE}
-    redecided = redecide_recording(FOREIGN, Robot(robot_radius_m=0.3))
+    redecided = redecide_recording(FOREIGN, RedecideParams(robot_radius_m=0.3))
     assert digest(found) == redecided.digest, "verify decides as the nodes do"
 
 
@@ -337,12 +340,12 @@ def test_it_waits_for_subscribers_and_names_the_topics(graph: Graph, bag: Path) 
 
 
 def test_it_waits_until_the_last_of_them_is_there(graph: Graph, bag: Path) -> None:
-    odoms = hear(graph, Odometry, "odom")
+    odoms = collect(graph, Odometry, "odom")
     replay = start(graph, bag, "--rate 100 --wait-for-subscribers 2 --topics odom")
     start_s = time.monotonic()
     until(graph, replay, lambda: time.monotonic() > start_s + 0.2)
     assert not odoms
-    second = hear(graph, Odometry, "odom", qos_profile_sensor_data)
+    second = collect(graph, Odometry, "odom", qos_profile_sensor_data)
     play(graph, replay)
     assert len(odoms) == COUNT
     assert second
@@ -368,7 +371,7 @@ def test_a_reader_that_hangs_is_named(graph: Graph, bag: Path) -> None:
 
 
 def test_a_reader_that_leaves_is_not_waited_for(graph: Graph, bag: Path) -> None:
-    odoms = hear(graph, Odometry, "odom", 10)
+    odoms = collect(graph, Odometry, "odom", 10)
     leaving = rclpy.create_node("leaving", context=graph.context)
     leaving.create_subscription(Odometry, "odom", lambda _: None, 1000)
     replay = start(graph, bag, "--as-fast-as-possible --wait-timeout 30")

@@ -103,7 +103,7 @@ def test_a_fresh_planner_fed_at_full_speed_decides_as_it_was_recorded(
     run_in_process(config, tmp_path / "bag", domain_id=domain_id)
     recorded = recorded_decisions(tmp_path / "bag")
     assert len(recorded) > 50
-    received = stage.graph.hear(topics.DECISION)
+    received = stage.graph.collect(topics.DECISION)
     settings = ["lockstep:=true", "seed:=3"]
     with stage.run("planner", "--ros-args", *(x for s in settings for x in ("-p", s))):
         stage.graph.until(lambda: stage.matched(topics.DECISION))
@@ -117,7 +117,7 @@ def test_a_fresh_planner_fed_at_full_speed_decides_as_it_was_recorded(
 def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
     stage: Stage, speed: list[str]
 ) -> None:
-    received = stage.graph.hear(topics.DECISION)
+    received = stage.graph.collect(topics.DECISION)
     sensor = ["source:=scan", "lockstep:=true", "wait_for:=planner"]
     with (
         stage.run("virtual_sensor", "--ros-args", *(x for s in sensor for x in ("-p", s))),

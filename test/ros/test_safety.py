@@ -160,7 +160,7 @@ def values(status: Any) -> dict[str, str]:
 
 
 def test_before_any_input_it_reports_what_it_waits_for(graph: Graph) -> None:
-    received = graph.hear(topics.DIAGNOSTICS)
+    received = graph.collect(topics.DIAGNOSTICS)
     graph.start(PlannerNode, {"hardware_id": "rosie"})
     graph.until(lambda: bool(received))
     inputs, driving = received[0].status

@@ -56,8 +56,8 @@ class Sensor:
         self.odom = graph.writer(topics.ODOM)
         self.obstacles = graph.writer(topics.OBSTACLES)
         self.scan = graph.writer(topics.SCAN)
-        self.sectors = graph.hear(topics.SECTORS)
-        self.vectors = graph.hear(topics.SENSORY_VECTOR)
+        self.sectors = graph.collect(topics.SECTORS)
+        self.vectors = graph.collect(topics.SENSORY_VECTOR)
         self.node = graph.start(VirtualSensor, parameters)
 
     def measure_all(self, *messages: Any) -> list[LaserScan]:

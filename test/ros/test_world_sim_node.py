@@ -46,10 +46,10 @@ class Driver:
 
     def __init__(self, graph: Graph, parameters: dict[str, Any], kind: Any = Twist) -> None:
         self.graph = graph
-        self.clock = graph.hear(topics.CLOCK)
-        self.odom = graph.hear(topics.ODOM)
-        self.obstacles = graph.hear(topics.OBSTACLES)
-        self.outcome = graph.hear(topics.OUTCOME)
+        self.clock = graph.collect(topics.CLOCK)
+        self.odom = graph.collect(topics.ODOM)
+        self.obstacles = graph.collect(topics.OBSTACLES)
+        self.outcome = graph.collect(topics.OUTCOME)
         self.goal_step = graph.writer(topics.GOAL_STEP)
         self.cmd_vel = graph.writer(topics.CMD_VEL, kind)
         self.world = graph.start(WorldSim, parameters)
@@ -197,14 +197,14 @@ def test_lockstep_starts_when_odom_has_a_subscriber(graph: Graph) -> None:
     started = time.monotonic()
     graph.until(lambda: time.monotonic() > started + 0.3)
     assert world.world.tick == 0
-    odom = graph.hear(topics.ODOM)
+    odom = graph.collect(topics.ODOM)
     graph.until(lambda: len(odom) == 1)
 
 
 def test_lockstep_starts_when_the_nodes_of_wait_for_are_there(graph: Graph) -> None:
     parameters = {"lockstep": True, "answer_timeout_s": 0.05, "wait_for": "virtual_sensor"}
     graph.start(WorldSim, parameters)
-    odom = graph.hear(topics.ODOM)  # odom has a subscriber, but virtual_sensor is missing
+    odom = graph.collect(topics.ODOM)  # odom has a subscriber, but virtual_sensor is missing
     started = time.monotonic()
     graph.until(lambda: time.monotonic() > started + 0.5)
     assert odom == []
@@ -253,7 +253,7 @@ def test_started_paused_nothing_moves_before_the_first_step(graph: Graph) -> Non
 
 def test_reset_restores_everything_but_the_stamps(graph: Graph) -> None:
     driver = Driver(graph, {"scenario": scenario(obstacles=OBSTACLES), **LOCKSTEP})
-    goals = graph.hear(topics.GOAL_POSE)
+    goals = graph.collect(topics.GOAL_POSE)
     driver.wait_for_ticks(1)
     driver.drive(twist(0.5))
     driver.drive(twist(0.5))
@@ -399,8 +399,8 @@ def test_stamped_twists_are_followed_where_enabled(graph: Graph) -> None:
 def test_goal_and_outcome_are_latched_for_late_subscribers(driver: Driver) -> None:
     for _ in range(3):
         driver.drive(twist())
-    goals = driver.graph.hear(topics.GOAL_POSE)
-    outcome = driver.graph.hear(topics.OUTCOME)
+    goals = driver.graph.collect(topics.GOAL_POSE)
+    outcome = driver.graph.collect(topics.OUTCOME)
     driver.graph.until(lambda: bool(goals and outcome))
     assert (goals[0].pose.position.x, goals[0].pose.position.y) == (1.0, 0.0)
     assert goals[0].header.frame_id == "odom"
@@ -409,7 +409,7 @@ def test_goal_and_outcome_are_latched_for_late_subscribers(driver: Driver) -> No
 
 def test_views_are_published_at_their_own_low_rate(graph: Graph) -> None:
     period_s = 3 * TICK_NS * NANO
-    trail, marks = graph.hear(topics.TRAIL), graph.hear(topics.MARKERS)
+    trail, marks = graph.collect(topics.TRAIL), graph.collect(topics.MARKERS)
     driver = Driver(graph, {"scenario": "case2", "view_period_s": period_s, **LOCKSTEP})
     driver.wait_for_ticks(1)
     for _ in range(6):

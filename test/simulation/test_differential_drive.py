@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.core.geometry import Point, Pose2D, carried, distance
+from mfba_planner.core.geometry import Point, Pose2D, distance, pose_as_in_message
 from mfba_planner.core.types import Decision, Mode
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.plain_data import scenario_to_json
@@ -148,8 +148,8 @@ def test_a_robot_placed_elsewhere_is_at_rest() -> None:
 
 def test_a_pose_survives_a_message() -> None:
     pose = Pose2D(1.0, 2.0, 0.0)
-    assert carried(pose) is pose
-    assert carried(Pose2D(1.0, 2.0, 3.0)) == pytest.approx((1.0, 2.0, 3.0))
+    assert pose_as_in_message(pose) is pose
+    assert pose_as_in_message(Pose2D(1.0, 2.0, 3.0)) == pytest.approx((1.0, 2.0, 3.0))
 
 
 def test_the_robot_of_a_scenario_survives_a_round_trip() -> None:

@@ -40,7 +40,7 @@ from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at
 from mfba_planner.simulation.planner_observations import Perception
 from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
 from mfba_planner.simulation.run_episode import run
-from mfba_planner.simulation.scenario import Kidnapping, Member, Scenario
+from mfba_planner.simulation.scenario import FleetRobot, Kidnapping, Scenario
 from mfba_planner.simulation.simulate import simulate_fleet
 from mfba_planner.simulation.world import World
 
@@ -50,7 +50,7 @@ TICK_NS = PlannerParams().tick_ns
 def fleet_of(*ends: tuple[Point, Point], **more: Any) -> Scenario:
     """Robots a, b, ... with these starts and goals."""
     members = tuple(
-        Member(name=chr(ord("a") + k), start_m=start, goal_m=goal)
+        FleetRobot(name=chr(ord("a") + k), start_m=start, goal_m=goal)
         for k, (start, goal) in enumerate(ends)
     )
     start, goal = ends[0]
@@ -181,7 +181,7 @@ def test_equal_seeds_give_equal_decisions_and_robots_have_own_seeds() -> None:
 
 def test_a_fleet_of_one_equals_a_single_robot() -> None:
     case = load_scenario("case1")
-    only = Member(name="a", start_m=case.start_m, goal_m=case.goal_m)
+    only = FleetRobot(name="a", start_m=case.start_m, goal_m=case.goal_m)
     (episode,) = run_fleet(replace(case, robots=(only,)), seed=4)
     assert digest(episode.ticks) == digest(run(case, seed=robot_seed(4, 0)).ticks)
 
@@ -274,12 +274,15 @@ TWO = (((0.0, 0.0), (5.0, 0.0)), ((2.0, 0.0), (5.0, 5.0)))
 @pytest.mark.parametrize(
     ("make_it", "what"),
     [
-        (lambda: Member(name="a/b", start_m=(0.0, 0.0), goal_m=(1.0, 0.0)), "not a ROS namespace"),
         (
-            lambda: Member(name="a__b", start_m=(0.0, 0.0), goal_m=(1.0, 0.0)),
+            lambda: FleetRobot(name="a/b", start_m=(0.0, 0.0), goal_m=(1.0, 0.0)),
             "not a ROS namespace",
         ),
-        (lambda: Member(name="a", start_m=(0.0, 0.0), goal_m=(0.0, 0.0)), "equal to start_m"),
+        (
+            lambda: FleetRobot(name="a__b", start_m=(0.0, 0.0), goal_m=(1.0, 0.0)),
+            "not a ROS namespace",
+        ),
+        (lambda: FleetRobot(name="a", start_m=(0.0, 0.0), goal_m=(0.0, 0.0)), "equal to start_m"),
         (lambda: fleet_of(*TWO, ((0.4, 0.0), (5.0, 9.0))), "start_m: 0.2 m into each other"),
         (lambda: fleet_of(*TWO, ((9.0, 0.0), (5.1, 5.0))), "goal_m: 0.5 m into each other"),
         (lambda: replace(fleet_of(*TWO), start_m=(1.0, 1.0)), "leave those two out"),

@@ -19,7 +19,7 @@ from mfba_planner.evaluation.metrics import assess, evaluate, tick_clearances
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.algorithm_1 import Algorithm1
-from mfba_planner.planning.odometry_jump import is_jump_reason
+from mfba_planner.planning.odometry_jump import is_odometry_jump
 from mfba_planner.planning.planner_factory import make_planner
 from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
 from mfba_planner.planning.predictive import preset
@@ -50,7 +50,7 @@ PLANNERS = {
 
 
 def carried(episode: Episode) -> list[int]:
-    return [k for k, tick in enumerate(episode.ticks) if is_jump_reason(tick.reason)]
+    return [k for k, tick in enumerate(episode.ticks) if is_odometry_jump(tick.reason)]
 
 
 def simulated(scenario: Scenario, planner: PlannerParams) -> Episode:
@@ -124,7 +124,7 @@ def test_only_impossible_moves_are_an_odometry_jump(
         observe_sectors(1_000_000_000 + round(took_s * 1e9), farthest * stretch)
     )
     if abs(stretch - 1.0) > 1e-6:
-        assert is_jump_reason(decision.reason) is (stretch > 1.0)
+        assert is_odometry_jump(decision.reason) is (stretch > 1.0)
 
 
 def test_a_refused_pose_is_no_odometry_jump() -> None:
@@ -132,9 +132,9 @@ def test_a_refused_pose_is_no_odometry_jump() -> None:
     planner.plan(observe_sectors(1, 0.0))
     refused = observe(2, "odom holds nan", FREE, (100.0, 0.0), Pose2D(50.0, 0.0))
     assert planner.plan(refused).mode is Mode.STOPPED
-    assert not is_jump_reason(planner.plan(observe_sectors(3, 0.1)).reason)
-    assert is_jump_reason(planner.plan(observe_sectors(4, 9.0)).reason)
-    assert not is_jump_reason(planner.plan(observe_sectors(3, 0.0)).reason)  # time was set back
+    assert not is_odometry_jump(planner.plan(observe_sectors(3, 0.1)).reason)
+    assert is_odometry_jump(planner.plan(observe_sectors(4, 9.0)).reason)
+    assert not is_odometry_jump(planner.plan(observe_sectors(3, 0.0)).reason)  # time was set back
 
 
 def test_the_graph_is_kidnapped_as_the_core_is(tmp_path: Path, domain_id: int) -> None:
@@ -160,7 +160,7 @@ def start(graph: Graph, scenario: Scenario) -> WorldSim:
 def test_initialpose_moves_the_robot_and_the_planner_reports_it(
     graph: Graph, drive: Drive
 ) -> None:
-    decisions = graph.hear(topics.DECISION)
+    decisions = graph.collect(topics.DECISION)
     case = load_scenario("case1")
     world = start(graph, replace(case, robot=replace(case.robot, drive=drive)))
     world.resume()
@@ -170,7 +170,7 @@ def test_initialpose_moves_the_robot_and_the_planner_reports_it(
     graph.until(lambda: world.over, timeout_s=60.0)
     graph.settle()
     assert world.world.outcome() is Outcome.GOAL_REACHED
-    reports = [m.status[0] for m in decisions if is_jump_reason(m.status[0].message)]
+    reports = [m.status[0] for m in decisions if is_odometry_jump(m.status[0].message)]
     assert len(reports) == 1
     assert reports[0].level == b"\x01"
 

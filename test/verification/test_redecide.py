@@ -22,9 +22,9 @@ from mfba_planner.core.types import Mode
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.ros.interface.serialized_message import type_name
-from mfba_planner.verification.redecide import Robot, redecide_recording
+from mfba_planner.verification.redecide import RedecideParams, redecide_recording
 
-ROBOT = Robot(robot_radius_m=0.3)
+ROBOT = RedecideParams(robot_radius_m=0.3)
 TICK_NS = SECOND // 10
 Message = tuple[str, Any, int]  # topic, message, log time
 

@@ -42,7 +42,7 @@ def compute(
     executor: Executor | None = None,
     store: Store | None = None,
     done: Done[P] = lambda _: None,
-    say: Callable[[str], None] = lambda _: None,
+    warn: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Columns]:
     """Compute (or read from the store) every chunk: {name of the chunk: its columns}.
 
@@ -61,7 +61,7 @@ def compute(
         else:
             found[chunk.name] = columns
             done(chunk)
-    for chunk, columns in _computed(missing, workers, executor, say):
+    for chunk, columns in _computed(missing, workers, executor, warn):
         if store:
             store.write(chunk, columns)
         found[chunk.name] = columns
@@ -70,7 +70,7 @@ def compute(
 
 
 def _computed(
-    chunks: Sequence[P], workers: int, executor: Executor | None, say: Callable[[str], None]
+    chunks: Sequence[P], workers: int, executor: Executor | None, warn: Callable[[str], None]
 ) -> Iterator[tuple[P, Columns]]:
     if executor is None and (workers == 1 or len(chunks) < 2):
         yield from ((chunk, chunk.run()) for chunk in chunks)
@@ -84,19 +84,19 @@ def _computed(
         for chunk, outcome in _batch(batch, workers, executor):
             if isinstance(outcome, WorkerDied):
                 died[chunk.name] += 1
-                _report(chunk, died[chunk.name], single=len(batch) == 1, say=say)
+                _report(chunk, died[chunk.name], single=len(batch) == 1, warn=warn)
             else:
                 del remaining[chunk.name]
                 yield chunk, outcome
 
 
-def _report(chunk: Chunk, times: int, *, single: bool, say: Callable[[str], None]) -> None:
+def _report(chunk: Chunk, times: int, *, single: bool, warn: Callable[[str], None]) -> None:
     if single and times >= TRIES:
         raise MfbaError(
             f"{chunk.name}: a worker process died {times} times on it (out of memory?); run again "
             "with fewer --workers; finished chunks are kept"
         )
-    say(f"{chunk.name}: its worker process may have died; running it again alone")
+    warn(f"{chunk.name}: its worker process may have died; running it again alone")
 
 
 def _batch(
@@ -111,7 +111,7 @@ def _batch(
     own = ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=belong_to_the_parent,
+        initializer=initialize_worker,
     )
     try:
         yield from _gathered(chunks, own, workers + 1)
@@ -157,7 +157,7 @@ def _outcome(future: Future[Columns]) -> Columns | WorkerDied:
         raise
 
 
-def belong_to_the_parent() -> None:
+def initialize_worker() -> None:
     """Worker set-up: ignore Ctrl-C, which the parent handles; exit when the parent dies."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_the_parent, daemon=True).start()

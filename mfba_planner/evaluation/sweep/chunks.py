@@ -13,10 +13,10 @@ from ..oracle import solve
 from ..study.chunk import Columns
 from ..suites import suite
 from ..suites.survivability import survivability
-from .columns import Row, lost_row, made_row, timing_row
+from .columns import Row, lost_row, run_row, timing_row
 from .single_run import generates_paths_together, run_one, run_together
 from .sweep_spec import Run, Setting, SweepSpec
-from .worker import Lost, each
+from .worker import Lost, run_in_worker
 
 RUNS_AT_ONCE = 100
 WORLDS_AT_ONCE = 20
@@ -25,7 +25,7 @@ DIGITS = 6  # of an optimum in metres: further digits differ between makes of pr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Runs:
+class RunsChunk:
     """Some runs of one planner."""
 
     name: str  # usable as a file name
@@ -54,7 +54,7 @@ class Runs:
     def _rows(self, batches: Sequence[tuple[Run, ...]]) -> Iterator[Row]:
         """The rows, one per run; runs of a batch that hung or died are run again one by one."""
         # Collect all results first: a hung child is only ended when its generator is exhausted.
-        results = list(each(make, batches, self.setting, self.setting.patience_s))
+        results = list(run_in_worker(make, batches, self.setting, self.setting.patience_s))
         for batch, result in zip(batches, results):
             if not isinstance(result, Lost):
                 yield from result
@@ -69,13 +69,13 @@ def make(runs: tuple[Run, ...], setting: Setting) -> list[Row]:
     started = perf_counter()
     single = len(runs) == 1
     done = [run_one(runs[0], setting, whole=False)] if single else run_together(runs, setting)
-    made = [(completed.times_ns, made_row(run, completed)) for run, completed in zip(runs, done)]
+    made = [(completed.times_ns, run_row(run, completed)) for run, completed in zip(runs, done)]
     wall_ms = 1e3 * (perf_counter() - started) / len(runs)
     return [{**timing_row(times_ns, wall_ms), **row} for times_ns, row in made]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Optima:
+class OracleChunk:
     """Oracle solutions of some worlds, by world number."""
 
     suite: str
@@ -101,7 +101,7 @@ class Optima:
         """Solve the worlds. Raises MfbaError for a world that takes too long."""
         found = []
         for world, result in zip(
-            self.worlds, each(solve_world, self.worlds, self, ORACLE_PATIENCE_S)
+            self.worlds, run_in_worker(solve_world, self.worlds, self, ORACLE_PATIENCE_S)
         ):
             if isinstance(result, Lost):
                 raise MfbaError(
@@ -112,7 +112,7 @@ class Optima:
         return {name: [row[name] for row in found] for name in found[0]}
 
 
-def solve_world(world: int, optima: Optima) -> Row:
+def solve_world(world: int, optima: OracleChunk) -> Row:
     """The oracle's columns of one world."""
     scenario = suite(optima.suite, optima.suite_seed).world(world, optima.speed_mps)
     solution = solve(scenario, optima.speed_mps)
@@ -124,15 +124,15 @@ def solve_world(world: int, optima: Optima) -> Row:
     }
 
 
-def chunks_of(spec: SweepSpec) -> list[Runs | Optima]:
+def chunks_of(spec: SweepSpec) -> list[RunsChunk | OracleChunk]:
     """All chunks of a sweep; independent of workers and executor."""
     at_once = max(1, RUNS_AT_ONCE // spec.seeds)
-    chunks: list[Runs | Optima] = [*(_optima(spec) if spec.oracle else ())]
+    chunks: list[RunsChunk | OracleChunk] = [*(_optima(spec) if spec.oracle else ())]
     for planner in spec.planners:
         for first in spec.world_range[::at_once]:
             worlds = range(first, min(first + at_once, spec.world_range.stop))
             chunks.append(
-                Runs(
+                RunsChunk(
                     name=f"{spec.suite}-{_plain(planner)}-{first}-{len(worlds)}",
                     runs=tuple(spec.runs(planner, worlds)),
                     setting=spec.setting_of(planner),
@@ -141,11 +141,11 @@ def chunks_of(spec: SweepSpec) -> list[Runs | Optima]:
     return chunks
 
 
-def _optima(spec: SweepSpec) -> Iterator[Optima]:
+def _optima(spec: SweepSpec) -> Iterator[OracleChunk]:
     worlds = suite(spec.suite, spec.setting.suite_seed)
     numbers = sorted({worlds.world_number(k) for k in spec.world_range})
     for first in range(0, len(numbers), WORLDS_AT_ONCE):
-        yield Optima(
+        yield OracleChunk(
             suite=spec.suite,
             suite_seed=spec.setting.suite_seed,
             worlds=tuple(numbers[first : first + WORLDS_AT_ONCE]),
@@ -154,7 +154,7 @@ def _optima(spec: SweepSpec) -> Iterator[Optima]:
 
 
 def gather(
-    chunks: list[Runs | Optima], found: Mapping[str, Columns]
+    chunks: list[RunsChunk | OracleChunk], found: Mapping[str, Columns]
 ) -> tuple[list[Row], list[Row]]:
     """A row for each run, and a row for each world that the oracle solved."""
     runs: list[Row] = []
@@ -162,7 +162,7 @@ def gather(
     for chunk in chunks:
         columns = found[chunk.name]
         rows_of = [dict(zip(columns, values)) for values in zip(*columns.values())]
-        (optima if isinstance(chunk, Optima) else runs).extend(rows_of)
+        (optima if isinstance(chunk, OracleChunk) else runs).extend(rows_of)
     return runs, optima
 
 

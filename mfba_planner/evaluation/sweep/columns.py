@@ -14,7 +14,7 @@ from ...simulation.episode import Outcome
 from ..contacts_and_clearances import RunMotion
 from ..metrics import Result, assess
 from ..scores import barn_score, optimality_gap, spl, time_to_goal_s
-from .single_run import PlayedRun
+from .single_run import CompletedRun
 from .sweep_spec import Run
 
 Row = dict[str, Any]
@@ -78,7 +78,7 @@ TIMINGS: dict[str, tuple[type, str]] = {
 }
 
 
-def made_row(run: Run, completed: PlayedRun) -> Row:
+def run_row(run: Run, completed: CompletedRun) -> Row:
     """The row of a run, without the oracle's columns."""
     result, run_motion = assess(completed.episode)
     scenario = completed.episode.scenario
@@ -113,7 +113,7 @@ def timing_row(times_ns: tuple[int, ...], wall_ms: float) -> Row:
     }
 
 
-def judged(row: Row, optimum: Mapping[str, Any] | None, speed_mps: float) -> Row:
+def with_optimum(row: Row, optimum: Mapping[str, Any] | None, speed_mps: float) -> Row:
     """The row with the oracle's columns (optimum None: a sweep without oracle)."""
     found: Row = {**row, **dict.fromkeys(_ORACLE)}
     if optimum is None:

@@ -17,12 +17,12 @@ from ...simulation.episode import Episode, Outcome
 from ...simulation.obstacle_motion import velocity_at
 from ..contacts_and_clearances import RunMotion
 from ..metrics import Result, assess, within_range
-from .single_run import PlayedRun
+from .single_run import CompletedRun
 
 BEFORE = 6  # decisions shown
 
 
-def _headline(completed: PlayedRun, result: Result, run_motion: RunMotion) -> str:
+def _headline(completed: CompletedRun, result: Result, run_motion: RunMotion) -> str:
     """How the run ended, in one line."""
     episode = completed.episode
     if completed.fault:
@@ -49,7 +49,7 @@ def _index(episode: Episode, run_motion: RunMotion) -> int | None:
     return times.index(contact_s) if contact_s in times else None
 
 
-def explain(completed: PlayedRun) -> list[str]:
+def explain(completed: CompletedRun) -> list[str]:
     """Lines of text that explain a run, the headline first."""
     episode = completed.episode
     result, run_motion = assess(episode)

@@ -23,7 +23,7 @@ from .table import build
 class ReadSweep:
     """The contents of a directory; of an interrupted sweep, the finished rows."""
 
-    order: SweepSpec
+    spec: SweepSpec
     rows: list[Row]
     code_changed: bool
 
@@ -44,7 +44,7 @@ def read_sweep(directory: Path) -> ReadSweep:
     finished = [chunk for chunk in chunks if found[chunk.name] is not None]
     rows, _ = build(spec, finished, {name: c for name, c in found.items() if c is not None})
     return ReadSweep(
-        order=spec, rows=rows, code_changed=facts.get("code") != code_digest(*PACKAGES)
+        spec=spec, rows=rows, code_changed=facts.get("code") != code_digest(*PACKAGES)
     )
 
 

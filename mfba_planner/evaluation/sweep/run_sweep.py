@@ -27,10 +27,10 @@ CONNECT_S = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Swept:
+class SweepResult:
     """The result of a sweep: rows and timings."""
 
-    order: SweepSpec
+    spec: SweepSpec
     rows: list[Row]
     timings: list[Row]
 
@@ -67,16 +67,16 @@ def sweep(
     executor: Executor | None = None,
     store: Store | None = None,
     done: Callable[[Chunk], None] = lambda _: None,
-    say: Callable[[str], None] = lambda _: None,
-) -> Swept:
+    warn: Callable[[str], None] = lambda _: None,
+) -> SweepResult:
     """Compute all runs (or read them from the store); the same result on any executor.
 
     workers, executor, store, done, say and errors as in study.compute_chunks.compute.
     """
     chunks = chunks_of(spec)
-    found = compute(chunks, workers=workers, executor=executor, store=store, done=done, say=say)
+    found = compute(chunks, workers=workers, executor=executor, store=store, done=done, warn=warn)
     rows, timings = build(spec, chunks, found)
-    return Swept(order=spec, rows=rows, timings=timings)
+    return SweepResult(spec=spec, rows=rows, timings=timings)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import cast
 from ...core.types import NANO, Observation
 from ...planning.algorithm_1 import Algorithm1, generate_paths_together
 from ...planning.planner_params import Swarm
-from ...planning.planner_registry import known
+from ...planning.planner_registry import find_factory
 from ...simulation.episode import Episode, Outcome
 from ...simulation.planner_observations import Observe, observe_sectors
 from ...simulation.run_episode import always_continue, episode_generator, run_to_end
@@ -21,7 +21,7 @@ TICKS_HELD = 100_000  # of all runs computed together, of some kB each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlayedRun:
+class CompletedRun:
     """A completed run; fault is the planner's fault that ended it, "" for none."""
 
     episode: Episode
@@ -34,7 +34,7 @@ class PlayedRun:
         return f"tick {len(self.episode.ticks)}: {self.fault}" if self.fault else ""
 
 
-def run_one(run: Run, setting: Setting, *, whole: bool = True) -> PlayedRun:
+def run_one(run: Run, setting: Setting, *, whole: bool = True) -> CompletedRun:
     """Compute a run in this process, without a time limit for the planner.
 
     After a fault of the planner the Episode holds the decisions before it, maybe none.
@@ -45,7 +45,7 @@ def run_one(run: Run, setting: Setting, *, whole: bool = True) -> PlayedRun:
     return replace(completed, times_ns=tuple(sandbox.times_ns))
 
 
-def run_together(runs: Sequence[Run], setting: Setting) -> Iterator[PlayedRun]:
+def run_together(runs: Sequence[Run], setting: Setting) -> Iterator[CompletedRun]:
     """run_one() of runs for which generates_paths_together(): one swarm batch per tick for all.
 
     The same decisions, bit for bit. Single decisions are not timed: times_ns is empty.
@@ -56,12 +56,12 @@ def run_together(runs: Sequence[Run], setting: Setting) -> Iterator[PlayedRun]:
         yield from _tick_by_tick(runs[first : first + at_once], setting)
 
 
-def _tick_by_tick(runs: Sequence[Run], setting: Setting) -> list[PlayedRun]:
+def _tick_by_tick(runs: Sequence[Run], setting: Setting) -> list[CompletedRun]:
     sandboxes = [PlannerSandbox(setting.params) for _ in runs]
     running = {
         i: _decision_by_decision(run, setting, sandboxes[i], False) for i, run in enumerate(runs)
     }
-    found: dict[int, PlayedRun] = {}
+    found: dict[int, CompletedRun] = {}
     while running:
         observations: dict[int, Observation] = {}
         for i, generator in running.items():
@@ -79,12 +79,12 @@ def generates_paths_together(planner: str, setting: Setting) -> bool:
     """Whether it is Algorithm 1 with a fresh swarm per tick, which is faster in one batch."""
     if ":" in planner or setting.params.swarm is not Swarm.FRESH:
         return False
-    return type(known(planner)(setting.params, setting.sensor, 0)) is Algorithm1
+    return type(find_factory(planner)(setting.params, setting.sensor, 0)) is Algorithm1
 
 
 def _decision_by_decision(
     run: Run, setting: Setting, sandbox: PlannerSandbox, whole: bool
-) -> Generator[Observation, None, PlayedRun]:
+) -> Generator[Observation, None, CompletedRun]:
     """A run as a generator: yields the observation before every decision."""
     scenario, fault = setting.scenario(run), ""
     try:
@@ -111,7 +111,7 @@ def _decision_by_decision(
         )
     if run.planner != "paper":
         episode = replace(episode, planner_name=run.planner)
-    return PlayedRun(episode=episode, fault=fault)
+    return CompletedRun(episode=episode, fault=fault)
 
 
 def _observer(path_planner: object, run: Run, setting: Setting, whole: bool) -> Observe:

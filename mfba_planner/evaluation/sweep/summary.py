@@ -19,7 +19,7 @@ Value = Callable[[Row], float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
+class PlannerSummary:
     """One planner's figures; rates with Wilson's, means with bootstrap intervals (95 %).
 
     certified is the success rate on worlds that the oracle certifies as feasible. gap,
@@ -63,8 +63,8 @@ class Versus:
     gap: Paired | None
 
 
-def standings(rows: Sequence[Row], timings: Sequence[Row]) -> list[Standing]:
-    """A Standing for each planner, as they come in the table."""
+def planner_summaries(rows: Sequence[Row], timings: Sequence[Row]) -> list[PlannerSummary]:
+    """A PlannerSummary for each planner, as they come in the table."""
     names = list(dict.fromkeys(row["planner"] for row in rows))
     return [
         _summary(name, k, [r for r in rows if r["planner"] == name], timings)
@@ -72,7 +72,7 @@ def standings(rows: Sequence[Row], timings: Sequence[Row]) -> list[Standing]:
     ]
 
 
-def _summary(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -> Standing:
+def _summary(name: str, number: int, rows: list[Row], timings: Sequence[Row]) -> PlannerSummary:
     successes = [row for row in rows if row["success"]]
     certified = [r for r in rows if r["certificate"] == Certificate.FEASIBLE.value]
     gaps = by_world([row for row in successes if row["gap"] is not None], lambda row: row["gap"])
@@ -85,7 +85,7 @@ def _summary(name: str, number: int, rows: list[Row], timings: Sequence[Row]) ->
         return mean(np.array(values), generator(number, key)) if values else None
 
     rated = [row for row in rows if row["spl"] is not None]
-    return Standing(
+    return PlannerSummary(
         planner=name,
         runs=len(rows),
         success=rate(len(successes), len(rows)),

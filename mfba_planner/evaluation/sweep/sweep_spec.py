@@ -15,7 +15,7 @@ from ...core.options import flatten
 from ...core.types import PathPlanner
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
-from ...planning.planner_registry import Factory, known, preset_of
+from ...planning.planner_registry import Factory, find_factory, preset_of
 from ...simulation.planner_observations import Perception
 from ...simulation.scenario import Scenario
 from ..suites import suite
@@ -167,7 +167,7 @@ def own_preset(name: str, params: PlannerParams) -> PlannerParams:
 def _factory(name: str) -> Factory:
     """The factory of a planner; modules are also searched in the working directory."""
     if ":" not in name:
-        return known(name)
+        return find_factory(name)
     module_name, _, attribute = name.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())

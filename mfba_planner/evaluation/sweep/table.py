@@ -16,15 +16,15 @@ from ...core.errors import ConfigError, OutputError
 from ...core.outputs import write_same
 from ..study.chunk import Columns
 from ..suites import suite
-from .chunks import Optima, Runs, gather
-from .columns import COLUMNS, TIMINGS, Row, judged
+from .chunks import OracleChunk, RunsChunk, gather
+from .columns import COLUMNS, TIMINGS, Row, with_optimum
 from .sweep_spec import SweepSpec
 
 Kinds = Mapping[str, tuple[type, str]]
 
 
 def build(
-    spec: SweepSpec, chunks: list[Runs | Optima], found: Mapping[str, Columns]
+    spec: SweepSpec, chunks: list[RunsChunk | OracleChunk], found: Mapping[str, Columns]
 ) -> tuple[list[Row], list[Row]]:
     """Rows of the table and of the timings, sorted by suite, world, planner, seed."""
     runs, optima = gather(chunks, found)
@@ -36,7 +36,7 @@ def build(
     rows = []
     for row in runs:
         optimum = by_world.get(worlds.world_number(row["world"])) if spec.oracle else None
-        rows.append(_columns_of(judged(row, optimum, speed), COLUMNS))
+        rows.append(_columns_of(with_optimum(row, optimum, speed), COLUMNS))
     return rows, [_columns_of(row, TIMINGS) for row in runs]
 
 

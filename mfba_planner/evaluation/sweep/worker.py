@@ -29,7 +29,7 @@ class Lost(NamedTuple):
     why: str
 
 
-def each(
+def run_in_worker(
     work: Work[T], items: Sequence[Any], shared: Any, patience_s: float
 ) -> Iterator[T | Lost]:
     """Yield work(item, shared) of each item, computed in a child process.

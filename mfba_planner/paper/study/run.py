@@ -31,13 +31,13 @@ def run_plan(
     workers: int = 1,
     store: Store | None = None,
     done: Callable[[SampleChunk], None] = lambda _: None,
-    say: Callable[[str], None] = lambda _: None,
+    warn: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Sample]:
     """Compute (or read back) every chunk; {sample: {column: values by seed}}.
 
     The callbacks and the errors raised are those of evaluation.study.compute_chunks.compute.
     """
-    return samples(plan, compute(plan, workers=workers, store=store, done=done, say=say))
+    return samples(plan, compute(plan, workers=workers, store=store, done=done, warn=warn))
 
 
 def samples(plan: Sequence[SampleChunk], found: Mapping[str, Columns]) -> dict[str, Sample]:

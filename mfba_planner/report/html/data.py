@@ -17,7 +17,7 @@ from mfba_planner.core.options import walk
 from mfba_planner.core.types import Bits, Mode
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances, within_range
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.odometry_jump import is_jump_reason
+from mfba_planner.planning.odometry_jump import is_odometry_jump
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report import format_values
 from mfba_planner.report.result_table import result_rows
@@ -190,7 +190,7 @@ def clearances(episode: Episode) -> list[float]:
     """
     gaps = [min(row, default=math.inf) for row in tick_clearances(episode)]
     afterwards = episode.ticks[1:]
-    driven = [math.inf if is_jump_reason(b.reason) else gap for gap, b in zip(gaps, afterwards)]
+    driven = [math.inf if is_odometry_jump(b.reason) else gap for gap, b in zip(gaps, afterwards)]
     return [*driven, math.inf]
 
 

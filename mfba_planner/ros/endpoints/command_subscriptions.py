@@ -11,7 +11,7 @@ from geometry_msgs.msg import TwistStamped
 
 from ...core.errors import InputError
 from ...core.geometry import Point
-from ...recording.from_messages import stamp_ns, told
+from ...recording.from_messages import command_from_twist, stamp_ns
 from ...simulation.world import World
 from ..interface import topics
 from ..interface.serialized_message import header_stamp_ns
@@ -77,7 +77,7 @@ class CommandSubscriptions:
         self.stop()
         world = self._world()
         try:
-            self.command = told(message, world.scenario.robot, world.pose.yaw)
+            self.command = command_from_twist(message, world.scenario.robot, world.pose.yaw)
         except InputError as error:
             self._refused_inputs.add(error)
 

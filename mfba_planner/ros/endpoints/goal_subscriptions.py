@@ -10,7 +10,7 @@ from std_srvs.srv import Trigger
 
 from ...core.errors import InputError
 from ...core.geometry import Point, Pose2D
-from ...core.types import Refused
+from ...core.types import RefusalReason
 from ...recording.from_messages import goal_point, waypoint_points
 from ..interface import topics
 from ..runtime.goal_queue import GoalQueue
@@ -48,7 +48,7 @@ class GoalSubscriptions:
         self._node.subscribe(topics.GOAL_POSE, self._on_goal_pose)
         self._node.subscribe(topics.WAYPOINTS, self._on_waypoints)
 
-    def advance(self, pose: Pose2D | Refused, tolerance_m: float) -> Point | None:
+    def advance(self, pose: Pose2D | RefusalReason, tolerance_m: float) -> Point | None:
         """The present goal: of several, the first that is not reached at this pose."""
         if not isinstance(pose, str):
             before = self.goal_queue.goal_index

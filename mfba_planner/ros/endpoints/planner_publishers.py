@@ -9,7 +9,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 
 from ...core.geometry import Point
 from ...core.types import Decision, Mode
-from ...planning.odometry_jump import is_jump_reason
+from ...planning.odometry_jump import is_odometry_jump
 from ..interface import markers, to_messages, topics
 from ..node_parameters import PlannerSettings
 from ..runtime.graph_node import GraphNode
@@ -43,7 +43,7 @@ class PlannerPublishers:
     ) -> None:
         """Publish the command first, as the world waits for it, then the rest of the decision."""
         self.publish_command(decision)
-        if decision.mode is Mode.STOPPED or is_jump_reason(decision.reason):
+        if decision.mode is Mode.STOPPED or is_odometry_jump(decision.reason):
             self._log.warning(decision.reason, throttle_duration_sec=1.0)
         frame = self._settings.odom_frame
         self._plan.publish(to_messages.plan_msg(decision, frame))

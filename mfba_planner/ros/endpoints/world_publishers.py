@@ -27,7 +27,7 @@ class WorldPublishers:
         """Advertise all topics."""
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
         self._odom = node.advertise(topics.ODOM)
-        noisy = robot.noise.of_odometry
+        noisy = robot.noise.affects_odometry
         self._truth = node.advertise(topics.GROUND_TRUTH) if noisy else None
         # With a lidar virtual_sensor reads scan; obstacles is then for people and bags only.
         self._scan_frame = settings.scan_frame

@@ -16,10 +16,10 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
-from ...core.geometry import Point, Pose2D, half_turn
+from ...core.geometry import Point, Pose2D, quaternion_from_yaw
 from ...core.types import Bits, Decision, Mode, Ranges, Scan
 from ...perception.sensory_vector import SensorParams, bits_text, longest_range_m
-from ...planning.odometry_jump import is_jump_reason
+from ...planning.odometry_jump import is_odometry_jump
 from ...recording.from_messages import SECOND_NS, body_velocity, points_text, rotated
 from ...simulation.episode import Outcome
 from ...simulation.robot_model import Base
@@ -54,7 +54,7 @@ def set_pose(pose: Pose, x: float, y: float, yaw_rad: float = 0.0) -> Pose:
     """Fill in a planar pose (REP-103); return it."""
     pose.position.x, pose.position.y = x, y
     if yaw_rad:  # the default is no rotation
-        pose.orientation.z, pose.orientation.w = half_turn(yaw_rad)
+        pose.orientation.z, pose.orientation.w = quaternion_from_yaw(yaw_rad)
     return pose
 
 
@@ -207,7 +207,7 @@ def decision_msg(
     }
     status = DiagnosticStatus(level=_LEVELS.get(decision.mode, DiagnosticStatus.OK), name=name)
     status.message = decision.reason
-    if is_jump_reason(decision.reason) and status.level == DiagnosticStatus.OK:
+    if is_odometry_jump(decision.reason) and status.level == DiagnosticStatus.OK:
         status.level = DiagnosticStatus.WARN
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     message = DiagnosticArray(status=[status])

@@ -12,7 +12,13 @@ from rclpy.event_handler import PublisherEventCallbacks
 
 from ...core.errors import ConfigError, GraphError
 from ...recording.bag_reader import BagReader
-from ...recording.replay_schedule import UNKNOWN_DEPTH, Due, Schedule, begin_ns, due_messages
+from ...recording.replay_schedule import (
+    UNKNOWN_DEPTH,
+    DueMessage,
+    Schedule,
+    due_messages,
+    replay_start_ns,
+)
 from ..interface import topics
 from ..interface.to_messages import clock_msg
 from ..runtime.graph_node import SPIN_S, GraphNode
@@ -56,7 +62,7 @@ class Player:
         s = self.settings
         fast = s.as_fast_as_possible
         found, left_out = choose(self._bag.topics, s, self._resolve)
-        self._start_ns = begin_ns(self._bag, s.start_offset)
+        self._start_ns = replay_start_ns(self._bag, s.start_offset)
         wanted = awaited(found, s, self._resolve)
         self._publishers = {
             topic.recorded: self._node.create_publisher(
@@ -130,7 +136,7 @@ class Player:
         self.phase, self._since_ns = phase, now
 
     def _rewind(self) -> None:
-        self._messages: Iterator[Due] = due_messages(
+        self._messages: Iterator[DueMessage] = due_messages(
             self._bag, self._publishers.keys(), self._latched, self.settings.start_offset
         )
         self._next = next(self._messages, None)
@@ -174,9 +180,9 @@ class Player:
             now = time.monotonic_ns()
         return 0.0
 
-    def _publish(self, due: Due) -> None:
-        self._schedule.step_to(due.time_ns)
-        if self._schedule.by_steps and due.time_ns > self._clock_ns:
+    def _publish(self, due: DueMessage) -> None:
+        self._schedule.advance_to(due.time_ns)
+        if self._schedule.is_stepped and due.time_ns > self._clock_ns:
             self._publish_clock(due.time_ns)
         self._publishers[due.topic].publish(due.data)
         self._last_ns = due.time_ns

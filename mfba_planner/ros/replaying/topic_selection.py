@@ -13,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ...core.errors import ConfigError, InputError
 from ...recording.bag_metadata import BagTopic
 from ...recording.message_definitions import definition_of
-from ...recording.replay_schedule import offer
+from ...recording.replay_schedule import merged_qos
 from ..interface import qos_conversion as qos
 from ..interface import topics
 from .replay_arguments import ReplaySettings, known
@@ -60,7 +60,7 @@ def choose(
                 recorded=name,
                 name=new_names.get(name, name),
                 type=message_type,
-                qos=qos.profile(offer(topic.qos)),
+                qos=qos.profile(merged_qos(topic.qos)),
                 message_count=topic.message_count,
             )
         )

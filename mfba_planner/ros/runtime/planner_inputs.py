@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ...core.errors import StampError
 from ...core.geometry import Pose2D
-from ...core.types import Ranges, Refused
+from ...core.types import Ranges, RefusalReason
 from .stamp_pairing import StampPairs
 
 
@@ -20,8 +20,8 @@ class Inputs(NamedTuple):
     """What one decision is made on."""
 
     stamp_ns: int
-    pose: Pose2D | Refused
-    ranges_m: Ranges | Refused
+    pose: Pose2D | RefusalReason
+    ranges_m: Ranges | RefusalReason
     age_s: float = 0.0
 
 
@@ -30,15 +30,19 @@ class LockstepInputs:
 
     def __init__(self) -> None:
         """Start with nothing received."""
-        self._pairs: StampPairs[Pose2D | Refused, Ranges | Refused] = StampPairs(repeat=True)
+        self._pairs: StampPairs[Pose2D | RefusalReason, Ranges | RefusalReason] = StampPairs(
+            repeat=True
+        )
 
-    def add_odom(self, stamp_ns: int, pose: Pose2D | Refused, _now_s: float) -> Inputs | None:
+    def add_odom(
+        self, stamp_ns: int, pose: Pose2D | RefusalReason, _now_s: float
+    ) -> Inputs | None:
         """Add odom; StampError for a stamp older than the last pair's."""
         pair = self._pairs.add_a(stamp_ns, pose)
         return Inputs(stamp_ns, *pair) if pair else None
 
     def add_sectors(
-        self, stamp_ns: int, ranges_m: Ranges | Refused, _now_s: float
+        self, stamp_ns: int, ranges_m: Ranges | RefusalReason, _now_s: float
     ) -> Inputs | None:
         """Add sectors; StampError for a stamp older than the last pair's."""
         pair = self._pairs.add_b(stamp_ns, ranges_m)
@@ -54,12 +58,12 @@ class NewestInputs:
 
     def __init__(self) -> None:
         """Start with nothing received."""
-        self._pose: Pose2D | Refused = "no odom yet"
-        self._ranges: Ranges | Refused = "no sectors yet"
+        self._pose: Pose2D | RefusalReason = "no odom yet"
+        self._ranges: Ranges | RefusalReason = "no sectors yet"
         self._odom_ns = self._sectors_ns = -1
         self._odom_s = self._sectors_s = 0.0
 
-    def add_odom(self, stamp_ns: int, pose: Pose2D | Refused, now_s: float) -> Inputs | None:
+    def add_odom(self, stamp_ns: int, pose: Pose2D | RefusalReason, now_s: float) -> Inputs | None:
         """Keep odom for the next sectors; StampError for a stamp that goes back."""
         if stamp_ns < max(self._odom_ns, 0):
             raise StampError(_goes_back("odom", stamp_ns, self._odom_ns))
@@ -69,7 +73,7 @@ class NewestInputs:
         return None
 
     def add_sectors(
-        self, stamp_ns: int, ranges_m: Ranges | Refused, now_s: float
+        self, stamp_ns: int, ranges_m: Ranges | RefusalReason, now_s: float
     ) -> Inputs | None:
         """Return sectors with the newest odom; StampError for a stamp that does not rise."""
         if stamp_ns <= self._sectors_ns:
