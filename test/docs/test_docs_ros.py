@@ -24,7 +24,7 @@ def test_parameters_and_files_that_are_named_exist() -> None:
     shortened = {"wait_s", "slow_within_m"}
     assert len(named) > 8
     assert named - shortened <= declared
-    for file in re.findall(r"(?:config|layout|test)/[\w.]+", PAGE):
+    for file in re.findall(r"(?:config|layout|test)/[\w./]+\w", PAGE):
         assert (ROOT / file).is_file(), file
 
 
