@@ -21,11 +21,17 @@ DOTTED = re.compile(r"\bmfba_planner(?:\.\w+)+")
 # A Python file or a folder in backticks: `planning/recovery.py`, `data.py`, `swarm/`.
 IN_BACKTICKS = re.compile(r"`(?:[^`\s]* )?([\w./-]+\.py|[\w-]+(?:/[\w-]+)*/)`")
 OF_THE_READER = {"skirt.py"}  # a file that the reader writes
+# A class, a constant or a protocol in backticks: `BasePlanner`, `ROUNDS`.
+SYMBOL = re.compile(r"`([A-Z]\w{2,})`")
+FOLDERS = ("mfba_planner", "bench", "docs", "launch", "test", "tools", "config", "layout")
 EXISTING = [
     f"/{path.relative_to(ROOT)}{'/' if path.is_dir() else ''}"
-    for folder in ("mfba_planner", "bench", "docs", "launch", "test", "tools", "config", "layout")
-    for path in (ROOT / folder, *(ROOT / folder).rglob("*"))
+    for path in (*ROOT.iterdir(), *(p for name in FOLDERS for p in (ROOT / name).rglob("*")))
 ]
+SOURCES = "\n".join(
+    path.read_text(encoding="utf-8")
+    for path in (ROOT / "setup.py", *sorted((ROOT / "mfba_planner").rglob("*.py")))
+)
 
 
 def resolves(name: str) -> bool:
@@ -69,9 +75,17 @@ def test_python_files_and_folders_exist(name: str) -> None:
     assert not missing
 
 
+@pytest.mark.parametrize("name", TEXTS)
+def test_symbols_occur_in_the_sources(name: str) -> None:
+    named = set(SYMBOL.findall(TEXTS[name]))
+    missing = sorted(found for found in named if not re.search(rf"\b{found}\b", SOURCES))
+    assert not missing
+
+
 def test_names_are_found_and_wrong_ones_refused() -> None:
     assert sum(len(DOTTED.findall(text)) for text in TEXTS.values()) > 10
     assert sum(len(IN_BACKTICKS.findall(text)) for text in TEXTS.values()) > 20
+    assert sum(len(SYMBOL.findall(text)) for text in TEXTS.values()) > 10
     assert resolves("mfba_planner.core.types.PathPlanner")
     assert not resolves("mfba_planner.core.types.Absent")
     assert not resolves("mfba_planner.absent.types")
