@@ -70,7 +70,7 @@ def topic_table() -> str:
     rows = []
     for topic in topics.GRAPH:
         if topic is topics.TF:
-            continue  # only where tf2_msgs is installed: TOPICS_TEXT says so
+            continue  # only where tf2_msgs is installed: mentioned in TOPICS_TEXT
         package = topic.type.__module__.split(".")[0]
         latched = topic.qos.durability.short_key == "transient_local"
         rows.append(
@@ -234,7 +234,7 @@ def _allowed(entry: dict[str, Any]) -> str:
     return {"string": "text"}.get(entry["type"], str(entry["type"]))
 
 
-# File name: title, for whom it is, content.
+# File name: title, audience and purpose, content.
 PAGES: dict[str, tuple[str, str, Callable[[], str]]] = {
     "cli": (
         "The command mfba",
@@ -244,18 +244,18 @@ PAGES: dict[str, tuple[str, str, Callable[[], str]]] = {
     ),
     "topics": (
         "Topics",
-        "For anybody who connects other nodes: every topic with its type and QoS, the frames, and "
+        "For developers who connect other nodes: every topic with type and QoS, the frames, and "
         "the two kinds of time.",
         topics_page,
     ),
     "services": (
         "Services",
-        "For anybody who controls the nodes from outside: every service with its type and effect.",
+        "For developers who control the nodes from outside: every service, its type and effect.",
         services_page,
     ),
     "parameters": (
         "Parameters of the nodes",
-        "For anybody who sets up the nodes: every parameter with default, range, meaning, unit.",
+        "For users who configure the nodes: every parameter with default, range, meaning, unit.",
         parameters_page,
     ),
     "scenario": (
