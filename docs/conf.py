@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How Sphinx builds these pages (`make docs`); the reference is written from the code first."""
+"""Sphinx configuration of `make docs`; writes the reference pages from the code first."""
 
 import sys
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The documentation builds without a warning, and what its pages show works as shown."""
+"""The documentation builds without warnings; commands and code of its pages work as shown."""
 
 import html
 import subprocess
@@ -17,8 +17,8 @@ DOCS = ROOT / "docs"
 PAGES = {
     name[len("docs/") :]: page for name, page in shown_commands.PAGES.items() if "docs/" in name
 }
-# They have tests of their own, which know what their commands and code must print.
-ELSEWHERE = {
+# Pages with tests of their own, which check the output of their commands and code.
+OWN_TESTS = {
     "benchmark.md": "bench/test_benchmark.py",
     "planners.md": "docs/test_docs_planners.py",
     "optimizer.md": "docs/test_docs_optimizer.py",
@@ -37,7 +37,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_every_page_is_built_and_can_be_reached(built: Path) -> None:
+def test_every_page_is_built_and_linked_from_the_index(built: Path) -> None:
     start = (built / "index.html").read_text(encoding="utf-8")
     for name in PAGES:
         target = name.removesuffix(".md") + ".html"
@@ -45,19 +45,19 @@ def test_every_page_is_built_and_can_be_reached(built: Path) -> None:
         assert name == "index.md" or f'href="{target}"' in start
 
 
-def test_the_reference_holds_every_command_and_every_key(built: Path) -> None:
+def test_the_reference_contains_every_command_and_every_key(built: Path) -> None:
     commands = (built / "reference/cli.html").read_text(encoding="utf-8")
     for name in cli.COMMANDS:
         assert f"mfba {name}<" in commands
     assert commands.count("usage: ") >= len(cli.COMMANDS)
     keys = (built / "reference/scenario.html").read_text(encoding="utf-8")
     schema = yaml_schema.schema()
-    for part in (schema, *schema["$defs"].values()):
-        for key, entry in part["properties"].items():
+    for table in (schema, *schema["$defs"].values()):
+        for key, entry in table["properties"].items():
             assert f">{key}<" in keys
             assert entry["description"] in html.unescape(keys)
 
 
-@pytest.mark.parametrize("name", [n for n in PAGES if n not in ELSEWHERE])
-def test_a_page_does_what_it_shows(name: str, tmp_path: Path) -> None:
-    shown_commands.follow(PAGES[name], tmp_path)
+@pytest.mark.parametrize("name", [n for n in PAGES if n not in OWN_TESTS])
+def test_commands_and_code_of_a_page_work(name: str, tmp_path: Path) -> None:
+    shown_commands.run_page(PAGES[name], tmp_path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No command is shown that no test and no step of .ci/run runs, at least a reduced form of it."""
+"""A test or .ci/run runs every command of README and docs, at least in a reduced form."""
 
 import re
 from pathlib import Path
@@ -13,20 +13,20 @@ CI = re.findall(r"^make (\w+)$", (ROOT / ".ci/run").read_text(encoding="utf-8"),
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 COLCON = (ROOT / "tools/colcon_check.sh").read_text(encoding="utf-8")
 SETUP = (ROOT / "setup.py").read_text(encoding="utf-8")
-EVERYTHING = [
+COMMANDS = [
     (n, w)
     for n, page in PAGES.items()
     for w in shown_commands.commands(page) + shown_commands.inline(page)
 ]
-# `make docs` is what docs/test_docs_build.py does; the target calls the same builder as strictly.
+# docs/test_docs_build.py runs the builder of `make docs`, with the same strictness.
 BY_TESTS = {"docs": "--builder html --nitpicky --fail-on-warning --keep-going"}
 
 
 def is_run(words: list[str]) -> bool:
-    """Whether a test or .ci/run runs it; AssertionError where it says what is not so."""
+    """Whether a test or .ci/run runs a command; AssertionError for a wrong argument."""
     program, *rest = words
     if ours(words) is not None:
-        return True  # by test_readme, test_docs and those that test_docs.ELSEWHERE names
+        return True  # by test_readme, test_docs_build and the tests in test_docs_build.OWN_TESTS
     if program == "ros2":
         return bool(kind_of(words))  # by test_docs_ros2
     if program == "python":
@@ -37,7 +37,7 @@ def is_run(words: list[str]) -> bool:
 
 
 def sets_up_a_workspace(words: list[str]) -> bool:
-    """Whether `make colcon` does it, which builds, sources and looks with what is installed."""
+    """Whether `make colcon` runs it, which builds, sources and checks the installation."""
     program, *rest = words
     assert "colcon" in CI
     assert "tools/colcon_check.sh" in MAKEFILE
@@ -54,20 +54,20 @@ def sets_up_a_workspace(words: list[str]) -> bool:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_every_command_of_a_page_is_run(name: str) -> None:
-    for page, words in EVERYTHING:
+    for page, words in COMMANDS:
         if page == name:
-            assert is_run(words), f"{name}: {' '.join(words)}: nobody runs it"
+            assert is_run(words), f"{name}: {' '.join(words)}: no test runs it"
 
 
-def test_commands_are_found_and_none_is_reduced_that_is_not_shown() -> None:
-    lines = {" ".join(words) for _, words in EVERYTHING}
+def test_commands_are_found_and_every_reduced_one_is_shown() -> None:
+    lines = {" ".join(words) for _, words in COMMANDS}
     assert len(lines) > 60
     assert {"make demo", "make test", "python bench/robots.py"} <= lines
     assert not set(REDUCED) - lines
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "expected"),
     [
         ("python bench/robots.py", "360 beams, sectors        3 of 3 "),
         (
@@ -77,5 +77,5 @@ def test_commands_are_found_and_none_is_reduced_that_is_not_shown() -> None:
         ("python bench/fleet.py", "1 of 1"),
     ],
 )
-def test_what_makes_the_tables_of_other_pages_runs(line: str, said: str, tmp_path: Path) -> None:
-    assert said in shown_commands.script(shown_commands.reduced(line.split()), tmp_path)
+def test_scripts_behind_tables_of_pages_run(line: str, expected: str, tmp_path: Path) -> None:
+    assert expected in shown_commands.script(shown_commands.reduced(line.split()), tmp_path)

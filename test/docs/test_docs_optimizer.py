@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The examples of docs/optimizer.md run, and say what they should."""
+"""The examples of docs/optimizer.md run and print correct results."""
 
 import re
 from typing import Any
@@ -23,7 +23,7 @@ def test_the_examples_run_one_after_the_other(capsys: pytest.CaptureFixture[str]
     assert printed[0].endswith("no failures\n")
     first = float(printed[0].split()[0])
     assert first < 0.1
-    assert space["swarm"].best_value == first, "ask and tell is the same run"
+    assert space["swarm"].best_value == first, "ask-and-tell gives the same run"
     assert space["result"].best_x.shape == (20, 2)
     assert np.median(space["result"].best_value) < 0.1
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/planners.md keeps its word: its planner drives, its table names those there are."""
+"""docs/planners.md: its example planner works, and its table lists every planner."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ from mfba_planner.planning.planner_registry import PLANNERS
 PAGE = (ROOT / "docs/planners.md").read_text(encoding="utf-8")
 
 
-def test_every_planner_has_its_line() -> None:
+def test_every_planner_has_a_row() -> None:
     named = set(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
     assert named == set(PLANNERS) - {"mfba", "ba"}
     assert "`mfba` and `ba` are it" in PAGE
@@ -28,7 +28,7 @@ def test_the_other_commands_run(tmp_path: Path) -> None:
     assert "3 of 3 at the goal without collision" in shown_commands.mfba(SIM[1:], tmp_path)
 
 
-def test_the_planner_of_one_s_own_runs_in_a_sweep(
+def test_the_example_planner_runs_in_a_sweep(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/ros.md keeps its word: its commands name what there is, the node takes what they say."""
+"""docs/ros.md: parameters and files in it exist, and its bound for giving up is correct."""
 
 import re
 
@@ -24,11 +24,11 @@ def test_parameters_and_files_that_are_named_exist() -> None:
     shortened = {"wait_s", "slow_within_m"}
     assert len(named) > 8
     assert named - shortened <= declared
-    for file in re.findall(r"(?:config|layout|test)/[\w.]+", PAGE):
+    for file in re.findall(r"(?:config|layout|test)/[\w./]+\w", PAGE):
         assert (ROOT / file).is_file(), file
 
 
-def test_the_bound_is_the_one_that_is_printed() -> None:
+def test_the_bound_for_giving_up_is_the_printed_one() -> None:
     params = RecoveryParams(wait_s=2.0, back_off_s=1.0, attempts=3)
     printed = (3 + 1) * (2 * 2.0 + 3 * 0.1) + 3 * (1.0 + 2 * 0.1)
     assert longest_s(params, 0.1) == pytest.approx(printed)

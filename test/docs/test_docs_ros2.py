@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every `ros2` command of the README and the docs is run: real processes, in the pages' order."""
+"""Every `ros2` command of README and docs runs as a process, in the sequence of its page."""
 
 import re
 import shlex
@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 import shown_commands
 import yaml
-from ros2_session import KINDS, SOON_S, Session, holds, kind_of
+from ros2_session import KINDS, TIMEOUT_S, Session, holds, kind_of
 from shown_commands import PAGES, ROOT
 
 from mfba_planner.launcher.in_process import run_in_process
 from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 
-# Other people's programs, and who holds us to what is said of them.
+# Commands of other packages in the text, and the tests of statements about them.
 MENTIONED = {
     "ros2 bag": "recording/test_bag_writer.py",
     "ros2 bag info": "recording/test_bag_metadata.py",
@@ -27,11 +27,11 @@ MENTIONED = {
     "ros2 bag record": "recording/test_bag_reader.py",
     "ros2 pkg prefix mfba_planner": "ros/test_viewer_layouts.py",
 }
-SAID = re.compile(r"\bros2 [a-z]+(?: \w+)*")
+IN_TEXT = re.compile(r"\bros2 [a-z]+(?: \w+)*")
 
 
 def blocks(page: str) -> list[list[list[str]]]:
-    """The `ros2` lines of each block of a page that has any, then those within its text."""
+    """The `ros2` lines of each code block of a page, then those in its text."""
     fences = [
         shown_commands.commands(f"```sh\n{block}```\n")
         for block in shown_commands.blocks(page, "sh")
@@ -49,17 +49,17 @@ def outside_fences(page: str) -> str:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_nothing_of_ros2_is_said_that_is_not_run(name: str) -> None:
+def test_every_ros2_command_in_the_text_is_run_or_tested(name: str) -> None:
     page = PAGES[name]
     for block in blocks(page):
         for words in block:
             kind_of(words)
     fenced = page.replace(outside_fences(page), "")
     in_sh = sum(len(block) for block in blocks(page))
-    for said in SAID.findall(outside_fences(page)):
-        words = said.split()
+    for command in IN_TEXT.findall(outside_fences(page)):
+        words = command.split()
         is_kind = any(kind[: len(words) - 1] == tuple(words[1:]) for kind in KINDS)
-        assert is_kind or words[1] == "run" or said in MENTIONED, f"{name}: {said}"
+        assert is_kind or words[1] == "run" or command in MENTIONED, f"{name}: {command}"
     assert in_sh >= len(re.findall(r"^ros2 ", fenced, re.MULTILINE))
     for test in MENTIONED.values():
         assert (ROOT / "test" / test).is_file()
@@ -70,10 +70,10 @@ def test_pages_with_ros2_are_found() -> None:
 
 
 @pytest.fixture
-def home(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where a reader is: with a bag at the place that pages name, and parameters of one's own."""
-    a_part_of_case_1 = replace(load_scenario("case1"), start_m=(9.4, 4.2), goal_m=(9.6, 8.0))
-    config = RunConfig(scenario=a_part_of_case_1)
+def directory(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with the bag and the parameter file that the pages name."""
+    short_case_1 = replace(load_scenario("case1"), start_m=(9.4, 4.2), goal_m=(9.6, 8.0))
+    config = RunConfig(scenario=short_case_1)
     run_in_process(config, tmp_path / "runs/mine/bag", domain_id=domain_id)
     shipped = yaml.safe_load((ROOT / "config/planner.yaml").read_text(encoding="utf-8"))
     shipped["/**/planner"]["ros__parameters"]["speed_mps"] = 0.3
@@ -82,30 +82,31 @@ def home(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Pat
     return tmp_path
 
 
-def recorded(home: Path) -> list[Path]:
-    """The bags that were not there before."""
-    return [path for path in (home / "runs").iterdir() if path.name != "mine"]
+def recorded(directory: Path) -> list[Path]:
+    """The bags that a page recorded."""
+    return [path for path in (directory / "runs").iterdir() if path.name != "mine"]
 
 
-def _is_kept(session: Session, bag: Path, home: Path, turns: Iterator[int]) -> bool:
-    """Whether what the planner says is recorded: it and the recorder may find each other late."""
-    session.prove()
-    return holds(bag, "/cmd_vel", home / f"saved{next(turns)}")
+def _is_recorded(session: Session, bag: Path, directory: Path, numbers: Iterator[int]) -> bool:
+    """Whether the bag has commands of the planner; discovery of the recorder may be late."""
+    session.check()
+    return holds(bag, "/cmd_vel", directory / f"saved{next(numbers)}")
 
 
 @pytest.mark.parametrize("name", WITH_ROS2)
-def test_the_commands_of_a_page_do_what_it_says(name: str, home: Path, domain_id: int) -> None:
+def test_the_commands_of_a_page_work(name: str, directory: Path, domain_id: int) -> None:
     bag = None
     if name.startswith("docs/how-to/"):
-        shown_commands.save(PAGES[name], home)
-    with Session(domain_id, home) as session:
+        shown_commands.save(PAGES[name], directory)
+    with Session(domain_id, directory) as session:
         for block in blocks(PAGES[name]):
             for words in block:
                 session.do(words)
-            session.prove()
+            session.check()
         if "recorder" in session.running:
-            session.graph.until(lambda: bool(recorded(home)), SOON_S)  # a node is seen before that
-            (bag,) = recorded(home)
-            session.graph.until(partial(_is_kept, session, bag, home, count()), SOON_S)
+            # The node is in the graph before its bag exists.
+            session.graph.until(lambda: bool(recorded(directory)), TIMEOUT_S)
+            (bag,) = recorded(directory)
+            session.graph.until(partial(_is_recorded, session, bag, directory, count()), TIMEOUT_S)
         session.end()
-    assert bag is None or holds(bag, "/cmd_vel", home / "saved")
+    assert bag is None or holds(bag, "/cmd_vel", directory / "saved")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands and code that the README and the docs show, as their readers would try them."""
+"""Find and run the commands and the code that README and docs show."""
 
 import os
 import re
@@ -11,7 +11,7 @@ from pathlib import Path
 from project import ROOT
 
 MFBA = Path(sys.executable).parent / "mfba"
-# README and docs, but for what the build writes (docs/reference).
+# README and docs, except the generated pages (docs/reference).
 PAGES = {
     str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
     for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md")))
@@ -19,7 +19,7 @@ PAGES = {
 }
 _BENCH = "python bench/benchmark.py"
 _SMALL = "--others 2 --few 2 --rounds 1 --workers 1 --docs docs"
-# What takes too long for a test, as shown, and what is run instead: the same with less of it.
+# Commands that take too long for a test, and the reduced command that runs instead.
 REDUCED = {
     ".venv/bin/mfba sim case2 --seeds 100": ".venv/bin/mfba sim case2 --seeds 3",
     "mfba sim walled --seeds 100": ("mfba sim walled --seeds 3"),
@@ -37,45 +37,45 @@ REDUCED = {
     "python bench/kidnapped.py --graph 5": "python bench/kidnapped.py --graph 1 --count 1",
     "python bench/fleet.py": "python bench/fleet.py --seeds 1 --robots 3 --radius 3",
 }
-# Whole lines of a page that name the file a block of YAML goes into.
+# Lines of a page with the name of the file for a block of YAML.
 _SAVED = re.compile(r"^[^`\n]*\b[Ss]aved? (?:this )?as `([\w.]+)`", re.MULTILINE)
 
 
 def blocks(text: str, language: str) -> list[str]:
-    """What stands in fences of a language."""
+    """The contents of the code blocks of a language."""
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
 def commands(text: str) -> list[list[str]]:
-    """The shell commands of a page, in words, those joined by && apart."""
+    """The shell commands of a page, split into words and at &&."""
     lines = [line for block in blocks(text, "sh") for line in block.splitlines() if line.strip()]
     words = [shlex.split(line, comments=True) for line in lines]
-    return [part for line in words for part in _split_at_and(line)]
+    return [command for line in words for command in _split_at_and(line)]
 
 
 def _split_at_and(words: list[str]) -> list[list[str]]:
-    parts: list[list[str]] = [[]]
+    found: list[list[str]] = [[]]
     for word in words:
         if word == "&&":
-            parts.append([])
+            found.append([])
         else:
-            parts[-1].append(word)
-    return parts
+            found[-1].append(word)
+    return found
 
 
 def inline(text: str) -> list[list[str]]:
-    """The commands within the text of a page that are more than a name, in words."""
+    """The commands with arguments in the running text of a page, split into words."""
     prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
     return [shlex.split(line) for line in re.findall(r"`((?:python|make) [^`]+)`", prose)]
 
 
 def reduced(command: list[str]) -> list[str]:
-    """What a test runs of a command: the whole, or what REDUCED says."""
+    """The command that a test runs: the same, or its reduced form in REDUCED."""
     return shlex.split(REDUCED.get(" ".join(command), " ".join(map(shlex.quote, command))))
 
 
 def script(command: list[str], cwd: Path, *, code: int = 0) -> str:
-    """Run `python bench/...` there; return what it printed."""
+    """Run `python bench/...` in cwd; return its stdout."""
     done = subprocess.run(
         [sys.executable, ROOT / command[1], *command[2:]],
         cwd=cwd,
@@ -90,12 +90,12 @@ def script(command: list[str], cwd: Path, *, code: int = 0) -> str:
 
 
 def ours(command: list[str]) -> list[str] | None:
-    """The arguments of a command of ours, None for another's."""
+    """The arguments of an `mfba` command; None for other programs."""
     return command[1:] if command[0] in (".venv/bin/mfba", "mfba") else None
 
 
 def mfba(arguments: list[str], cwd: Path, *, code: int = 0) -> str:
-    """Run it; return what it said on both channels."""
+    """Run `mfba` in cwd; return stdout and stderr."""
     done = subprocess.run(
         [MFBA, *arguments],
         cwd=cwd,
@@ -110,7 +110,7 @@ def mfba(arguments: list[str], cwd: Path, *, code: int = 0) -> str:
 
 
 def python(code: str, cwd: Path) -> str:
-    """Run a block of Python; return what it printed."""
+    """Run a block of Python in cwd; return its stdout."""
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=cwd, capture_output=True, text=True, timeout=90
     )
@@ -119,13 +119,13 @@ def python(code: str, cwd: Path) -> str:
 
 
 def save(text: str, cwd: Path) -> None:
-    """Save the YAML of a page where it says."""
+    """Save the YAML blocks of a page under the file names in its text."""
     for name, content in zip(_SAVED.findall(text), blocks(text, "yaml"), strict=True):
         (cwd / name).write_text(content, encoding="utf-8")
 
 
-def follow(text: str, cwd: Path) -> None:
-    """Do what a page says: save its YAML, run its commands, then its Python.
+def run_page(text: str, cwd: Path) -> None:
+    """Save the YAML of a page, run its commands, then its Python.
 
     A block of `console` must print just what it shows.
     """
