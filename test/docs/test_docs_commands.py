@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import shown_commands
 from ros2_session import kind_of
-from shown_commands import PAGES, REDUCED, ROOT, ours
+from shown_commands import PAGES, REDUCED, ROOT, mfba_arguments
 
 CI = re.findall(r"^make (\w+)$", (ROOT / ".ci/run").read_text(encoding="utf-8"), re.MULTILINE)
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -25,7 +25,7 @@ BY_TESTS = {"docs": "--builder html --nitpicky --fail-on-warning --keep-going"}
 def is_run(words: list[str]) -> bool:
     """Whether a test or .ci/run runs a command; AssertionError for a wrong argument."""
     program, *rest = words
-    if ours(words) is not None:
+    if mfba_arguments(words) is not None:
         return True  # by test_readme, test_docs_build and the tests in test_docs_build.OWN_TESTS
     if program == "ros2":
         return bool(kind_of(words))  # by test_docs_ros2

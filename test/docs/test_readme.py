@@ -6,14 +6,16 @@ import re
 from pathlib import Path
 
 import shown_commands
-from shown_commands import ROOT, ours
+from shown_commands import ROOT, mfba_arguments
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 DOCS = [README, *(path.read_text(encoding="utf-8") for path in sorted(ROOT.glob("docs/**/*.md")))]
 
 COMMANDS = shown_commands.commands(README)
 MFBA = [
-    found for command in COMMANDS if (found := ours(shown_commands.reduced(command))) is not None
+    found
+    for command in COMMANDS
+    if (found := mfba_arguments(shown_commands.reduced(command))) is not None
 ]
 
 

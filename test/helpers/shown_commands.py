@@ -89,7 +89,7 @@ def script(command: list[str], cwd: Path, *, code: int = 0) -> str:
     return done.stdout
 
 
-def ours(command: list[str]) -> list[str] | None:
+def mfba_arguments(command: list[str]) -> list[str] | None:
     """The arguments of an `mfba` command; None for other programs."""
     return command[1:] if command[0] in (".venv/bin/mfba", "mfba") else None
 
@@ -133,12 +133,12 @@ def run_page(text: str, cwd: Path) -> None:
         (cwd / name).symlink_to(ROOT / name)
     save(text, cwd)
     for command in commands(text):
-        arguments = ours(reduced(command))
+        arguments = mfba_arguments(reduced(command))
         if arguments is not None:
             mfba(arguments, cwd)
     for shown in blocks(text, "console"):
         line, _, expected = shown.removeprefix("$ ").partition("\n")
-        arguments = ours(shlex.split(line))
+        arguments = mfba_arguments(shlex.split(line))
         assert arguments is not None
         assert mfba(arguments, cwd, code=int(expected.startswith("mfba: "))) == expected
     for code in blocks(text, "python"):
