@@ -21,6 +21,7 @@ COMMANDS = {
     "export": "a bag's ticks and decisions as one tidy table, CSV or Parquet",
     "recover": "make an ordinary bag of one that was killed or truncated",
     "picture": "draw the run that a bag holds",
+    "animate": "a run as an animated WebP or GIF",
     "view": "runs in Rerun's viewer",
     "report": "runs as one page for a browser, to play and scrub",
     "figures": "the paper's figures again, as SVG and PNG",
