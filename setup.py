@@ -51,6 +51,7 @@ setup(
         "mcap>=1.5",
         "mcap-ros2-support>=0.5.5",
         "numpy>=1.26,<3",
+        "Pillow>=10",
         "pydantic>=2,<3",
         "PyYAML>=6",
         "rich>=13",

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All of docs/benchmark.md: every suite, planner, perception and ingredient, and what it costs.
+"""Benchmark for docs/benchmark.md: every suite, planner, perception and ingredient, and its cost.
 
     pip install -e .[orca]
     python bench/benchmark.py --worlds 10000     # the whole thing; some hours on two cores
-    python bench/benchmark.py --out DIR          # small; goes on where it was interrupted
+    python bench/benchmark.py --out DIR          # small; continues where it was interrupted
 
-Every sweep has a directory below --out, which `mfba show` reads. The optima of a suite have one
-of their own, since they do not depend on any planner.
+Every sweep has a directory below --out, which `mfba show` reads. The optima of a suite have
+another, since they do not depend on any planner.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pathlib import Path
 from benchmark_costs import measure_costs, measure_rates
 from benchmark_page import PER_MINUTE, render
 from benchmark_pictures import write_pictures
-from benchmark_runs import HEADLINE, Counts, Results, warn
+from benchmark_runs import HEADLINE, Counts, Results, print_line
 
 from mfba_planner.core.outputs import new_run_directory
 from mfba_planner.evaluation.study.compute_chunks import initialize_worker
@@ -30,7 +30,7 @@ from mfba_planner.evaluation.suites import suite_names
 
 ROOT = Path(__file__).parents[1]
 RATE_WORLDS = 2000  # runs by which episodes per minute are measured
-BEGIN, END = "<!-- generated: begin -->\n", "<!-- generated: end -->\n"
+BEGIN_MARK, END_MARK = "<!-- generated: begin -->\n", "<!-- generated: end -->\n"
 
 
 @contextmanager
@@ -91,13 +91,13 @@ def main(args: list[str] | None = None) -> None:
         worlds=found.worlds,
         others=found.others or found.worlds,
         few=few,
-        seen=found.seen or few,
+        perception_worlds=found.seen or few,
     )
     suites = [name for name in suite_names() if not found.suite or name in found.suite]
     out = found.out or new_run_directory(stem="benchmark")
     target = found.docs / "benchmark.md"
     _between(target.read_text(encoding="utf-8"), "")  # before the work is done
-    warn(f"results go to {out}")
+    print_line(f"results go to {out}")
     with _pool(found.workers) as executor:
         results = Results(out, found.workers, executor, found.first)
         results.make_all(suites, counts)
@@ -122,11 +122,13 @@ def _command(found: argparse.Namespace) -> str:
 
 
 def _between(text: str, generated: str) -> str:
-    before, _, rest = text.partition(BEGIN)
-    _, found, after = rest.partition(END)
+    before, _, rest = text.partition(BEGIN_MARK)
+    _, found, after = rest.partition(END_MARK)
     if not found:
-        raise SystemExit(f"benchmark.md: lacks the lines {BEGIN.strip()} and {END.strip()}")
-    return before + BEGIN + generated + END + after
+        raise SystemExit(
+            f"benchmark.md: lacks the lines {BEGIN_MARK.strip()} and {END_MARK.strip()}"
+        )
+    return before + BEGIN_MARK + generated + END_MARK + after
 
 
 if __name__ == "__main__":

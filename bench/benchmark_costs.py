@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What runs cost, and one decision: ours, pyrvo's ORCA, a dynamic window, among ever more.
+"""Cost of runs and of one decision: our planners, pyrvo's ORCA, a dynamic window; by obstacles.
 
-The dynamic window is this package's `dwa`, all velocities at once in numpy, and once more as
-tutorials have it (stepwise_dwa.py); PythonRobotics itself is no package that could be measured.
+The dynamic window is this package's `dwa`, all velocities at once in numpy, and again as in
+tutorials (stepwise_dwa.py); PythonRobotics itself is not a package that could be measured.
 """
 
 from __future__ import annotations
@@ -39,15 +39,14 @@ RATE_SUITE, RATE_ROUNDS = "random-10", 3
 class Costs:
     """Microseconds of one decision, median, per planner and number of circles in range.
 
-    All in turn, as a robot's computer has other things to do between two decisions; and alone_us
-    with ten in range where `predictive` decides again and again, as loops that time one function
-    have it.
+    median_us: planners in turn, since a robot's computer runs other code between two decisions.
+    repeated_us: `predictive` with ten circles in range, again and again, as timing loops do.
     """
 
     counts: Sequence[int]
     median_us: Mapping[str, Sequence[float]]
     rounds: int
-    alone_us: float
+    repeated_us: float
 
     def at(self, name: str, count: int) -> float:
         """One of them."""
@@ -96,17 +95,17 @@ def _measure(rounds: int, _: None) -> Costs:
                 taken[name].append(_taken(once, k))
         for name in NAMES:
             median_us[name].append(statistics.median(taken[name][ARRANGEMENTS:]) / 1e3)
-    again, alone = _deciding(NAMES[0], 10), []
+    again, repeated_ns = _deciding(NAMES[0], 10), []
     for k in range(max(FEWEST, 20 * rounds)):
-        alone.append(_taken(again, k))
-    return Costs(COUNTS, median_us, rounds, statistics.median(alone[ARRANGEMENTS:]) / 1e3)
+        repeated_ns.append(_taken(again, k))
+    return Costs(COUNTS, median_us, rounds, statistics.median(repeated_ns[ARRANGEMENTS:]) / 1e3)
 
 
 def _taken(once: Callable[[int], object], k: int) -> int:
     """Nanoseconds of CPU time that the k-th decision takes."""
-    begin = time.process_time_ns()
+    start_ns = time.process_time_ns()
     once(100_000_000 * (k + 1))
-    return time.process_time_ns() - begin
+    return time.process_time_ns() - start_ns
 
 
 def _deciding(name: str, count: int) -> Callable[[int], object]:

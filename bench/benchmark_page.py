@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The generated part of docs/benchmark.md: targets first, then every table."""
+"""The generated text of docs/benchmark.md: targets first, then every table."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def _suite(results: Results, suite: str, counts: Counts) -> str:
 
 
 def verdict(found: Interval, target: float, *, at_least: bool) -> str:
-    """Whether a target is met, and whether the whole interval says so."""
+    """Whether a target is met, and whether by the whole interval."""
     sign = 1.0 if at_least else -1.0
     if sign * (found.middle - target) < 0.0:
         return "**missed**"
@@ -170,8 +170,8 @@ def _targets(results: Results, suites: Sequence[str], counts: Counts) -> Lines:
             for entry in PERCEPTIONS[1:]:
                 one = results.standing(suite, entry, counts.perceived(suite))
                 what = f"mean gap, {suite}, {entry.label}"
-                told = _line(what, one.gap, most, at_least=False, of=one.runs)
-                yield told if entry in PERCEPTIONS[1:3] else [told[0], "(told)", told[2], ""]
+                cells = _line(what, one.gap, most, at_least=False, of=one.runs)
+                yield cells if entry in PERCEPTIONS[1:3] else [cells[0], "(told)", cells[2], ""]
     for case, most in CASE_GAP.items() if "paper" in suites else ():
         one = results.standing("paper", PREDICTIVE, counts.lead("paper"), case)
         free = "met" if not one.collisions else "**missed**"
@@ -183,9 +183,9 @@ def _line(
     what: str, found: Interval | None, target: float, *, at_least: bool, of: int
 ) -> Sequence[str]:
     sign = ">=" if at_least else "<="
-    told = "-" if found is None else f"{percent(found)} of {of}"
+    measured = "-" if found is None else f"{percent(found)} of {of}"
     judged = "**missed**" if found is None else verdict(found, target, at_least=at_least)
-    return [what, f"{sign} {100.0 * target:g} %", told, judged]
+    return [what, f"{sign} {100.0 * target:g} %", measured, judged]
 
 
 def _cost_targets(workers: int, costs: Costs, rates: Mapping[str, Sequence[float]]) -> Lines:
@@ -201,14 +201,14 @@ def _cost_targets(workers: int, costs: Costs, rates: Mapping[str, Sequence[float
     for what, found, most in (
         (
             "median us of a predictive decision, 10 in range, again and again",
-            costs.alone_us,
+            costs.repeated_us,
             DECISION_US,
         ),
         ("the same in turn with the other planners", costs.at("predictive", 10), DECISION_US),
         ("exponent of its growth, 10 to 1000 in range", costs.slope("predictive"), SLOPE),
     ):
-        told = f"{found:.3g}" if found < 100.0 else f"{found:.0f}"
-        yield [what, f"<= {most:g}", told, "met" if found <= most else "**missed**"]
+        measured = f"{found:.3g}" if found < 100.0 else f"{found:.0f}"
+        yield [what, f"<= {most:g}", measured, "met" if found <= most else "**missed**"]
 
 
 def _costs(costs: Costs) -> str:
@@ -226,7 +226,7 @@ def _costs(costs: Costs) -> str:
         "Medians of CPU time (one thread), all planners in turn among the same circles (evenly "
         "over the sensing region, which grows with their number beyond 10), "
         f"{costs.rounds} rounds at 10 and fewer where more are in range. With nothing in between, "
-        f"`predictive` takes {costs.alone_us:.0f} us with 10 in range. "
+        f"`predictive` takes {costs.repeated_us:.0f} us with 10 in range. "
         f"Growth as count^s from 10 on: s = {slopes}. `orca` is pyrvo asked "
         "`ROUNDS` times per decision; `dwa` is ours, all velocities at once in numpy, and step by "
         "step it simulates one velocity after the other, as PythonRobotics' tutorial goes about "

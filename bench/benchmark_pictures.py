@@ -33,7 +33,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     STEPWISE: {"color": style.PURPLE, "marker": "v"},
 }
 # where wins are looked for first: many obstacles make telling pictures
-CLEAR = ("adversarial",)  # with few obstacles, so that whole ways can be seen
+CLEAR = ("adversarial",)  # with few obstacles, so that whole paths are visible
 EXAMPLES = ("random-20", "random-30", "random-10", "adversarial", "dynabarn-like", "dense")
 _SUCCESS, _LONGER = "reached without collision (%)", "longer than the optimum (%)"
 _W, _H, _AXIS, _HEAD, _LEGEND = 3.4, 2.6, 0.6, 0.55, 1.2  # inches
@@ -137,7 +137,12 @@ def _line(ax: Axes, x: Sequence[float], y: Sequence[Interval | None], label: str
 
 
 def _bars(
-    ax: Axes, places: Sequence[float], found: Sequence[Interval], *, vertical: bool, **looks: Any
+    ax: Axes,
+    positions: Sequence[float],
+    found: Sequence[Interval],
+    *,
+    vertical: bool,
+    **looks: Any,
 ) -> None:
     middle = [100.0 * i.middle for i in found]
     error = [
@@ -145,9 +150,9 @@ def _bars(
     ]  # fmt: skip
     more: dict[str, Any] = {"markersize": 5.0, "linewidth": 1.4, "capsize": 2.0}
     if vertical:
-        ax.errorbar(places, middle, yerr=error, **looks, **more)
+        ax.errorbar(positions, middle, yerr=error, **looks, **more)
     else:
-        ax.errorbar(middle, places, xerr=error, linestyle="none", **looks, **more)
+        ax.errorbar(middle, positions, xerr=error, linestyle="none", **looks, **more)
 
 
 def _ablation(results: Results, suites: Sequence[str], counts: Counts) -> Figure:
@@ -166,8 +171,8 @@ def _ablation(results: Results, suites: Sequence[str], counts: Counts) -> Figure
         judged: list[list[Interval | None]] = [[s.success for s in found], [s.gap for s in found]]
         for ax, intervals in zip(axes, judged):
             some = [(n + 0.2 * (k - 1), i) for n, i in enumerate(intervals) if i is not None]
-            places, shown = [n for n, _ in some], [i for _, i in some]
-            _bars(ax, places, shown, vertical=False, **looks)
+            positions, shown = [n for n, _ in some], [i for _, i in some]
+            _bars(ax, positions, shown, vertical=False, **looks)
     for ax, what in zip(axes, (_SUCCESS, _LONGER)):
         ax.set_xlabel(what)
         ax.set_ylim(len(INGREDIENTS) - 0.5, -0.5)
@@ -213,12 +218,12 @@ def _example(
         return
     suite, world = found[0]
     run = Run(suite, world, loser.planner, 0)
-    completed = run_one(run, loser.setting)
-    headline = explain(completed)[0]
-    index = contact_index(completed.episode)
+    rerun = run_one(run, loser.setting)
+    headline = explain(rerun)[0]
+    index = contact_index(rerun.episode)
     assert index is not None, "it collided in the sweep"
     file = f"benchmark-{winner.label}-wins.png"
-    (images / file).write_bytes(tick_png(completed.episode, index, str(run), [headline]))
+    (images / file).write_bytes(tick_png(rerun.episode, index, str(run), [headline]))
     directory = results.directories[suite, loser.planner, loser.setting]
     words = f"Worlds where {winner.label} arrives and {loser.label} collides: {len(found)}"
     yield Example(f"{words}. The first: {headline}", f"mfba show {directory} {run}", file)
@@ -232,7 +237,7 @@ def _shorter(
     loser: Entry,
     images: Path,
 ) -> Iterator[Example]:
-    """Where nobody wins by arriving: the world in which the way is shorter by most."""
+    """Where the winner never wins by arriving: the world in which its path is shorter by most."""
     found: list[tuple[float, str, int]] = [
         (100.0 * (b["gap"] - a["gap"]), suite, a["world"])
         for suite in [name for name in CLEAR if name in suites][:1]
@@ -243,10 +248,12 @@ def _shorter(
         return
     points, suite, world = max(found)
     run = Run(suite, world, loser.planner, 0)
-    ways = [run_one(Run(suite, world, e.planner, 0), e.setting).episode for e in (winner, loser)]
+    episodes = [
+        run_one(Run(suite, world, e.planner, 0), e.setting).episode for e in (winner, loser)
+    ]
     file = f"benchmark-{winner.label}-wins.png"
     legend = f"dash-dotted: {loser.label}, {points:.0f} points longer"
-    figure = run_figure(ways[0], ways[1], f"{winner.label}; {legend}")
+    figure = run_figure(episodes[0], episodes[1], f"{winner.label}; {legend}")
     figure.set_dpi(80)
     _write(images / file, figure)
     directory = results.directories[suite, loser.planner, loser.setting]

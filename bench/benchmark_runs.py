@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the benchmark runs: lines of tables, in how many worlds, and sweeps that they share."""
+"""The runs of the benchmark: rows of tables, numbers of worlds, and the sweeps they share."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from mfba_planner.planning.predictive import preset
 
 ORACLE = ("core", "evaluation", "scenarios", "simulation")  # their code decides the optima
 HEADLINE = ("random-10", "random-20", "random-30", "adversarial")  # suites with --worlds
-CROWDS = ("random-10", "random-20", "random-30")  # seen in several ways
+CROWDS = ("random-10", "random-20", "random-30")  # with several perceptions
 STRIPPED = ("random-20", "random-30", "adversarial")  # in which ingredients are left out
 PAPER_WORLDS = 2000  # 1000 seeds of each case are all that is asked for
 
@@ -42,7 +42,7 @@ class Entry:
     setting: Setting = FINE
 
 
-def _seen(perception: str, noise_m: float = 0.0, latency_ticks: int = 0) -> Setting:
+def _perceiving(perception: str, noise_m: float = 0.0, latency_ticks: int = 0) -> Setting:
     return Setting(
         params=FINE.params, perception=perception, noise_m=noise_m, latency_ticks=latency_ticks
     )
@@ -56,12 +56,12 @@ LEAD = (Entry("paper", "paper", PAPER), Entry("predictive", "predictive"), Entry
 PEERS = tuple(Entry(name, name) for name in ("dwa", "vfh", "apf", "straight"))
 PERCEPTIONS = (
     Entry("known", "predictive"),
-    Entry("scan-12", "predictive", _seen("scan-12")),
-    Entry("scan-360", "predictive", _seen("scan-360")),
-    Entry("scan-360, 2 cm noise", "predictive", _seen("scan-360", 0.02)),
-    Entry("scan-360, 1 tick late", "predictive", _seen("scan-360", 0.0, 1)),
-    Entry("scan-360, both", "predictive", _seen("scan-360", 0.02, 1)),
-    Entry("the paper's sectors", "predictive", _seen("sectors")),
+    Entry("scan-12", "predictive", _perceiving("scan-12")),
+    Entry("scan-360", "predictive", _perceiving("scan-360")),
+    Entry("scan-360, 2 cm noise", "predictive", _perceiving("scan-360", 0.02)),
+    Entry("scan-360, 1 tick late", "predictive", _perceiving("scan-360", 0.0, 1)),
+    Entry("scan-360, both", "predictive", _perceiving("scan-360", 0.02, 1)),
+    Entry("the paper's sectors", "predictive", _perceiving("sectors")),
 )
 INGREDIENTS = (
     Entry("paper's bits, step 0.3 m", "paper", PAPER),
@@ -84,7 +84,7 @@ class Counts:
     worlds: int
     others: int
     few: int
-    seen: int
+    perception_worlds: int
 
     def lead(self, suite: str) -> int:
         """Worlds of the planners that lead."""
@@ -98,7 +98,7 @@ class Counts:
 
     def perceived(self, suite: str) -> int:
         """Worlds of what predictive sees by something else than known circles."""
-        return min(self.seen, self.lead(suite))
+        return min(self.perception_worlds, self.lead(suite))
 
 
 class Results:
@@ -117,15 +117,15 @@ class Results:
         spec = SweepSpec(
             suite=suite, planners=("straight",), worlds=worlds, first=self.first, setting=FINE
         )
-        chunks = [part for part in chunks_of(spec) if isinstance(part, OracleChunk)]
+        chunks = [chunk for chunk in chunks_of(spec) if isinstance(chunk, OracleChunk)]
         facts = {"suite": suite, "first": self.first, "worlds": worlds}
         store = Store(
             self.out / f"{suite}-optima", chunks, facts, command="benchmark", packages=ORACLE
         )
         found = compute(
-            chunks, workers=self.workers, executor=self.executor, store=store, warn=warn
+            chunks, workers=self.workers, executor=self.executor, store=store, warn=print_line
         )
-        columns = [found[part.name] for part in chunks]
+        columns = [found[chunk.name] for chunk in chunks]
         rows = [dict(zip(some, values)) for some in columns for values in zip(*some.values())]
         self._optima[suite] = {row["world"]: row for row in rows}
 
@@ -139,8 +139,10 @@ class Results:
         plain = "".join(c if c.isalnum() or c in ".-" else "-" for c in entry.label)
         self.directories[key] = self.out / f"{suite}-{plain}"
         store = open_store(self.directories[key], spec)
-        swept = sweep(spec, workers=self.workers, executor=self.executor, store=store, warn=warn)
-        warn(f"{suite}: {entry.label}, {worlds} worlds")
+        swept = sweep(
+            spec, workers=self.workers, executor=self.executor, store=store, warn=print_line
+        )
+        print_line(f"{suite}: {entry.label}, {worlds} worlds")
         optima, number = self._optima[suite], suite_of(suite).world_number
         rows = [
             with_optimum(row, optima[number(row["world"])], entry.setting.params.speed_mps)
@@ -210,6 +212,6 @@ def of_suite(entries: tuple[Entry, ...], suite: str) -> tuple[Entry, ...]:
     return entries if suite in where else ()
 
 
-def warn(line: str) -> None:
-    """A word to whoever watches."""
+def print_line(line: str) -> None:
+    """Print progress on stderr."""
     print(line, file=sys.stderr, flush=True)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one decision costs, beside the floor it stands on, and case study 1 by the core driver.
+"""Time of one decision, beside its lower bound, and of case study 1 by the core driver.
 
-Run: python bench/decision.py. The floor is what no swarm of this size can do without: one
+Run: python bench/decision.py. The lower bound is what every swarm of this size needs: one
 random stream, and the objective at every candidate. All are measured in turn (A B C A B C
 ...), so that a machine whose speed drifts slows all of them; trust the ratios.
 """
@@ -49,7 +49,7 @@ def floor(params: BatParams) -> Callable[[int], object]:
 
 
 def decisions(ranges_m: tuple[float, ...], mode: Mode) -> Callable[[int], object]:
-    """Decisions of one planner on ever new stamps, somewhere on the way."""
+    """Decisions of one planner on ever new stamps, between start and goal."""
     planner = Algorithm1(PlannerParams(), seed=1)
 
     def once(stamp: int) -> object:
@@ -68,9 +68,9 @@ def measure(subjects: dict[str, Callable[[int], object]], rounds: int) -> dict[s
     times: dict[str, list[float]] = {name: [] for name in subjects}
     for k in range(rounds + rounds // 10):
         for name, once in subjects.items():
-            begin = time.perf_counter_ns()
+            start = time.perf_counter_ns()
             once(382_165_605 * (k + 1))
-            times[name].append((time.perf_counter_ns() - begin) / 1e3)
+            times[name].append((time.perf_counter_ns() - start) / 1e3)
     return {name: taken[-rounds:] for name, taken in times.items()}
 
 
@@ -101,9 +101,9 @@ def main() -> None:
     case1 = load_scenario("case1")
     spent, ticks = [], 0
     for seed in range(options.runs):
-        begin = time.perf_counter()
+        start = time.perf_counter()
         ticks += len(run(case1, seed=seed).ticks)
-        spent.append((time.perf_counter() - begin) * 1e3)
+        spent.append((time.perf_counter() - start) * 1e3)
     print(
         f"case study 1, core driver: median {statistics.median(spent):.1f} ms, longest "
         f"{max(spent):.1f} ms of {options.runs} runs, {ticks / options.runs:.0f} ticks each "

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Break each line that is an equation of the paper, once, and name the test that notices.
+"""Mutation test of the paper's equations: change each line, name the test that fails.
 
     .venv/bin/python bench/equations.py          # one change per line
     .venv/bin/python bench/equations.py --all    # every change that bench/mutation.py knows
 
-The lines are those marked `# eq. N` in the core: eq. 3-10 in the swarm (the plane unrolled, and
-any dimension) and once more in the batched engine. Exit code 1 where a change goes unnoticed.
+The lines are those marked `# eq. N` in mfba_planner/swarm: eq. 3-10 for one swarm (two dimensions
+unrolled, and any dimension) and again for batched swarms. Exit code 1 if a change goes unnoticed.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from mutation import ROOT, mutants, start
+from mutation import module_path, mutants, start
 
-MODULES = ("bat", "flight", "batch")
+MODULES = ("swarm/bat_swarm", "swarm/swarm_iteration", "swarm/batched_swarms")
 _DELETED = "the line, deleted"
 MARK = re.compile(r"# eq\. (\d+)$")
 
 
-class _Witness:
-    """Writes the name of each failed test into a pipe."""
+class _FailureReporter:
+    """A pytest plugin that writes the name of each failed test into a pipe."""
 
     def __init__(self, pipe: int) -> None:
         self.pipe = pipe
@@ -42,10 +42,10 @@ class _Witness:
             os.write(self.pipe, b"(the tests do not load)\n")
 
 
-def witness(module: str, tree: ast.Module) -> str:
+def first_failure(module: str, tree: ast.Module) -> str:
     """Name of the test that fails first, "" for none."""
     reading, writing = os.pipe()
-    pid = start(module, tree, _Witness(writing))
+    pid = start(module, tree, _FailureReporter(writing))
     os.close(writing)
     with os.fdopen(reading) as lines:
         names = lines.read().split("\n")
@@ -55,7 +55,7 @@ def witness(module: str, tree: ast.Module) -> str:
 
 def changes(module: str, every: bool) -> Iterator[tuple[int, int, str, ast.Module]]:
     """Yield (equation, line, what was changed, changed tree)."""
-    text = (ROOT / "mfba_planner" / "core" / f"{module}.py").read_text()
+    text = module_path(module).read_text()
     marks = {
         number: int(found[1])
         for number, line in enumerate(text.splitlines(), start=1)
@@ -83,12 +83,12 @@ def main(argv: Sequence[str]) -> int:
     rows = []
     for module in MODULES:
         for equation, line, change, tree in changes(module, options.all):
-            rows.append((equation, f"{module}.py:{line}", change, witness(module, tree)))
+            rows.append((equation, f"{module}.py:{line}", change, first_failure(module, tree)))
             print(".", end="", file=sys.stderr, flush=True)
     print("", file=sys.stderr)
     print("| eq. | line | change | first test that fails |\n|---|---|---|---|")
-    for equation, place, change, name in sorted(rows, key=lambda row: row[0]):
-        print(f"| {equation} | {place} | `{change}` | {name or '**none**'} |")
+    for equation, location, change, test in sorted(rows, key=lambda row: row[0]):
+        print(f"| {equation} | {location} | `{change}` | {test or '**none**'} |")
     missed = [row for row in rows if not row[3]]
     print(f"\n{len(rows)} changes, {len(missed)} unnoticed")
     return 1 if missed else 0

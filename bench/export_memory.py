@@ -85,11 +85,11 @@ def main() -> None:
                       ["export", str(bag), f"{root}/run.parquet"],
                       ["info", str(bag)]):  # fmt: skip
             started = time.monotonic()
-            with tempfile.TemporaryFile("w+") as said:
-                child = subprocess.Popen([sys.executable, "-c", MFBA, *words], stdout=said)
+            with tempfile.TemporaryFile("w+") as output:
+                child = subprocess.Popen([sys.executable, "-c", MFBA, *words], stdout=output)
                 _, status, used = os.wait4(child.pid, 0)
-                said.seek(0)
-                text = said.read()
+                output.seek(0)
+                text = output.read()
             took = time.monotonic() - started
             assert f"{ticks} rows" in text or "\ndigest " in text, text
             name = f"{words[0]} {Path(words[-1]).suffix}"

@@ -2,7 +2,7 @@
 """Where the preset `best` comes from: a search over the swarm's options, F1-F6 held out.
 
     .venv/bin/python bench/find_best.py                # all of it, some ten minutes
-    .venv/bin/python bench/find_best.py --random 30    # a taste of it
+    .venv/bin/python bench/find_best.py --random 30    # a small search
 
 Settings of every option, first random ones, then children of the better ones, are tried on
 twelve functions that are not in Table 2, their minima moved away from the middle; the better
@@ -34,7 +34,7 @@ Setting = dict[str, Any]
 Scored = tuple[float, Setting]
 POPULATION, ITERATIONS, FLOOR = 40, 200, 1e-12
 BUDGET: dict[str, Any] = {"population": POPULATION, "iterations": ITERATIONS}
-ROWS = CACHED_BATS // POPULATION  # runs that fly at once
+ROWS = CACHED_BATS // POPULATION  # runs that are iterated together
 GENERATIONS = 4  # of children, after the random settings
 FINAL = (12, 6)  # settings, and rounds of 17 runs per function
 
@@ -194,7 +194,7 @@ def child(rng: Generator, parents: list[Setting]) -> Setting:
 
 
 def errors(params: BatParams, rounds: int, seed: int) -> list[float]:
-    """Mean error on every held-out function; all of them fly at once, 17 runs each a round."""
+    """Mean error on every held-out function; all settings together, 17 runs each per round."""
     count = ROWS // len(FUNCTIONS)
 
     def objective(points: Array) -> Array:
@@ -217,12 +217,12 @@ def score(means: list[float]) -> float:
 
 def judged(settings: list[Setting], rounds: int, seed: int, title: str) -> list[Scored]:
     """Score the settings, best first, and print them."""
-    begin = time.perf_counter()
+    start = time.perf_counter()
     scored = [
         (score(errors(BatParams(**BUDGET, **chosen), rounds, seed)), chosen) for chosen in settings
     ]
     scored.sort(key=lambda pair: pair[0])
-    spent = time.perf_counter() - begin
+    spent = time.perf_counter() - start
     print(f"\n{title}: {len(scored)} settings, {rounds} rounds each ({spent:.0f} s)")
     for value, chosen in scored:
         print(f"{value:8.3f}  " + " ".join(f"{k}={v}" for k, v in chosen.items()), flush=True)
@@ -246,7 +246,7 @@ def compare(rivals: dict[str, BatParams], runs: int, seed: int) -> None:
 def main() -> None:
     """Print every setting tried, the finals, and the winner beside the other presets."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--random", type=int, default=160, help="settings to begin with")
+    parser.add_argument("--random", type=int, default=160, help="random settings to start with")
     parser.add_argument("--seed", type=int, default=2024)
     options = parser.parse_args()
     rng = Generator(PCG64(options.seed))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots that swap places across a circle: how many seeds go without a contact, by planner.
 
-Run: python bench/fleet.py. A seed turns every robot's place on the circle by up to JITTER_DEG,
+Run: python bench/fleet.py. A seed turns every robot's start on the circle by up to JITTER_DEG,
 its goal opposite, and names all random streams. A seed succeeds when every robot is at its goal
 and none has touched another; contacts are judged continuously in time.
 """
@@ -36,7 +36,7 @@ from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.scenario import FleetRobot, Scenario
 
 JITTER_DEG = 8.0  # of 36 between two robots
-JITTER_STREAM = 7  # spawn key of the places' SeedSequence children
+JITTER_STREAM = 7  # spawn key of the starts' SeedSequence children
 
 
 def circle(robots: int, radius_m: float, seed: int, robot: Robot) -> Scenario:
@@ -58,8 +58,8 @@ def circle(robots: int, radius_m: float, seed: int, robot: Robot) -> Scenario:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Way:
-    """A planner and what it gets to see."""
+class Configuration:
+    """A planner, its robot and its sensing."""
 
     planner: PlannerParams
     sensor: SensorParams = SensorParams()
@@ -84,7 +84,7 @@ def _orca(params: PlannerParams, sensor: SensorParams) -> MakePlanner:
     return lambda seed: Orca(params, sensor, seed)
 
 
-# Others do not keep their velocities here: pass them at 0.2 m rather than at 0.015 m.
+# Robots of a fleet do not keep their velocities: pass them at 0.2 m rather than at 0.015 m.
 WIDE = PredictiveParams(risk=RiskParams(margin_m=0.2, close_m=3.0))
 FAR = SensorParams(sensing_range_m=3.0)
 LIDAR = Robot(lidar=Lidar(beams=360))
@@ -94,45 +94,51 @@ def _known() -> Observe:
     return Perception("known", sectors=False)
 
 
-WAYS: dict[str, Way] = {
-    "paper, sectors": Way(planner=PlannerParams(), make=_paper),
-    "paper, sectors, step 0.08 m": Way(
+CONFIGURATIONS: dict[str, Configuration] = {
+    "paper, sectors": Configuration(planner=PlannerParams(), make=_paper),
+    "paper, sectors, step 0.08 m": Configuration(
         planner=replace(PlannerParams(), step_length_m=0.08), make=_paper
     ),
-    "predictive, sectors": Way(planner=preset(), make=_predictive),
-    "predictive, known within 0.8 m": Way(planner=preset(), make=_predictive, observe=_known),
-    "predictive, known within 3 m": Way(
+    "predictive, sectors": Configuration(planner=preset(), make=_predictive),
+    "predictive, known within 0.8 m": Configuration(
+        planner=preset(), make=_predictive, observe=_known
+    ),
+    "predictive, known within 3 m": Configuration(
         planner=preset(), sensor=FAR, make=_predictive, observe=_known
     ),
-    "predictive, known, wide berth": Way(planner=preset(), make=_wide, observe=_known),
-    "predictive, lidar, tracked": Way(
+    "predictive, known, wide berth": Configuration(planner=preset(), make=_wide, observe=_known),
+    "predictive, lidar, tracked": Configuration(
         planner=replace(preset(), scan_radius_m=0.35),
         robot=LIDAR,
         make=_predictive,
         observe=lambda: observe_scan,
     ),
-    "orca, known within 3 m": Way(planner=preset(), sensor=FAR, make=_orca, observe=_known),
+    "orca, known within 3 m": Configuration(
+        planner=preset(), sensor=FAR, make=_orca, observe=_known
+    ),
 }
 
 
-def measure(name: str, way: Way, robots: int, radius_m: float, seeds: range) -> None:
+def measure(
+    name: str, configuration: Configuration, robots: int, radius_m: float, seeds: range
+) -> None:
     """One line of the table."""
     good = arrived = contacts = 0
     clearance_m, lasts_s, began = math.inf, 0.0, time.perf_counter()
     for seed in seeds:
         done = run_fleet(
-            circle(robots, radius_m, seed, way.robot),
-            planner=way.planner,
-            sensor=way.sensor,
+            circle(robots, radius_m, seed, configuration.robot),
+            planner=configuration.planner,
+            sensor=configuration.sensor,
             seed=seed,
-            path_planner=way.make(way.planner, way.sensor),
-            observe=_each(way.observe),
+            path_planner=configuration.make(configuration.planner, configuration.sensor),
+            observe=_per_robot(configuration.observe),
         )
         results = [evaluate(episode) for episode in done]
-        there = sum(result.outcome is Outcome.GOAL_REACHED for result in results)
+        at_goal = sum(result.outcome is Outcome.GOAL_REACHED for result in results)
         hits = sum(result.collisions for result in results)
-        good += there == robots and not hits
-        arrived += there
+        good += at_goal == robots and not hits
+        arrived += at_goal
         contacts += hits
         clearance_m = min(clearance_m, *(result.min_clearance_m for result in results))
         lasts_s += max(result.time_s for result in results)
@@ -145,10 +151,10 @@ def measure(name: str, way: Way, robots: int, radius_m: float, seeds: range) -> 
     )
 
 
-def _each(make: Callable[[], Observe]) -> Observe:
-    """A look of its own for every robot: some remember."""
-    looks: dict[int, Observe] = {}
-    return lambda world, sensor: looks.setdefault(id(world), make())(world, sensor)
+def _per_robot(make: Callable[[], Observe]) -> Observe:
+    """A separate observer for every robot: some have memory."""
+    observers: dict[int, Observe] = {}
+    return lambda world, sensor: observers.setdefault(id(world), make())(world, sensor)
 
 
 def main() -> None:
@@ -158,20 +164,20 @@ def main() -> None:
     parser.add_argument("--radius", type=float, default=6.0, help="of the circle, m")
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--first", type=int, default=0, help="the first seed")
-    parser.add_argument("--only", default="", help="the ways whose name holds this")
+    parser.add_argument("--only", default="", help="the configurations whose name holds this")
     options = parser.parse_args()
     print(
         f"{options.robots} robots, circle of {options.radius:g} m, {options.seeds} seeds; "
         "95 % intervals by Wilson"
     )
     print(
-        f"{'planner':<34}  seeds without contact            there  touch  least gap"
+        f"{'planner':<34}  seeds without contact            goal   touch  least gap"
         "     lasts  computed in"
     )
     seeds = range(options.first, options.first + options.seeds)
-    for name, way in WAYS.items():
+    for name, configuration in CONFIGURATIONS.items():
         if options.only in name:
-            measure(name, way, options.robots, options.radius, seeds)
+            measure(name, configuration, options.robots, options.radius, seeds)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 
 A flip is a bit of a recorded sensory vector (in /sensory_vector, in Vs of the decision, or by a
 range of /sectors), the last mantissa bit of a waypoint coordinate, or a mode. The bag that is
-written with it is whole and sound but for what it says.
+written with it is sound in all other respects.
 """
 
 from __future__ import annotations
@@ -42,11 +42,13 @@ def main() -> int:
         assert verify(bag).is_identical
         for index in range(options.flips):
             what, topic, change = flip(rng)
-            place = int(rng.integers(ticks))
-            edited = rewrite(bag, Path(root) / f"edited{index}", one_changed(topic, place, change))
+            index_of_message = int(rng.integers(ticks))
+            edited = rewrite(
+                bag, Path(root) / f"edited{index}", one_changed(topic, index_of_message, change)
+            )
             made[what] += 1
             if verify(edited).is_identical:
-                print(f"NOT noticed: {what}, message {place}")
+                print(f"NOT noticed: {what}, message {index_of_message}")
             else:
                 noticed[what] += 1
     for what, count in sorted(made.items()):
@@ -69,7 +71,7 @@ def flip(rng: np.random.Generator) -> tuple[str, str, Callable[[Any], None]]:
         return text[:sector] + "10"[int(text[sector])] + text[sector + 1 :]
 
     def last_bit(text: str) -> str:
-        chunks = [float(part) for part in text.split(",")]
+        chunks = [float(number) for number in text.split(",")]
         raw = np.float64(chunks[axis]).view(np.uint64) ^ np.uint64(1)
         chunks[axis] = float(raw.view(np.float64))
         return ",".join(map(repr, chunks))

@@ -104,7 +104,7 @@ def bare_processes(steps: int) -> float:
     for hop in hops:
         assert hop.stdout
         assert hop.stdout.readline() == "up\n"
-    time.sleep(1.0)  # all pairs of endpoints matched, also where no count tells
+    time.sleep(1.0)  # all pairs of endpoints matched, also where no count can be read
     world.stdin.write("go\n")
     world.stdin.flush()
     rate = float(world.stdout.readline())
@@ -136,7 +136,7 @@ def graph(driver: str, seed: int, root: Path) -> float:
 
 
 def scenario(root: Path) -> Path:
-    """Case study 2's five obstacles on a long way, so that starting and stopping weigh little."""
+    """Case study 2's five obstacles on a long trip, so that starting and stopping weigh little."""
     side = 0.3 * TICKS / 2**0.5
     rows = [
         {

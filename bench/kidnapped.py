@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""100 seeded kidnappings, at a random tick to a random free place: whether the robot arrives.
+"""100 seeded kidnappings, at a random tick to a random free position: whether the robot arrives.
 
 Run: python bench/kidnapped.py [--count N] [--graph N]. Kidnapping k is drawn from seed k: case 1
-or 2 in turn, a moment of its undisturbed run, a place of the 12 x 12 m that is 0.1 m clear of
-everybody. Rows: who decides, on which robot. --graph lets the real graph do the first N of them
+or 2 in turn, a moment of its undisturbed run, a position in the 12 x 12 m that is 0.1 m clear of
+all obstacles. Rows: planner and robot. --graph lets the real graph do the first N of them
 as well (in one process, over DDS) and holds its decisions against the core's.
 """
 
@@ -44,15 +44,15 @@ ROWS: dict[str, tuple[Robot, PlannerParams]] = {
 }
 
 
-def play(scenario: Scenario, params: PlannerParams, seed: int) -> Episode:
-    """The core driver."""
+def run_core(scenario: Scenario, params: PlannerParams, seed: int) -> Episode:
+    """Simulate a run with the core driver."""
     return simulate(scenario, planner=params, sensor=SensorParams(), seed=seed)
 
 
 def kidnapped(k: int, robot: Robot, params: PlannerParams) -> Scenario:
     """The scenario of kidnapping k: drawn from its undisturbed run."""
     case = replace(load_scenario(("case1", "case2")[k % 2]), robot=robot)
-    ticks = len(play(case, params, k).ticks)
+    ticks = len(run_core(case, params, k).ticks)
     rng = np.random.default_rng((20, k))
     at_s = int(rng.integers(1, ticks - 1)) * params.tick_ns * NANO
     circles = case.enlarged(at_s)
@@ -84,7 +84,7 @@ def main() -> None:
         arrived = clean = noticed = equal = 0
         for k in range(found.count):
             scenario = kidnapped(k, robot, params)
-            episode = play(scenario, params, k)
+            episode = run_core(scenario, params, k)
             arrived += episode.outcome is Outcome.GOAL_REACHED
             clean += evaluate(episode).success
             noticed += any(is_odometry_jump(tick.reason) for tick in episode.ticks)

@@ -2,8 +2,8 @@
 """Lockstep under stress: every recorded run must have the digest of the core driver's.
 
 Runs of both case studies and of random worlds, with random readings, methods, sensors and
-seeds. Most go through the in-process driver; the others as a process per node, started in a
-random order with random delays. Some run while every core is kept busy by other processes.
+seeds. Most go through the in-process driver; the others as a process per node, started in
+random sequence with random delays. Some run while every core is kept busy by other processes.
 The digest is taken from the bag, and `mfba verify` must agree.
 """
 
@@ -25,7 +25,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from by_hand import ALL, ByHand
+from manual_run import ALL, ManualRun
 
 from mfba_planner.core.options import override
 from mfba_planner.launcher.in_process import run_in_process
@@ -86,9 +86,9 @@ def by_driver(config: RunConfig, bag: Path, rng: np.random.Generator) -> None:
         with private_domain() as domain:
             run_in_process(config, bag, domain_id=domain)
         return
-    order = [ALL[k] for k in rng.permutation(len(ALL))]
-    with ByHand(config, bag) as graph:
-        graph.start(order, rng.uniform(0.0, 0.5, len(order)).tolist())
+    sequence = [ALL[k] for k in rng.permutation(len(ALL))]
+    with ManualRun(config, bag) as graph:
+        graph.start(sequence, rng.uniform(0.0, 0.5, len(sequence)).tolist())
         graph.end()
 
 

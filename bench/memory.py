@@ -2,7 +2,7 @@
 """Resident memory of every node over a long multi-process lockstep run, the recorder included.
 
 Run: python bench/memory.py. The robot creeps through the walled room in steps so short that
-the trip takes --ticks; it avoids, waits and turns on its way as ever. Memory is read from
+the trip takes --ticks; it avoids, waits and turns as usual. Memory is read from
 /proc/PID/status after the first 2000 ticks and then twenty times. Exit code 1 where a node holds
 more than 110 MB or has grown by more than 5 MB.
 """
@@ -43,7 +43,7 @@ def resident_mb(pid: int) -> float:
 
 
 def long_run(ticks: int) -> RunConfig:
-    """The walled room at steps of such a length that the straight way takes that many ticks."""
+    """The walled room at steps so short that the straight line takes that many ticks."""
     scenario = load_scenario("walled")
     step_m = distance(scenario.start_m, scenario.goal_m) / ticks
     planner = PlannerParams(step_length_m=max(step_m, 0.001), speed_mps=0.8)
@@ -58,31 +58,35 @@ def measure(ticks: int) -> dict[str, list[float]]:
         tempfile.TemporaryDirectory() as root,
         private_domain() as domain,
         GraphMonitor(domain) as monitor,
-        NodeProcesses(lambda name, line: None, lambda: False) as crew,
+        NodeProcesses(lambda name, line: None, lambda: False) as processes,
     ):
-        told = node_parameters(config, peers)
-        told["world_sim"] |= {
+        parameters = node_parameters(config, peers)
+        parameters["world_sim"] |= {
             "run_on": True,
             "view_period_s": ticks * config.planner.tick_ns * NANO / 1000,
         }
-        told["planner"] |= {"view_period_s": told["world_sim"]["view_period_s"]}
-        told[RECORDER] = {"output": f"{root}/bag", "nodes": ",".join(NODES), "sim_time": True}
-        crew.start({RECORDER: told.pop(RECORDER), **told}, {})
+        parameters["planner"] |= {"view_period_s": parameters["world_sim"]["view_period_s"]}
+        parameters[RECORDER] = {
+            "output": f"{root}/bag",
+            "nodes": ",".join(NODES),
+            "sim_time": True,
+        }
+        processes.start({RECORDER: parameters.pop(RECORDER), **parameters}, {})
         for question in monitor.call_ready(peers).values():
-            agreed(crew, monitor, question)
+            agreed(processes, monitor, question)
         monitor.subscribe()
-        agreed(crew, monitor, monitor.call_pause(False))
-        history: dict[str, list[float]] = {c.name: [] for c in crew.children}
+        agreed(processes, monitor, monitor.call_pause(False))
+        history: dict[str, list[float]] = {c.name: [] for c in processes.children}
         due, begun = float(WARM_UP), time.monotonic()
         while due <= ticks:
             time.sleep(0.05)
-            crew.check()
+            processes.check()
             monitor.poll()
             now = monitor.progress()
             tick = now.stamp_ns // config.planner.tick_ns if now else 0
             if tick >= due:
                 due += (ticks - WARM_UP) / READINGS
-                for child in crew.children:
+                for child in processes.children:
                     history[child.name].append(resident_mb(child.process.pid))
                 now_mb = ", ".join(f"{node} {mb[-1]:.1f}" for node, mb in history.items())
                 print(f"tick {tick}: {now_mb} MB", flush=True)
@@ -92,10 +96,10 @@ def measure(ticks: int) -> dict[str, list[float]]:
     return history
 
 
-def agreed(crew: NodeProcesses, monitor: GraphMonitor, question: ServiceCall) -> None:
-    """Ask until the answer is yes."""
+def agreed(processes: NodeProcesses, monitor: GraphMonitor, question: ServiceCall) -> None:
+    """Spin until the service call has succeeded."""
     while (response := question.response()) is None or not response.success:
-        crew.check()
+        processes.check()
         monitor.spin(0.02)
 
 

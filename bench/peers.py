@@ -3,7 +3,7 @@
 
     pip install -e .[peers]
     python bench/peers.py                 # some ten minutes, nearly all of them the peers'
-    python bench/peers.py --peer-runs 10  # a taste of it
+    python bench/peers.py --peer-runs 10  # fewer runs
 
 Budget: the same number of evaluations for all, population 40 and 200 iterations in d = 2 (only
 the best of a peer's first 8040 evaluations counts). Run k of everyone has seed k. Speed: a plain
@@ -215,9 +215,9 @@ def speed(rounds: int) -> None:
     taken: dict[str, list[float]] = {name: [] for name in subjects}
     for seed in range(rounds + 1):
         for name, (run_once, evaluations) in subjects.items():
-            begin = time.process_time()
+            start = time.process_time()
             run_once(seed)
-            taken[name].append((time.process_time() - begin) / evaluations * 1e6)
+            taken[name].append((time.process_time() - start) / evaluations * 1e6)
     medians = {name: statistics.median(times[1:]) for name, times in taken.items()}
     print(f"\nspeed: us per evaluation, median of {rounds} rounds (the first one warms up)")
     print(f"{'':34}{'us':>9}{'niapy /':>10}{'OriginalBA /':>14}{'DevBA /':>10}")

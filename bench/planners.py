@@ -3,7 +3,7 @@
 
 Run: python bench/planners.py. Circles are placed at random, evenly over the sensing region
 (which grows with their number beyond ten, so that the crowd is equally dense), none in contact
-with the robot; every arrangement has a planner of its own, which knows it from before. The
+with the robot; every arrangement has a planner of its own, which has observed it before. The
 paper's path generation is measured in turn with them: on a busy machine trust the ratio.
 """
 

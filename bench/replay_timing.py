@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How well `replay --rate 1` keeps the recorded times between messages, seen by a subscriber.
+"""How well `replay --rate 1` keeps the recorded times between messages, measured by a subscriber.
 
 Run: python bench/replay_timing.py [BAG ...]; without bags it takes the one that rosbag2 recorded
 from a robot with a lidar, and a run of case study 1. The subscriber is another process than
@@ -35,11 +35,11 @@ ROOT = Path(__file__).parents[1]
 FOREIGN = ROOT / "test/data/rosbag2_foreign_scan"
 REPLAY = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.replay())"
 
-Times = dict[str, list[int]]  # ns, by topic, in order
+Times = dict[str, list[int]]  # ns, by topic, ascending
 
 
 def log_times(bag: Path, left_out: str = "tf2_msgs") -> tuple[dict[str, str], Times]:
-    """The types and log times of what will be played."""
+    """The types and log times of the messages to replay."""
     types: dict[str, str] = {}
     times: Times = {}
     with BagReader(bag) as reader:
@@ -97,7 +97,7 @@ def report(what: str, errors: list[float]) -> None:
 
 
 def measure(bag: Path, rate: float) -> None:
-    """Play one bag and print its errors."""
+    """Replay one bag and print its timing errors."""
     types, logged = log_times(bag)
     expected = sum(map(len, logged.values()))
     arrived = arrival_times(bag, types, expected, rate)
@@ -115,10 +115,10 @@ def main() -> None:
     parser.add_argument("bags", nargs="*", type=Path, metavar="BAG")
     parser.add_argument("--rate", type=float, default=1.0)
     given = parser.parse_args()
-    with private_domain() as domain_id, tempfile.TemporaryDirectory() as scratch:
+    with private_domain() as domain_id, tempfile.TemporaryDirectory() as directory:
         bags = given.bags
         if not bags:
-            own = Path(scratch) / "case1"
+            own = Path(directory) / "case1"
             config = RunConfig(scenario=load_scenario("case1"), seed=1)
             run_in_process(config, own, domain_id=domain_id)
             bags = [FOREIGN, own]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fresh planner fed from a replayed bag at any rate: does it reach the recorded digest.
+"""A new planner fed from a replayed bag at any rate: whether it reaches the recorded digest.
 
-Replay and planner are processes of their own, in lockstep; every sectors message must be answered
-once. Bags of both case studies, algorithms and readings, as fast as possible.
+Replay and planner are two processes, in lockstep; every sectors message must give one decision.
+Bags of both case studies, algorithms and readings, as fast as possible.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ FAST = ["--as-fast-as-possible", "--wait-timeout", "30", "--inputs-of", "planner
 
 
 def decide_again(config: RunConfig, bag: Path, root: Path, domain: int) -> tuple[int, str]:
-    """How many answers a fresh planner gave to the replayed bag, and their digest.
+    """Number of decisions of a new planner on the replayed bag, and their digest.
 
     The sectors are taken from the bag: this listener may miss the first that are replayed.
     """
     ranges = {tick.stamp_ns: tick.ranges_m for tick in read_episode(bag).ticks}
-    told = flatten(config.planner) | {"seed": config.seed, "lockstep": True}
-    (root / "planner.yaml").write_text(parameters_yaml(told), encoding="utf-8")
+    parameters = flatten(config.planner) | {"seed": config.seed, "lockstep": True}
+    (root / "planner.yaml").write_text(parameters_yaml(parameters), encoding="utf-8")
     context = Context()
     context.init(domain_id=domain)
     graph = Graph(context)
@@ -83,7 +83,8 @@ def main() -> int:
         same = count == len(recorded.ticks) and found == digest(recorded.ticks)
         equal += same
         print(
-            f"{index}: {case}, {algorithm}, {reading}: {count} of {len(recorded.ticks)} answers, "
+            f"{index}: {case}, {algorithm}, {reading}: {count} of "
+            f"{len(recorded.ticks)} decisions, "
             f"{'same digest' if same else f'OTHER digest {found}'}",
             flush=True,
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kill the planner with -9 in the middle of a run and start it again: same digest, or said why.
+"""Kill the planner with -9 during a run and start it again: same digest, or a reported reason.
 
 A process per node, in lockstep; at a random tick the planner is killed and a new one started,
 which picks up at the tick the world repeats. The bag is then verified without ROS.
@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from by_hand import ByHand
+from manual_run import ManualRun
 
 from mfba_planner.paper import readings
 from mfba_planner.planning.planner_params import PlannerParams
@@ -25,8 +25,8 @@ from mfba_planner.verification.verify_bag import verify
 
 
 def interrupted_run(config: RunConfig, kill_at: int, bag: Path) -> None:
-    """Run case and kill; return when the world says that the run is over."""
-    with ByHand(config, bag, answer_timeout_s=0.5, answer_retries=60) as run:
+    """Run case and kill; return when world_sim reports the end of the run."""
+    with ManualRun(config, bag, answer_timeout_s=0.5, answer_retries=60) as run:
         run.start()
         over = run.monitor.ticks_at_end
         run.until(lambda: run.tick() >= kill_at or over(), "tick to kill at")
@@ -55,16 +55,16 @@ def main() -> int:
             report = verify(bag)
             if report.is_identical and report.digest == digest(core.ticks):
                 same += 1
-                fate = "same digest"
+                outcome = "same digest"
             elif not report.is_identical:
                 refused += 1
                 first = report.divergence and f"tick {report.divergence.tick} differs"
                 fault = next(iter(report.faults), first)
-                fate = f"refused: {fault}"
+                outcome = f"refused: {fault}"
             else:
                 silent += 1
-                fate = "DIFFERENT, and nothing says so"
-            print(f"{index}: {case}, killed at tick {kill_at}: {fate}", flush=True)
+                outcome = "DIFFERENT, and not reported"
+            print(f"{index}: {case}, killed at tick {kill_at}: {outcome}", flush=True)
     print(f"{same} same digest, {refused} refused with a reason, {silent} silently different")
     return int(silent > 0)
 

@@ -60,18 +60,18 @@ ROWS: dict[str, tuple[Robot, PlannerParams]] = {
 
 
 def clearance(episode: Episode) -> float:
-    """The smallest gap (m) along the arcs really driven, and the lines of who does not turn."""
+    """The smallest gap (m) along the arcs driven; along lines for robots that do not turn."""
     scenario, tick_ns = episode.scenario, episode.planner.tick_ns
     base, least, speeds = scenario.robot, float("inf"), Speeds()
     poses = episode.truth or tuple(tick.pose for tick in episode.ticks)
     count = max(1, -(-tick_ns // SUBTICK_NS)) if base.turns else 1
     for tick, pose, end in zip(episode.ticks, poses, poses[1:]):
         t_s, now = episode.time_s(tick.stamp_ns), pose
-        told = command(tick, base, tick_ns)
+        commanded = command(tick, base, tick_ns)
         for k in range(count):
             a_s, b_s = (t_s + tick_ns * NANO * (k + j) / count for j in (0, 1))
             if base.turns:
-                after, speeds = apply_command(now, speeds, told, base, tick_ns // count)
+                after, speeds = apply_command(now, speeds, commanded, base, tick_ns // count)
             else:
                 after = end
             gaps = step_clearances(scenario, a_s, b_s, now.position, after.position)

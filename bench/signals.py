@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """SIGINT and SIGTERM to every node at random moments: exit code 0, empty stderr, closed bag.
 
-Run: python bench/signals.py 30. The nodes do their work while it happens: somebody publishes
+Run: python bench/signals.py 30. The nodes do their work while it happens: a publisher sends
 odometry, obstacles, sectors and goals at 100 Hz to them. A moment is drawn from the first of our
 code on, which is when the process catches SIGTERM (SigCgt in /proc/PID/status: the interpreter
 itself never does), up to --longest seconds later; so many fall into imports and start-up.
-Before that the process is the Python interpreter, which no package can teach any manners.
+Before that the process is the bare Python interpreter, whose signal handling is not ours.
 """
 
 from __future__ import annotations
@@ -52,13 +52,13 @@ def arguments(node: str, directory: Path) -> list[str]:
     """What makes a node busy."""
     if node == "replay":
         return [str(FOREIGN_BAG), "--loop"]
-    told = {
+    parameters = {
         "planner": [],
         "virtual_sensor": [],
         "world_sim": ["speed_factor:=50.0", "run_on:=true"],
         "recorder": [f"output:={directory}"],
     }
-    return ["--ros-args", *(word for value in told[node] for word in ("-p", value))]
+    return ["--ros-args", *(word for value in parameters[node] for word in ("-p", value))]
 
 
 def kill_one(node: str, signum: signal.Signals, moment_s: float, domain: int, root: Path) -> Death:

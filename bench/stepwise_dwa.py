@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`dwa` as tutorials (PythonRobotics) have it: one velocity after the other, step by step.
 
-A peer of the measurement of cost alone: it samples, judges and chooses as
-planning/peers/dwa.py does.
+Only for measuring its cost: it samples, scores and chooses as planning/peers/dwa.py does.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 """`mfba sweep` on two hosts: a dask worker in each of two network namespaces (needs root).
 
 The namespaces share a veth pair and nothing else of the network; scheduler and client are in the
-first. Prints who computed how much, and whether the table is the one of local processes.
+first. Prints how much each worker computed, and whether the table equals that of local processes.
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ def inside(host: str, *words: str) -> list[str]:
 @contextmanager
 def daemon(host: str, *words: str) -> Iterator[None]:
     """A quiet process in a namespace."""
-    with tempfile.TemporaryDirectory() as scratch:
+    with tempfile.TemporaryDirectory() as directory:
         process = subprocess.Popen(
-            inside(host, "-m", *words), cwd=scratch,
+            inside(host, "-m", *words), cwd=directory,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         try:
@@ -92,12 +92,12 @@ def swept(command: list[str]) -> str:
 
 
 def main() -> None:
-    """Sweep on both hosts and here."""
+    """Sweep on both hosts and with local processes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--worlds", type=int, default=400)
     options = parser.parse_args()
-    order = ["sweep", "random-10", "--planner", "paper", "--planner", "straight"]
-    order += ["--worlds", str(options.worlds)]
+    sweep_arguments = ["sweep", "random-10", "--planner", "paper", "--planner", "straight"]
+    sweep_arguments += ["--worlds", str(options.worlds)]
     with tempfile.TemporaryDirectory() as root, ExitStack() as stack:
         stack.enter_context(hosts())
         first = next(iter(HOSTS))
@@ -112,11 +112,16 @@ def main() -> None:
         wait = COUNT.format(address=ADDRESS)
         subprocess.run(inside(first, "-c", wait), check=True, stdout=subprocess.DEVNULL)
         out = str(Path(root) / "hosts")
-        there = swept(inside(first, "-c", MFBA, *order, "--scheduler", ADDRESS, "--out", out))
+        two_hosts = swept(
+            inside(first, "-c", MFBA, *sweep_arguments, "--scheduler", ADDRESS, "--out", out)
+        )
         subprocess.run(inside(first, "-c", wait), check=True)
-        here = swept([sys.executable, "-c", MFBA, *order, "--out", str(Path(root) / "here")])
-    print(f"two hosts {there}\nhere      {here}\n{'identical' if there == here else 'DIFFERENT'}")
-    sys.exit(there != here)
+        one_host = swept(
+            [sys.executable, "-c", MFBA, *sweep_arguments, "--out", str(Path(root) / "local")]
+        )
+    same = two_hosts == one_host
+    print(f"two hosts {two_hosts}\none host  {one_host}\n{'identical' if same else 'DIFFERENT'}")
+    sys.exit(not same)
 
 
 if __name__ == "__main__":

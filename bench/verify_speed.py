@@ -22,7 +22,7 @@ MFBA = "import sys; from mfba_planner import entry_points; sys.exit(entry_points
 
 
 def main() -> None:
-    """Print simulated time / wall time of the check alone and of the whole command."""
+    """Print simulated time / wall time of the check itself and of the whole command."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repetitions", type=int, default=20)
     options = parser.parse_args()

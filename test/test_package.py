@@ -46,7 +46,7 @@ OUTSIDE: dict[str, set[str]] = {
     "paper": {"numpy", "scipy"},
     "recording": {"mcap", "mcap_ros2", "numpy", "yaml", "zstandard"},
     "verification": set(),
-    "report": {"matplotlib", "numpy", "rerun", "rich"},
+    "report": {"PIL", "matplotlib", "numpy", "rerun", "rich"},
     "ros": {"numpy"} | ROS,
     "launcher": {"launch", "launch_ros", "rich", "yaml"} | ROS,
     "cli": {"pyarrow", "rich", "yaml"},
@@ -220,7 +220,12 @@ def test_every_import_is_declared_and_every_dependency_justified(distribution: A
         if not requirement.startswith("#")
     }
     ros = {element.text for element in manifest() if element.tag.endswith("_depend")}
-    modules = {"PyYAML": "yaml", "mcap-ros2-support": "mcap_ros2", "rerun-sdk": "rerun"}
+    modules = {
+        "PyYAML": "yaml",
+        "Pillow": "PIL",
+        "mcap-ros2-support": "mcap_ros2",
+        "rerun-sdk": "rerun",
+    }
     declared = {modules.get(name, name) for name in wheels} | ros
     imported = {name.split(".")[0] for path in SOURCES for name in imports_of(path)}
     used = imported - sys.stdlib_module_names - {"mfba_planner"}

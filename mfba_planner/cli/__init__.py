@@ -21,6 +21,7 @@ COMMANDS = {
     "export": "write a bag's ticks and decisions as one table, CSV or Parquet",
     "recover": "copy the intact messages of a broken bag into a new one",
     "picture": "draw the run of a bag as PNG",
+    "animate": "write a run as an animated WebP or GIF",
     "view": "show runs in Rerun's viewer",
     "report": "write runs as one HTML page, with playback",
     "figures": "reproduce the paper's figures, as SVG and PNG",

@@ -36,22 +36,37 @@ Z_ROBOT = 0.5 * (Z_PATH + Z_MARK)  # below the goal, which stays visible
 
 def draw_snapshot(ax: Axes, episode: Episode, index: int) -> None:
     """Draw tick number index (from 0) of a run, with the obstacles at that time."""
-    tick = episode.ticks[index]
     draw_walls(ax, episode)
     for number in range(1, len(episode.scenario.obstacles) + 1):
-        _obstacle(ax, episode, index, number)
+        draw_track(ax, episode, index, number)
+        draw_obstacle(ax, episode, index, number, str(number))
+    draw_robot(ax, episode, index)
+    draw_ends(ax, episode)
+
+
+def draw_robot(ax: Axes, episode: Episode, index: int) -> None:
+    """Draw the robot at a tick: path so far, sensing range, sectors (headings) set, body."""
+    tick = episode.ticks[index]
     position, reach = tick.pose.position, episode.sensor.sensing_range_m
     ring = ring_of(episode, tick.vs)
     draw_sectors(ax, position, reach, tick.vs, "closing" if ring.of_headings else "set", ring)
     patch(ax, Circle(position, reach, fill=False, zorder=Z_RING, **style.RING), "reach")
     draw_path(ax, replace(episode, ticks=episode.ticks[: index + 1]))
-    draw_ends(ax, episode)
     radius = episode.scenario.robot_radius_m
     patch(ax, Circle(position, radius, zorder=Z_ROBOT, **style.ROBOT), "robot")
 
 
-def _obstacle(ax: Axes, episode: Episode, index: int, number: int) -> None:
-    """Body, enlarged edge, track so far, and an arrow for the next seconds' motion."""
+def draw_track(ax: Axes, episode: Episode, index: int, number: int) -> None:
+    """Draw the path of obstacle `number` (from 1) from the first tick to this one."""
+    scenario, time_s = episode.scenario, episode.time_s(episode.ticks[index].stamp_ns)
+    obstacle, start_s = scenario.obstacles[number - 1], span_s(episode)[0]
+    if obstacle.top_speed_mps > 0.0 and time_s > start_s:
+        points = track(obstacle, scenario.walls, start_s, time_s)
+        line(ax, points, f"past:{number}", zorder=Z_TRACK, **style.TRACK)
+
+
+def draw_obstacle(ax: Axes, episode: Episode, index: int, number: int, label: str) -> None:
+    """Draw obstacle `number` (from 1) at a tick: body, enlarged edge, arrow of its next 4 s."""
     scenario, tick = episode.scenario, episode.ticks[index]
     obstacle = scenario.obstacles[number - 1]
     time_s = episode.time_s(tick.stamp_ns)
@@ -63,10 +78,6 @@ def _obstacle(ax: Axes, episode: Episode, index: int, number: int) -> None:
     )
     patch(ax, enlarged, f"{'in_range' if sensed else 'enlarged'}:{number}")
     if obstacle.top_speed_mps > 0.0:
-        start_s = span_s(episode)[0]
-        if time_s > start_s:
-            points = track(obstacle, scenario.walls, start_s, time_s)
-            line(ax, points, f"past:{number}", zorder=Z_TRACK, **style.TRACK)
         bounces = bounce_times(obstacle, time_s, time_s + AHEAD_S, scenario.walls)
         tip = center_at(obstacle, min([time_s + AHEAD_S, *bounces]), scenario.walls)
         if tip != center:  # not if the obstacle stands still for now
@@ -74,5 +85,5 @@ def _obstacle(ax: Axes, episode: Episode, index: int, number: int) -> None:
             patch(ax, arrow, f"motion:{number}")
     body = Circle(center, obstacle.radius_m, zorder=Z_OBSTACLE, **style.OBSTACLE)
     patch(ax, body, f"body:{number}")
-    label = ax.text(*center, str(number), zorder=Z_MARK, clip_on=True, **style.NUMBER)
-    label.set_gid(f"number:{number}")
+    text = ax.text(*center, label, zorder=Z_MARK, clip_on=True, **style.NUMBER)
+    text.set_gid(f"number:{number}")

@@ -28,21 +28,21 @@ def _all() -> dict[str, Entry]:
         "end": (Line2D([], [], **style.END), "end of the run"),
         **{f"path:{mode.value}": (_path(mode), format_values.MODES[mode]) for mode in _MODES},
         "recorded": (Line2D([], [], **style.RECORDED), "path of the recorded run"),
-        "obstacle": (_disc(style.OBSTACLE), "obstacle, at closest pass"),
+        "obstacle": (disc(style.OBSTACLE), "obstacle, at closest pass"),
         "enlarged": (Line2D([], [], **_edge(style.ENLARGED)), "enlarged by the robot's radius"),
         "pass": (Line2D([], [], **style.PASS), "clearance at closest pass"),
         "track": (_track(), "obstacle's track"),
         "track_near_pass": (_track(), "obstacle's track near closest pass"),
-        "ring": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR at the switch"),
+        "ring": (disc({**style.RING, "facecolor": "none"}), "sensing range SR at the switch"),
         "sector": (Patch(**style.SECTOR), "sectors set at the switch"),
         "heading": (Patch(**style.SECTOR), "headings to a contact, at the switch"),
         "sensed": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle at the switch"),
         "particle": (Line2D([], [], **style.PARTICLE), "robot, a particle"),
-        "outline": (_disc(style.OBSTACLE), "obstacle"),
-        "robot": (_disc(style.ROBOT), "robot"),
-        "body": (_disc(style.OBSTACLE), "obstacle; the arrow: its next 4 s"),
+        "outline": (disc(style.OBSTACLE), "obstacle"),
+        "robot": (disc(style.ROBOT), "robot"),
+        "body": (disc(style.OBSTACLE), "obstacle; the arrow: its next 4 s"),
         "past": (Line2D([], [], **style.TRACK), "obstacle's track so far"),
-        "reach": (_disc({**style.RING, "facecolor": "none"}), "sensing range SR"),
+        "reach": (disc({**style.RING, "facecolor": "none"}), "sensing range SR"),
         "set": (Patch(**style.SECTOR), "sectors set"),
         "closing": (Patch(**style.SECTOR), "headings to a contact"),
         "in_range": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle within SR"),
@@ -70,7 +70,8 @@ def _track() -> Line2D:
     return Line2D([], [], marker=">", markersize=5.0, markeredgewidth=0.0, **style.TRACK)
 
 
-def _disc(looks: style.Looks) -> Line2D:
+def disc(looks: style.Looks) -> Line2D:
+    """The handle of a circle with this face and edge."""
     return Line2D(
         [],
         [],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""bench/benchmark.py: its tables say what the rows say; docs/benchmark.md keeps its word."""
+"""bench/benchmark.py: its tables match the rows; docs/benchmark.md matches its commands."""
 
 import json
 import os
@@ -60,7 +60,7 @@ def lines(page: str, title: str) -> dict[str, dict[str, str]]:
     return {row[0]: dict(zip(cells[0], row)) for row in cells[2:]}
 
 
-def test_the_tables_say_what_the_rows_say(made: Path) -> None:
+def test_the_tables_hold_what_the_rows_hold(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     found = lines(page, "### random-20")
     assert list(found) == SEVEN
@@ -108,11 +108,11 @@ def test_paper_has_its_own_step_and_all_others_share_one(made: Path) -> None:
 def test_ingredients_and_perceptions_share_what_is_the_same_run(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     suite = lines(page, "### random-20")["predictive"]
-    seen = lines(page, "## What predictive sees")
+    perceptions = lines(page, "## What predictive sees")
     bought = lines(page, "## What each ingredient buys")
-    assert len(seen) == 7
+    assert len(perceptions) == 7
     assert len(bought) == 10
-    for same in (seen["random-20: known"], bought["random-20: all (predictive)"]):
+    for same in (perceptions["random-20: known"], bought["random-20: all (predictive)"]):
         assert {**same, "planner": "predictive"} == suite
 
 
@@ -120,21 +120,21 @@ def test_episodes_per_minute_are_of_whole_sweeps(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     targets = lines(page, "## Targets")
     for name in ("paper", "predictive"):
-        told = targets[f"episodes per minute, {name}, random-10, workers: 1"]["found"]
-        found, low, high = map(float, re.findall(r"\d+", told)[:3])
+        found_cell = targets[f"episodes per minute, {name}, random-10, workers: 1"]["found"]
+        found, low, high = map(float, re.findall(r"\d+", found_cell)[:3])
         # Two short runs, and half a second to start a process for them.
         assert 10.0 < low <= found <= high < 2 * 60.0 / 0.01
-        assert "in 3 sweeps" in told
+        assert "in 3 sweeps" in found_cell
 
 
 def test_a_decision_is_timed_again_and_again_and_in_turn(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     targets, costs = lines(page, "## Targets"), lines(page, "## What a decision costs")
-    alone = targets["median us of a predictive decision, 10 in range, again and again"]
+    repeated = targets["median us of a predictive decision, 10 in range, again and again"]
     turn = targets["the same in turn with the other planners"]
     assert float(turn["found"]) == pytest.approx(float(costs["10"]["predictive, us"]), abs=0.5)
-    assert f"`predictive` takes {float(alone['found']):.0f} us with 10 in range" in page
-    for row in (alone, turn):
+    assert f"`predictive` takes {float(repeated['found']):.0f} us with 10 in range" in page
+    for row in (repeated, turn):
         assert row["target"] == "<= 300"
         assert row[""] == ("met" if float(row["found"]) <= 300.0 else "**missed**")
 
@@ -192,27 +192,27 @@ def test_all_suites_are_made_by_the_command_shown_but_for_its_numbers(tmp_path: 
     shown_commands.script(shown_commands.reduced(WHOLE), tmp_path)
     page = (tmp_path / "docs" / "benchmark.md").read_text(encoding="utf-8")
     for suite in suite_names():
-        labels = lines(page, f"### {suite}")  # where there are cases: "case 1: orca"
+        labels = lines(page, f"### {suite}")  # of suites with cases: "case 1: orca"
         assert {label.rpartition(" ")[2] for label in labels} == set(SEVEN)
     assert PAGE.count("\n### ") == page.count("\n### ")
     assert PAGE.count("\n## ") == page.count("\n## ")
 
 
 @pytest.mark.parametrize("command", [w for w in SHOWN if w[0] != "python"], ids=lambda w: w[-1])
-def test_the_runs_shown_go_as_the_page_says(command: list[str], tmp_path: Path) -> None:
+def test_the_runs_shown_have_the_outcome_on_the_page(command: list[str], tmp_path: Path) -> None:
     """Of their sweeps this one world."""
     _, show, directory, run = command
     suite, world, planner, _ = run.split("/")
-    (said,) = re.findall(rf"The first: (.*):\n\n```sh\n{' '.join(command)}\n", PAGE)
+    (headline,) = re.findall(rf"The first: (.*):\n\n```sh\n{' '.join(command)}\n", PAGE)
     sweep = f"sweep {suite} --planner {planner} --first {world} --worlds 1 --workers 1"
     step = "--set planner.step_length_m=0.08"  # which is predictive's own
     shown_commands.mfba([*sweep.split(), *step.split(), "--out", directory], tmp_path)
     assert show == "show"
-    told = shown_commands.mfba(command[1:], tmp_path)
-    assert told.splitlines()[:2] == [run, said]
+    found_cell = shown_commands.mfba(command[1:], tmp_path)
+    assert found_cell.splitlines()[:2] == [run, headline]
 
 
-def test_every_command_of_the_page_is_run_here_and_options_in_its_text_exist(
+def test_every_command_of_the_page_is_run_and_options_in_its_text_exist(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert {words[0] for words in SHOWN} == {"python", "mfba"}
@@ -222,8 +222,8 @@ def test_every_command_of_the_page_is_run_here_and_options_in_its_text_exist(
     for words in (WHOLE, MADE_BY):
         assert words[1] == "bench/benchmark.py"
         parser.parse_args(words[2:])
-    for part in re.findall(r"`(--.*?)`", PAGE):
-        options = [word for word in part.split() if word.startswith("--")]
+    for options_text in re.findall(r"`(--.*?)`", PAGE):
+        options = [word for word in options_text.split() if word.startswith("--")]
         assert all(word == "--help" or f"{word} " in parser.format_help() for word in options)
 
 
@@ -234,7 +234,7 @@ def test_the_window_step_by_step_sees_what_ours_sees_between_its_steps() -> None
     samples = rng.uniform(-0.6, 0.6, size=(40, 2))
     exact = DynamicWindow.gaps(around, samples)
     missed = stepwise["StepwiseDwa"].gaps(around, samples) - exact
-    # Within half a step nobody comes nearer than by its own way and the robot's.
+    # Within half a step no obstacle comes nearer than by its own path and the robot's.
     most = 0.5 * stepwise["STEP_S"] * (np.hypot(0.3, 0.3) + np.hypot(0.6, 0.6))
     assert missed.min() >= -1e-12
     assert 0.0 < missed.max() <= most

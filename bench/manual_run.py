@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded run, a process per node, conducted by hand: for benches that disturb it."""
+"""A recorded run with a process per node, started step by step: for benches that disturb it."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ TIMEOUT_S = 180.0
 ALL = (topics.RECORDER, *NODES)
 
 
-class ByHand:
+class ManualRun:
     """The nodes of one run in a domain of their own; all of them end with the context."""
 
     def __init__(self, config: RunConfig, bag: Path, **world: Any) -> None:
         """Prepare; world holds further parameters of world_sim."""
-        self.told = node_parameters(config, ALL)
-        self.told[topics.WORLD_SIM] |= world
-        self.told[topics.RECORDER] = recorder_parameters(config, str(bag), NODES)
+        self.parameters = node_parameters(config, ALL)
+        self.parameters[topics.WORLD_SIM] |= world
+        self.parameters[topics.RECORDER] = recorder_parameters(config, str(bag), NODES)
         self._tick_ns = config.planner.tick_ns
         self._lines: list[str] = []
         self._stack = ExitStack()
 
-    def __enter__(self) -> ByHand:
+    def __enter__(self) -> ManualRun:
         domain = self._stack.enter_context(private_domain())
         self.monitor = self._stack.enter_context(GraphMonitor(domain))
-        hear = lambda name, line: self._lines.append(f"{name}: {line}")  # noqa: E731
-        self.crew = self._stack.enter_context(NodeProcesses(hear, lambda: False))
+        keep_line = lambda name, line: self._lines.append(f"{name}: {line}")  # noqa: E731
+        self.processes = self._stack.enter_context(NodeProcesses(keep_line, lambda: False))
         self._deadline = time.monotonic() + TIMEOUT_S
         return self
 
@@ -60,12 +60,12 @@ class ByHand:
                 raise AssertionError(f"{what}: never\n" + "\n".join(self._lines[-20:]))
             self.monitor.spin(0.01)
 
-    def start(self, order: Sequence[str] = ALL, delays_s: Sequence[float] = ()) -> None:
-        """Start the nodes in an order, each after a delay; then let them play."""
-        for name, delay_s in zip(order, [*delays_s, *[0.0] * len(order)]):
+    def start(self, names: Sequence[str] = ALL, delays_s: Sequence[float] = ()) -> None:
+        """Start the nodes in this sequence, each after a delay; then end the pause."""
+        for name, delay_s in zip(names, [*delays_s, *[0.0] * len(names)]):
             due = time.monotonic() + delay_s
             self.until(lambda due=due: time.monotonic() >= due, "delay")  # type: ignore[misc]
-            self.crew.start({name: self.told[name]}, {})
+            self.processes.start({name: self.parameters[name]}, {})
         for name, question in self.monitor.call_ready(ALL).items():
             ready = lambda q=question: (a := q.response()) is not None and a.success  # noqa: E731
             self.until(ready, f"{name} ready")
@@ -79,13 +79,15 @@ class ByHand:
         return now.stamp_ns // self._tick_ns - 1 if now else -1
 
     def end(self) -> None:
-        """Wait until the world says that the run is over."""
+        """Wait until world_sim reports the end of the run."""
         self.until(self.monitor.ticks_at_end, "end of the run")
 
     def replace_planner(self) -> None:
         """Kill the planner with -9 and start another."""
-        (planner,) = [child for child in self.crew.children if child.name == topics.PLANNER]
+        (planner,) = [child for child in self.processes.children if child.name == topics.PLANNER]
         planner.process.kill()
         planner.process.wait()
-        self.crew.children.remove(planner)
-        self.crew.start({topics.PLANNER: self.told[topics.PLANNER] | {"wait_for": ""}}, {})
+        self.processes.children.remove(planner)
+        self.processes.start(
+            {topics.PLANNER: self.parameters[topics.PLANNER] | {"wait_for": ""}}, {}
+        )

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mfba animate`: a run as an animated WebP or GIF; needs no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic
+
+from ..core.argument_parser import Parser
+from ..core.errors import ConfigError
+from ..core.outputs import new_file
+from .named_episodes import named_episodes
+
+_DESCRIPTION = """Write a run as an animation for a web page or slides: WebP or GIF, by the suffix.
+
+A bag is read. Of a result (`mfba sim --out`) the run is simulated again, and must take the
+decisions that the result's digest stands for. A fleet's bag shows all its robots, or those
+that --robot names; the others are obstacles then. The animation repeats for ever."""
+_QUIET_S = 2.0  # no progress bar before
+
+
+def main(args: list[str]) -> int:
+    """Write the animation."""
+    parser = Parser(prog="mfba animate", description=_DESCRIPTION)
+    parser.add_argument(
+        "path", type=Path, metavar="BAG|RESULT", help="run or bag directory, or file"
+    )
+    parser.add_argument("out", type=Path, metavar="OUT", help="file to create: .webp or .gif")
+    parser.add_argument(
+        "--fps", type=float, default=12.0, metavar="N", help="frames per second (default: 12)"
+    )
+    parser.add_argument(
+        "--speed", type=float, default=3.0, metavar="N",
+        help="simulated seconds per second (default: 3)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--width", type=int, default=640, metavar="PX", help="pixels (default: 640)"
+    )
+    parser.add_argument(
+        "--max-bytes", type=int, default=1_500_000, metavar="N",
+        help="size limit: colours, then frames are left out until it fits (default: 1500000)",
+    )  # fmt: skip
+    parser.add_robots()
+    found = parser.parse(args)
+    # Pillow and matplotlib take their time: not for --help.
+    from ..report.animation import SUFFIXES, AnimationOptions, animation_bytes
+
+    suffix = found.out.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ConfigError(
+            f"{found.out}: unknown kind of animation; give a name that ends in .webp or .gif"
+        )
+    options = AnimationOptions(
+        fps=found.fps, speed=found.speed, width_px=found.width, max_bytes=found.max_bytes
+    )
+    with new_file(found.out) as file:
+        runs, roster = named_episodes([found.path], found.robots)
+        with _progress_bar() as progress:
+            data = animation_bytes(runs, roster, suffix, options, progress)
+        file.write(data)
+    print(f"wrote {found.out}")
+    return 0
+
+
+@contextmanager
+def _progress_bar() -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on a terminal, for frames that take longer than _QUIET_S."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("drawing"), BarColumn(), TimeRemainingColumn())
+    start_s = monotonic()
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("", visible=False)
+
+        def progress(done: int, total: int) -> None:
+            visible = monotonic() - start_s > _QUIET_S
+            bar.update(task, completed=done, total=total, visible=visible)
+
+        yield progress
