@@ -138,7 +138,7 @@ class Variation(Trips):
             "length_m": result.length_m,
             "collisions": result.collisions,
             "reached": int(result.outcome.value == "goal_reached"),
-            "told": int(as_figure),
+            "as_figure": int(as_figure),
         }
 
 
@@ -234,5 +234,5 @@ def _row(reading: Reading, case: str, sample: Sample) -> Row:
         intervals=tuple(map(statistics.interval, intervals)),
         contacts=float(np.mean(sample["collisions"] > 0)),
         reached=float(np.mean(sample["reached"])),
-        as_figure=float(np.mean(sample["told"])),
+        as_figure=float(np.mean(sample["as_figure"])),
     )

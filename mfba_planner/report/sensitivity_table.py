@@ -36,7 +36,7 @@ def to_csv(rows: Sequence[Row]) -> str:
     spans = [f"{name}_{end}_m" for name in STATISTICS for end in ("median", "low", "high")]
     holds = [f"holds_{law}_{name}" for law in LAWS for name in STATISTICS]
     head = ["group", "reading", "case", *spans, *holds]
-    writer.writerow([*head, "printed_rows", "contacts", "reached", "encounters_as_told"])
+    writer.writerow([*head, "printed_rows", "contacts", "reached", "encounters_as_figure"])
     for row in rows:
         writer.writerow(
             [

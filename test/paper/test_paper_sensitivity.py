@@ -76,7 +76,7 @@ def test_section6_gives_the_same_runs_as_outside_the_study() -> None:
     columns = variation(BASE, "case2").run([3, 4])
     episodes = [run(SCENARIOS["case2"], seed=seed) for seed in (3, 4)]
     assert columns["length_m"] == [evaluate(episode).length_m for episode in episodes]
-    assert columns["told"] == [
+    assert columns["as_figure"] == [
         int(evaluate(episode).encounters[:2] == (1, 2)) for episode in episodes
     ]
 
@@ -124,7 +124,7 @@ def samples(
                 "length_m": length[case] + spread,
                 "collisions": np.full(41, hit),
                 "reached": np.ones(41),
-                "told": np.full(41, as_figure),
+                "as_figure": np.full(41, as_figure),
             }
     return found
 

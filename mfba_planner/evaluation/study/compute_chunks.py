@@ -46,7 +46,7 @@ def compute(
 ) -> dict[str, Columns]:
     """Compute (or read from the store) every chunk: {name of the chunk: its columns}.
 
-    done is called with each finished chunk, in any sequence; say with a message when a worker
+    done is called with each finished chunk, in any sequence; warn with a message when a worker
     died. An early end leaves the finished chunks in the store. A given executor is left open,
     and workers is ignored. Raises ConfigError for workers out of range, MfbaError for a chunk
     whose worker died TRIES times.

@@ -71,7 +71,7 @@ def sweep(
 ) -> SweepResult:
     """Compute all runs (or read them from the store); the same result on any executor.
 
-    workers, executor, store, done, say and errors as in study.compute_chunks.compute.
+    workers, executor, store, done, warn and errors as in study.compute_chunks.compute.
     """
     chunks = chunks_of(spec)
     found = compute(chunks, workers=workers, executor=executor, store=store, done=done, warn=warn)
