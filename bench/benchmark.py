@@ -24,7 +24,7 @@ from benchmark_page import PER_MINUTE, render
 from benchmark_pictures import write_pictures
 from benchmark_runs import HEADLINE, Counts, Results, print_line
 
-from mfba_planner.core.outputs import new_run_directory
+from mfba_planner.core.output_files import new_run_directory
 from mfba_planner.evaluation.study.compute_chunks import initialize_worker
 from mfba_planner.evaluation.suites import suite_names
 

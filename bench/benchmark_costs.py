@@ -19,7 +19,7 @@ from planners import arrangement
 from stepwise_dwa import StepwiseDwa
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Observation, PathPlanner
+from mfba_planner.core.planner_types import Observation, PathPlanner
 from mfba_planner.evaluation.sweep.run_sweep import sweep
 from mfba_planner.evaluation.sweep.sweep_spec import SweepSpec
 from mfba_planner.evaluation.sweep.worker import Lost, run_in_worker

@@ -171,7 +171,9 @@ def _targets(results: Results, suites: Sequence[str], counts: Counts) -> Lines:
                 one = results.standing(suite, entry, counts.perceived(suite))
                 what = f"mean gap, {suite}, {entry.label}"
                 cells = _line(what, one.gap, most, at_least=False, of=one.runs)
-                yield cells if entry in PERCEPTIONS[1:3] else [cells[0], "(reported)", cells[2], ""]
+                yield (
+                    cells if entry in PERCEPTIONS[1:3] else [cells[0], "(reported)", cells[2], ""]
+                )
     for case, most in CASE_GAP.items() if "paper" in suites else ():
         one = results.standing("paper", PREDICTIVE, counts.lead("paper"), case)
         free = "met" if not one.collisions else "**missed**"

@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
 from mfba_planner.evaluation.statistics import Interval
-from mfba_planner.evaluation.sweep.columns import Row
 from mfba_planner.evaluation.sweep.explain_run import contact_index, explain
 from mfba_planner.evaluation.sweep.single_run import run_one
 from mfba_planner.evaluation.sweep.sweep_spec import Run
+from mfba_planner.evaluation.sweep.table_columns import Row
 from mfba_planner.report import style
 from mfba_planner.report.figure_sheet import EDGE, Sheet, to_bytes
 from mfba_planner.report.run_figure import run_figure

@@ -13,13 +13,13 @@ from mfba_planner.evaluation.study.chunk_store import Store
 from mfba_planner.evaluation.study.compute_chunks import compute
 from mfba_planner.evaluation.suites import suite as suite_of
 from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
-from mfba_planner.evaluation.sweep.chunks import OracleChunk, chunks_of
-from mfba_planner.evaluation.sweep.columns import Row, with_optimum
 from mfba_planner.evaluation.sweep.run_sweep import open_store, sweep
 from mfba_planner.evaluation.sweep.summary import PlannerSummary, Versus, planner_summaries, versus
+from mfba_planner.evaluation.sweep.sweep_chunks import OracleChunk, chunks_of
 from mfba_planner.evaluation.sweep.sweep_spec import Setting, SweepSpec
+from mfba_planner.evaluation.sweep.table_columns import Row, with_optimum
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 
 ORACLE = ("core", "evaluation", "scenarios", "simulation")  # their code decides the optima
 HEADLINE = ("random-10", "random-20", "random-30", "adversarial")  # suites with --worlds

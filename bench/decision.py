@@ -18,8 +18,8 @@ from collections.abc import Callable
 import numpy as np
 
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.planner_types import Mode, Observation
 from mfba_planner.core.random_streams import stream
-from mfba_planner.core.types import Mode, Observation
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario

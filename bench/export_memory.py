@@ -19,11 +19,11 @@ import numpy as np
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import LaserScan
 
-from mfba_planner.core.options import flatten
+from mfba_planner.core.declared_options import flatten
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_writer import BagWriter
-from mfba_planner.recording.configuration import attach_configuration
+from mfba_planner.recording.configuration_attachment import attach_configuration
 from mfba_planner.ros.interface.to_messages import decision_msg, sectors_msg, set_stamp
 from mfba_planner.scenarios.run_config import RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 
-from mfba_planner.paper.readings import SWARMS
+from mfba_planner.paper.readings_of_paper import SWARMS
 from mfba_planner.swarm.bat_swarm import BatParams
 from mfba_planner.swarm.batched_swarms import CACHED_BATS, minimize_batch
 from mfba_planner.swarm.search_region import Box

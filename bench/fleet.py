@@ -22,7 +22,7 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.peers.orca import Orca
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.planning.predictive import Predictive, PredictiveParams, preset
+from mfba_planner.planning.predictive_planner import Predictive, PredictiveParams, preset
 from mfba_planner.planning.trajectory_cost import RiskParams
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import MakePlanner, run_fleet

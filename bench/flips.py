@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.verification.verify_bag import verify
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "test" / "helpers"))

@@ -17,21 +17,21 @@ from pathlib import Path
 import numpy as np
 
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.types import NANO
+from mfba_planner.core.planner_types import NANO
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.ros_domain import claim_domain
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.odometry_jump import is_odometry_jump
 from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.scenarios.run_config import Driver, RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
+from mfba_planner.simulation.run_episode import simulate
 from mfba_planner.simulation.scenario import Kidnapping, Scenario
-from mfba_planner.simulation.simulate import simulate
 
 ROOM_M, CLEAR_M = 12.0, 0.1
 AHEAD = replace(preset(), method=Method.PREDICTIVE)
@@ -64,7 +64,7 @@ def kidnapped(k: int, robot: Robot, params: PlannerParams) -> Scenario:
 
 def by_graph(scenario: Scenario, params: PlannerParams, seed: int) -> str:
     """The decision digest of the same run through the real graph."""
-    from mfba_planner.launcher.in_process import run_in_process
+    from mfba_planner.launcher.in_process_driver import run_in_process
 
     config = RunConfig(scenario=scenario, planner=params, seed=seed, driver=Driver.IN_PROCESS)
     domain, lock = claim_domain()

@@ -27,17 +27,17 @@ from pathlib import Path
 import numpy as np
 from manual_run import ALL, ManualRun
 
-from mfba_planner.core.options import override
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.core.declared_options import override
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
-from mfba_planner.paper import readings
+from mfba_planner.paper import readings_of_paper
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.scenarios.run_config import Driver, RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.obstacle_motion import Obstacle, Walls
+from mfba_planner.simulation.run_episode import simulate
 from mfba_planner.simulation.scenario import Scenario
-from mfba_planner.simulation.simulate import simulate
 from mfba_planner.verification.verify_bag import verify
 
 
@@ -66,8 +66,8 @@ def random_config(rng: np.random.Generator, driver: Driver) -> RunConfig:
     """One run out of all that could be."""
     which = int(rng.integers(4))
     scenario = load_scenario(f"case{which + 1}") if which < 2 else random_world(rng)
-    names = list(readings.PLANNERS)
-    planner = readings.planner(names[int(rng.integers(len(names)))])
+    names = list(readings_of_paper.PLANNERS)
+    planner = readings_of_paper.planner(names[int(rng.integers(len(names)))])
     algorithm = ("mfba", "ba")[int(rng.integers(2))]
     method = ("paper", "paper", "paper", "predictive")[int(rng.integers(4))]
     sensor = SensorParams(sectors=(12, 24, 36)[int(rng.integers(3))])

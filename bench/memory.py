@@ -19,7 +19,7 @@ from pathlib import Path
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.types import NANO
+from mfba_planner.core.planner_types import NANO
 from mfba_planner.launcher.graph_monitor import GraphMonitor, ServiceCall
 from mfba_planner.launcher.node_processes import NodeProcesses
 from mfba_planner.launcher.ros_domain import private_domain

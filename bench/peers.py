@@ -31,8 +31,8 @@ from niapy.problems import Problem
 from niapy.task import Task
 from numpy.random import PCG64, Generator
 
-from mfba_planner.paper.functions import FUNCTIONS, Function
-from mfba_planner.paper.readings import SWARMS
+from mfba_planner.paper.benchmark_functions import FUNCTIONS, Function
+from mfba_planner.paper.readings_of_paper import SWARMS
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, minimize
 from mfba_planner.swarm.batched_swarms import minimize_batch
 from mfba_planner.swarm.search_region import Box

@@ -18,10 +18,10 @@ import numpy as np
 from decision import FREE, decisions, measure
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Circle, Mode, Observation
+from mfba_planner.core.planner_types import Circle, Mode, Observation
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 
 COUNTS = (1, 3, 10, 30, 100, 300, 1000)
 RADIUS_M, SR_M = 0.6, 0.8

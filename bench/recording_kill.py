@@ -22,9 +22,9 @@ from pybag.mcap_reader import McapFileReader
 from rosbags.highlevel import AnyReader
 
 from mfba_planner.core.errors import BagError
+from mfba_planner.recording.bag_qos import OfferedQos
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
-from mfba_planner.recording.qos_profiles import OfferedQos
 from mfba_planner.recording.recover import recover
 
 MAX_LOSS_S = 1.0

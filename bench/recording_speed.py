@@ -20,9 +20,9 @@ from pathlib import Path
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from mfba_planner.recording.bag_qos import OfferedQos
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import CHUNK_BYTES, BagWriter
-from mfba_planner.recording.qos_profiles import OfferedQos
 
 ODOMETRY_BYTES = 720
 

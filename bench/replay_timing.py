@@ -24,7 +24,7 @@ from typing import Any
 
 import rclpy
 
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.ros.runtime.spin_node import make_executor

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from manual_run import ManualRun
 
-from mfba_planner.paper import readings
+from mfba_planner.paper import readings_of_paper
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
@@ -39,14 +39,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--reading", default="section6", choices=list(readings.PLANNERS))
+    parser.add_argument("--reading", default="section6", choices=list(readings_of_paper.PLANNERS))
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     same = refused = silent = 0
     with tempfile.TemporaryDirectory() as root:
         for index in range(options.runs):
             case = ("case1", "case2")[index % 2]
-            params: PlannerParams = readings.planner(options.reading)
+            params: PlannerParams = readings_of_paper.planner(options.reading)
             config = replace(RunConfig(scenario=load_scenario(case)), planner=params, seed=index)
             core = run(config.scenario, planner=params, seed=index)
             kill_at = int(rng.integers(1, len(core.ticks) - 2))

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from mfba_planner.evaluation.metrics import evaluate
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario

@@ -6,7 +6,7 @@ from __future__ import annotations
 from launch.launch_description import LaunchDescription
 
 from mfba_planner.launcher.launch_actions import make_description
-from mfba_planner.launcher.robot_launch import PLANNER_ARGUMENTS, robot_nodes
+from mfba_planner.launcher.robot_launch_description import PLANNER_ARGUMENTS, robot_nodes
 
 
 def generate_launch_description() -> LaunchDescription:

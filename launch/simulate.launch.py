@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from launch.launch_description import LaunchDescription
 
 from mfba_planner.launcher.launch_actions import make_description
-from mfba_planner.launcher.robot_launch import NodeStart
-from mfba_planner.launcher.simulate_launch import ARGUMENTS, launch_parameters
+from mfba_planner.launcher.robot_launch_description import NodeStart
+from mfba_planner.launcher.simulate_launch_description import ARGUMENTS, launch_parameters
 
 
 def generate_launch_description() -> LaunchDescription:

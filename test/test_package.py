@@ -21,7 +21,7 @@ from project import ROOT
 
 from mfba_planner import __version__
 from mfba_planner.cli import COMMANDS as COMMANDS_OF_MFBA
-from mfba_planner.core import resources
+from mfba_planner.core import shipped_files
 from mfba_planner.core.errors import InputError
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
@@ -289,11 +289,11 @@ def test_programs_lead_to_a_main(distribution: Any) -> None:
 
 
 def test_shipped_files_are_found_by_name() -> None:
-    names = resources.scenario_names()
+    names = shipped_files.scenario_names()
     assert {"case1", "case2"} <= set(names)
-    assert resources.scenario_path("case1").is_file()
+    assert shipped_files.scenario_path("case1").is_file()
     with pytest.raises(InputError, match=r"scenarios/case0\.yaml: not a shipped file; see "):
-        resources.scenario_path("case0")
+        shipped_files.scenario_path("case0")
 
 
 def run(*command: str, **variables: str) -> "subprocess.CompletedProcess[str]":

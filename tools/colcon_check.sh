@@ -39,7 +39,7 @@ from ament_index_python import get_package_prefix, get_package_share_directory
 import mfba_planner
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.report.html.page import page
-from mfba_planner.core.resources import scenario_names
+from mfba_planner.core.shipped_files import scenario_names
 from mfba_planner.scenarios.scenario_files import load_scenario
 
 assert mfba_planner.__file__.startswith(os.environ["BASE"]), mfba_planner.__file__

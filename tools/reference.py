@@ -23,12 +23,12 @@ from typing import Any
 from reference_text import PARAMETERS_TEXT, SERVICES, SERVICES_TEXT, TOPICS_TEXT, YAML_HEAD
 
 from mfba_planner import cli
-from mfba_planner.core.options import override, walk
+from mfba_planner.core.declared_options import override, walk
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_factory import DEFAULT_METHOD
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.planning.predictive import preset
-from mfba_planner.ros import node_parameters
+from mfba_planner.planning.predictive_planner import preset
+from mfba_planner.ros import node_settings
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios import yaml_schema
 from mfba_planner.simulation.robot_model import Robot
@@ -50,13 +50,13 @@ ROBOT: dict[str, dict[str, Any]] = {
     },
 }
 NODES: dict[str, tuple[Any, ...]] = {
-    "planner": (node_parameters.PlannerSettings(), PlannerParams()),
-    "virtual_sensor": (node_parameters.VirtualSensorSettings(), SensorParams()),
+    "planner": (node_settings.PlannerSettings(), PlannerParams()),
+    "virtual_sensor": (node_settings.VirtualSensorSettings(), SensorParams()),
     "world_sim": (
-        node_parameters.WorldSimSettings(),
-        node_parameters.RobotParameters(robot=Robot()),
+        node_settings.WorldSimSettings(),
+        node_settings.RobotParameters(robot=Robot()),
     ),
-    "recorder": (node_parameters.RecorderSettings(),),
+    "recorder": (node_settings.RecorderSettings(),),
 }
 
 

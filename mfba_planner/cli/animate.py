@@ -10,8 +10,8 @@ from time import monotonic
 
 from ..core.argument_parser import Parser
 from ..core.errors import ConfigError
-from ..core.outputs import new_file
-from .named_episodes import named_episodes
+from ..core.output_files import new_file
+from .support.load_episodes import named_episodes
 
 _DESCRIPTION = """Write a run as an animation for a web page or slides: WebP or GIF, by the suffix.
 

@@ -6,13 +6,13 @@ from __future__ import annotations
 import argparse
 
 from ..core.argument_parser import Parser
+from ..core.declared_options import flatten
 from ..core.errors import BagError
-from ..core.options import flatten
-from ..core.outputs import bag_in
+from ..core.output_files import bag_in
 from ..evaluation.metrics import evaluate
+from ..recording.fleet_topics import with_robot_name
 from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import Recording, read_recording
-from ..recording.robot_topics import with_robot_name
 from ..report.result_table import comparison_text
 from ..simulation.decision_digest import digest
 from ..simulation.episode import Episode

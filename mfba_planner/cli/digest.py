@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.outputs import bag_in
+from ..core.output_files import bag_in
+from ..recording.fleet_topics import NO_NAMESPACE, select_robots
 from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import summaries
-from ..recording.robot_topics import NO_NAMESPACE, select_robots
 from ..report.result_json import read_result
 
 

@@ -12,11 +12,11 @@ from typing import Any, BinaryIO
 
 from ..core.argument_parser import Parser
 from ..core.errors import BagError, ConfigError
-from ..core.outputs import bag_in, new_file
+from ..core.output_files import bag_in, new_file
 from ..recording.bag_reader import BagReader
-from ..recording.decisions import robots_with_decisions
+from ..recording.decisions_with_sectors import robots_with_decisions
+from ..recording.fleet_topics import select_robots
 from ..recording.omitted_decisions import print_omissions
-from ..recording.robot_topics import select_robots
 from ..recording.tick_table import COLUMNS, Row, read_rows
 
 BATCH = 5000  # rows in memory at a time

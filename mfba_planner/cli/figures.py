@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..core.argument_parser import Parser
+from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
-from ..core.options import did_you_mean
-from ..core.outputs import new_run_directory, refuse_existing, write_new
+from ..core.output_files import new_run_directory, refuse_existing, write_new
 from ..report.figures.paper_figures import FIGURES, FORMATS, render
 
 _DESCRIPTION = "Reproduce the paper's figures; the same version writes the same bytes."

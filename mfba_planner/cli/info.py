@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from ..core.argument_parser import Parser
 from ..core.errors import BagError
-from ..core.outputs import bag_in
+from ..core.output_files import bag_in
 from ..launcher.run_result import show
 from ..recording.bag_info import describe, format_info
-from ..recording.configuration import ATTACHMENT_NAME
+from ..recording.configuration_attachment import ATTACHMENT_NAME
+from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import Summary, summaries
-from ..recording.robot_topics import NO_NAMESPACE
 from ..report.fleet_table import fleet_text
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.outputs import bag_in
+from ..core.output_files import bag_in
 from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import read_recording
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.outputs import refuse_existing
-from .named_episodes import add_paths, named_episodes
+from ..core.output_files import refuse_existing
+from .support.load_episodes import add_paths, named_episodes
 
 _DESCRIPTION = """Write runs as one HTML file; it needs no network and no ROS.
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from ..core.argument_parser import Parser
-from ..core.resources import scenario_names, share_dir
+from ..core.shipped_files import scenario_names, share_dir
 from ..scenarios.scenario_files import load_scenario
 
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.outputs import new_run_directory, write_same
+from ..core.output_files import new_run_directory, write_same
 from ..paper import sensitivity
 from ..paper.study.run import open_store
 from ..report.figures.paper_figures import FORMATS
 from ..scenarios.scenario_files import load_scenario
-from .study_progress import add_arguments, check, run_with_progress
+from .support.study_progress import add_arguments, check, run_with_progress
 
 _DESCRIPTION = """Vary what section 6.2 leaves open, one parameter at a time, and compare path
 lengths and encountered obstacles with the printed ones: a table, CSV, Markdown and a heat map.
@@ -43,7 +43,7 @@ def _write(directory: Path, rows: Sequence[sensitivity.Row]) -> list[str]:
     """Write CSV, Markdown and heat map; existing files must have the same content."""
     from ..report import style
     from ..report.figure_sheet import to_bytes
-    from ..report.figures.sensitivity import draw
+    from ..report.figures.sensitivity_heat_map import draw
     from ..report.sensitivity_table import to_csv, to_markdown
 
     files = {

@@ -12,14 +12,14 @@ from typing import Any
 
 from ..core.argument_parser import Parser
 from ..core.errors import InputError
-from ..core.outputs import new_run_directory, refuse_existing, write_new
+from ..core.output_files import new_run_directory, refuse_existing, write_new
 from ..evaluation.oracle import solve
-from ..evaluation.sweep.columns import Row, run_row
 from ..evaluation.sweep.explain_run import contact_index, explain
 from ..evaluation.sweep.planner_sandbox import HungError
 from ..evaluation.sweep.read_sweep import ReadSweep, read_sweep
 from ..evaluation.sweep.single_run import CompletedRun, run_one
 from ..evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, own_preset, read_run
+from ..evaluation.sweep.table_columns import Row, run_row
 
 _DESCRIPTION = """Repeat a run of a sweep and explain its outcome.
 

@@ -14,7 +14,7 @@ from ..evaluation.metrics import Result, evaluate
 from ..launcher.run_arguments import RunRequest, add_world_arguments, read_config
 from ..launcher.run_result import show, why_no_success
 from ..scenarios.run_config import Driver, RunConfig
-from ..simulation.simulate import simulate
+from ..simulation.run_episode import simulate
 
 _DESCRIPTION = "Simulate episodes without ROS: same decisions as `mfba run`, no bag."
 _HEAD = "    seed  outcome       length     time  clearance  collisions"
@@ -39,9 +39,9 @@ def main(args: list[str]) -> int:
     _check(parsed)
     config = read_config(parsed, driver=Driver.CORE)
     if config.scenario.robots:
-        from . import fleet
+        from .support import simulate_fleet
 
-        return fleet.simulate(config, parsed.seeds, parsed.out)
+        return simulate_fleet.simulate(config, parsed.seeds, parsed.out)
     if parsed.out is not None:
         from ..launcher.execute_run import execute
 

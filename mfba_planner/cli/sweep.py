@@ -12,23 +12,23 @@ from pathlib import Path
 from typing import Any
 
 from ..core.argument_parser import Parser
-from ..core.options import Scalar, flatten
-from ..core.outputs import new_run_directory, write_same
+from ..core.declared_options import Scalar, flatten
+from ..core.output_files import new_run_directory, write_same
 from ..evaluation.study.compute_chunks import check_workers
 from ..evaluation.suites import suite_names
 from ..evaluation.suites.named_suites import SPEED_MPS
-from ..evaluation.sweep.chunks import chunks_of
-from ..evaluation.sweep.columns import COLUMNS, TIMINGS
 from ..evaluation.sweep.run_sweep import SweepResult, dask_executor, open_store, sweep
+from ..evaluation.sweep.sweep_chunks import chunks_of
 from ..evaluation.sweep.sweep_spec import PATIENCE_S, Setting, SweepSpec, own_preset
 from ..evaluation.sweep.table import write
+from ..evaluation.sweep.table_columns import COLUMNS, TIMINGS
 from ..launcher.set_option import add_set_argument, with_settings
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD
 from ..planning.planner_params import PlannerParams
 from ..planning.planner_registry import PLANNERS
 from ..simulation.planner_observations import NAMES as PERCEPTIONS
-from .study_progress import add_work_arguments, print_status, progress
+from .support.study_progress import add_work_arguments, print_status, progress
 
 _DESCRIPTION = """Run planners in the worlds of a suite and compare them.
 

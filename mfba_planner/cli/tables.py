@@ -10,16 +10,16 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.errors import InputError, OutputError
-from ..core.outputs import new_run_directory, write_new, write_same
+from ..core.output_files import new_run_directory, write_new, write_same
 from ..paper.study.plan import FULL, QUICK
 from ..paper.study.run import open_store
-from ..paper.tables.build import SECTIONS, build, check_sections, plan
-from ..paper.tables.model import Section
+from ..paper.tables.build_tables import SECTIONS, build, check_sections, plan
+from ..paper.tables.table_entries import Section
 from ..report.figures.paper_figures import FIGURES, render
-from ..report.tables import data, html, markdown
+from ..report.tables import html, json_and_csv, markdown
 from ..report.tables.text import Origin
 from ..scenarios.scenario_files import load_scenario
-from .study_progress import add_arguments, check, run_with_progress
+from .support.study_progress import add_arguments, check, run_with_progress
 
 _DESCRIPTION = """Reproduce Tables 1 to 7 and compare each printed number with ours.
 
@@ -78,8 +78,8 @@ def _write_forms(directory: Path, sections: Sequence[Section], origin: Origin) -
     pictures = _figures(origin.quick) if has_all else []
     forms = {
         "tables.md": markdown.page(sections, origin),
-        "tables.csv": data.to_csv(sections),
-        "tables.json": data.to_json(sections, origin),
+        "tables.csv": json_and_csv.to_csv(sections),
+        "tables.json": json_and_csv.to_json(sections, origin),
         "tables.html": html.page(sections, origin, pictures),
     }
     for name, content in forms.items():

@@ -10,18 +10,18 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.errors import BagError, ConfigError
-from ..core.outputs import bag_in
+from ..core.output_files import bag_in
 from ..launcher.set_option import add_set_argument, with_settings
 from ..recording.bag_reader import BagReader
+from ..recording.fleet_topics import NO_NAMESPACE, with_robot_name
 from ..recording.read_episode import read_recording
-from ..recording.robot_topics import NO_NAMESPACE, with_robot_name
 from ..simulation.episode import Episode, Outcome, stamp_of
-from ..simulation.simulate import simulate, simulate_fleet
+from ..simulation.run_episode import simulate, simulate_fleet
 from ..verification.compare_decisions import Divergence, first_divergence, side_by_side
 from ..verification.redecide import is_foreign
 from ..verification.verify_bag import Report, verify_each
-from . import verify_foreign
-from .verify_foreign import print_remarks
+from .support import verify_foreign_bag
+from .support.verify_foreign_bag import print_remarks
 
 
 def main(args: list[str]) -> int:
@@ -38,13 +38,13 @@ def main(args: list[str]) -> int:
     parser.add_argument(
         "--picture", type=Path, metavar="PNG", help="with --set: file to create, with both trails"
     )
-    verify_foreign.add_arguments(parser)
+    verify_foreign_bag.add_arguments(parser)
     parsed = parser.parse(args)
     bag = bag_in(parsed.bag)
     with BagReader(bag) as reader:
         if is_foreign(reader):
-            return verify_foreign.report(bag, parsed)
-    verify_foreign.refuse_arguments(bag, parsed)
+            return verify_foreign_bag.report(bag, parsed)
+    verify_foreign_bag.refuse_arguments(bag, parsed)
     if parsed.picture and not parsed.settings:
         raise ConfigError("--picture: there is one trail only; give --set NAME=VALUE as well")
     reports = verify_each(bag, parsed.robots)

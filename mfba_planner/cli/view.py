@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from .named_episodes import add_paths, named_episodes
+from .support.load_episodes import add_paths, named_episodes
 
 _DESCRIPTION = """Show runs in Rerun's viewer (pip install 'mfba_planner[view]'): the moving world,
 decisions as text, clearance and speed, with playback on sim_time or tick."""

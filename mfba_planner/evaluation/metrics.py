@@ -12,7 +12,7 @@ from itertools import pairwise, zip_longest
 import numpy as np
 
 from ..core.geometry import Pose2D, distance
-from ..core.types import NANO, Decision, Mode
+from ..core.planner_types import NANO, Decision, Mode
 from ..planning.odometry_jump import is_odometry_jump
 from ..simulation.batched_motion import Array, Motion, StepClearances
 from ..simulation.episode import Episode, Outcome

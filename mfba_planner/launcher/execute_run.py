@@ -9,13 +9,13 @@ from contextlib import closing, suppress
 from ..core.errors import BagError, MfbaError
 from ..scenarios.run_config import Driver
 from ..simulation.episode import Episode
-from ..simulation.simulate import simulate
+from ..simulation.run_episode import simulate
 from .console import RunConsole
 from .fleet_result import finish_fleet_run
-from .run import Run
 from .run_arguments import RunRequest
 from .run_directory import RunDirectory
 from .run_result import finish_run
+from .run_state import Run
 from .stop_request import StoppedError, StopRequest
 
 
@@ -65,7 +65,7 @@ def _run_driver(run: Run) -> Episode | None:
     """Run the requested driver; return the episode where no bag is written."""
     config = run.request.config
     if config.driver is Driver.MULTI_PROCESS:
-        from .multi_process import run_multi_process
+        from .multi_process_driver import run_multi_process
 
         run_multi_process(run)
         return None
@@ -85,7 +85,7 @@ def _run_driver(run: Run) -> Episode | None:
 
 
 def _run_in_process(run: Run) -> None:
-    from .in_process import run_in_process
+    from .in_process_driver import run_in_process
     from .ros_domain import private_domain
 
     with private_domain() as domain:

@@ -10,7 +10,7 @@ from ..evaluation.metrics import evaluate
 from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import read_recording
 from ..report.fleet_table import fleet_text, why_no_success
-from .run import Run
+from .run_state import Run
 
 
 def finish_fleet_run(run: Run, failure: str = "") -> None:

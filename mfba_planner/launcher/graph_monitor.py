@@ -16,13 +16,13 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import SetBool, Trigger
 
+from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.from_messages import parse_points, stamp_ns
-from ..recording.robot_topics import NO_NAMESPACE
 from ..ros.endpoints.robot_namespace import below
 from ..ros.interface import topics
 from ..ros.interface.serialized_message import header_stamp_ns
 from ..ros.interface.topics import Topic
-from ..ros.runtime.graph_node import GraphNode
+from ..ros.runtime.base_node import GraphNode
 from ..ros.runtime.polled_subscriptions import PolledSubscriptions
 
 RESEND_S = 0.5  # a response can get lost during discovery

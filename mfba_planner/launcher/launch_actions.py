@@ -13,8 +13,8 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from .robot_launch import NodeStart
-from .simulate_launch import LaunchArgument
+from .robot_launch_description import NodeStart
+from .simulate_launch_description import LaunchArgument
 
 
 def make_description(

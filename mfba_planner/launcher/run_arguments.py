@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..core.argument_parser import Parser
+from ..core.declared_options import override
 from ..core.errors import ConfigError
-from ..core.options import override
-from ..paper import readings
+from ..paper import readings_of_paper
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD, params_for_method
 from ..planning.planner_params import Method
@@ -118,7 +118,7 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
         "--reading",
         metavar="NAME",
         help="interpretation of the paper's path planning: "
-        f"{', '.join(readings.PLANNERS)} (default: {readings.DEFAULT_METHOD})",
+        f"{', '.join(readings_of_paper.PLANNERS)} (default: {readings_of_paper.DEFAULT_METHOD})",
     )
     parser.add_argument(
         "--planner",
@@ -130,16 +130,16 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--swarm",
         metavar="NAME",
-        help=f"interpretation of the paper's eq. 3-10: {', '.join(readings.SWARMS)}",
+        help=f"interpretation of the paper's eq. 3-10: {', '.join(readings_of_paper.SWARMS)}",
     )
     add_set_argument(parser)
 
 
 def read_config(parsed: argparse.Namespace, **more: Any) -> RunConfig:
     """The RunConfig of the arguments, applied as reading, swarm, algorithm, planner, --set."""
-    planner = readings.planner(parsed.reading or readings.DEFAULT_METHOD)
+    planner = readings_of_paper.planner(parsed.reading or readings_of_paper.DEFAULT_METHOD)
     if parsed.swarm:
-        planner = replace(planner, bat=readings.swarm(parsed.swarm))
+        planner = replace(planner, bat=readings_of_paper.swarm(parsed.swarm))
     if parsed.algorithm:
         planner = override(planner, {"bat.algorithm": parsed.algorithm})
     algorithm_1 = any((parsed.algorithm, parsed.reading, parsed.swarm))

@@ -8,8 +8,8 @@ import shutil
 from pathlib import Path
 
 from ..core.errors import OutputError
-from ..core.outputs import new_run_directory
-from ..recording.file_storage import make_directory, remove_empty
+from ..core.output_files import new_run_directory
+from ..recording.atomic_files import make_directory, remove_empty
 
 _MAX_TRIES = 100  # so many launchers may start at once
 

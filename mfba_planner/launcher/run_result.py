@@ -10,11 +10,11 @@ from pathlib import Path
 from ..core.errors import MfbaError
 from ..core.geometry import distance
 from ..evaluation.metrics import Result, evaluate
+from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import read_recording
-from ..recording.robot_topics import NO_NAMESPACE
 from ..simulation.episode import Episode, Outcome
-from .run import Run
+from .run_state import Run
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..core.declared_options import Scalar, flatten, override
 from ..core.geometry import Point, bearing, distance, towards
-from ..core.options import Scalar, flatten, override
 from ..evaluation import statistics
 from ..evaluation.metrics import evaluate
 from ..perception.sensory_vector import SensorParams
@@ -20,7 +20,7 @@ from ..simulation.obstacle_motion import Obstacle
 from ..simulation.run_episode import run
 from ..simulation.scenario import Scenario
 from ..swarm.bat_swarm import Algorithm
-from . import published, readings
+from . import published, readings_of_paper
 from .study.chunk import SampleChunk, Trips, chunks
 from .study.run import Sample
 
@@ -60,7 +60,7 @@ class Reading:
 
 def all_readings(quick: bool = False) -> list[Reading]:
     """`section6`, readings with one difference to it, other sets that fit, and `fig1`."""
-    base = readings.planner("section6")
+    base = readings_of_paper.planner("section6")
     found = [Reading(group="preset", label="section6", planner=base)]
     for group, label, changes, in_quick in _changes():
         if in_quick or not quick:
@@ -68,7 +68,7 @@ def all_readings(quick: bool = False) -> list[Reading]:
             found.append(Reading(group=group, label=label, planner=planner))
     found += [reading for reading in _sensing() if reading.sectors_rad or not quick]
     for algorithm in Algorithm:
-        fig1 = override(readings.planner("fig1"), {"bat.algorithm": algorithm.value})
+        fig1 = override(readings_of_paper.planner("fig1"), {"bat.algorithm": algorithm.value})
         label = f"fig1, {algorithm.value.upper()}"
         found.append(Reading(group="preset", label=label, planner=fig1))
     return sorted(found, key=lambda reading: GROUPS.index(reading.group))

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.declared_options import check, option
 from ..core.geometry import Point, Pose2D
-from ..core.options import check, option
-from ..core.types import NANO, Circle, Scan
+from ..core.planner_types import NANO, Circle, Scan
 
 Array = np.ndarray
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.types import Ranges, Scan
+from ..core.planner_types import Ranges, Scan
 from .sensory_vector import SensorParams, mark_sectors, single_precision
 
 

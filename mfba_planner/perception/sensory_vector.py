@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.declared_options import check, option
 from ..core.errors import InputError
 from ..core.geometry import Point, ray_circle_distance, tangent_half_angle
-from ..core.options import check, option
-from ..core.types import Bits, Ranges
+from ..core.planner_types import Bits, Ranges
 
 TWO_PI = 2.0 * math.pi
 FARTHER = 1.0 + 1e-9  # factor of a distance: surely beyond it in spite of rounding

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, bearing, distance, towards
+from ..core.planner_types import NANO, Bits, Decision, Mode, Observation
 from ..core.random_streams import stream
-from ..core.types import NANO, Bits, Decision, Mode, Observation
 from ..perception.sensory_vector import sensory_vector
 from ..swarm.bat_swarm import BatSwarm, Disc, Vector
 from .gap_vector import gap_heading, gap_vector, nearest_free_gap

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
-from ..core.types import NANO, Bits, Decision, Mode, Observation
+from ..core.planner_types import NANO, Bits, Decision, Mode, Observation
 from ..perception.sensory_vector import SensorParams
 from .mode_transitions import Event, transition
 from .odometry_jump import OdometryJump, with_odometry_jump

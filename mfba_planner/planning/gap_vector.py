@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cache, lru_cache
 
 from ..core.geometry import wrap_angle
-from ..core.types import Bits
+from ..core.planner_types import Bits
 
 TIE_RAD = 1e-9  # angles closer than this count as equal: rounding must not choose the gap
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from ..core.types import Mode
+from ..core.planner_types import Mode
 
 
 class Event(Enum):

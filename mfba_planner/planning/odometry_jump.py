@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 
 from ..core.geometry import Pose2D, distance
-from ..core.types import NANO, Decision, Mode, Observation
+from ..core.planner_types import NANO, Decision, Mode, Observation
 from .planner_params import PlannerParams
 
 CARRIED_OFF = "carried off"

@@ -22,7 +22,7 @@ def params_for_method(
     usual = Method.PAPER if algorithm_1 else DEFAULT_METHOD
     if Method(method or usual) is Method.PAPER:
         return params
-    from .predictive import preset
+    from .predictive_planner import preset
 
     return preset(replace(params, method=Method.PREDICTIVE))
 
@@ -32,7 +32,7 @@ def make_planner(
 ) -> SupervisedPlanner:
     """A new planner of params.method. Raises ConfigError for a negative seed."""
     if params.method is Method.PREDICTIVE:
-        from .predictive import Predictive  # slow to import, and not always needed
+        from .predictive_planner import Predictive  # slow to import, and not always needed
 
         return SupervisedPlanner(Predictive(params, sensor or SensorParams(), seed))
     return supervised_algorithm_1(params, seed)

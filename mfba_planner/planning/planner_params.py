@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from ..core.options import check, option
-from ..core.types import NANO
+from ..core.declared_options import check, option
+from ..core.planner_types import NANO
 from ..swarm.bat_swarm import BatParams
 from .gap_vector import GapHeading
 from .recovery import RecoveryParams

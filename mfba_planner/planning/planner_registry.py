@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
-from ..core.options import did_you_mean
-from ..core.types import PathPlanner
+from ..core.planner_types import PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..swarm.bat_swarm import Algorithm
 from .algorithm_1 import Algorithm1
@@ -18,7 +18,7 @@ from .peers.orca import Orca
 from .peers.straight_line import Straight
 from .peers.vfh import VectorFieldHistogram
 from .planner_params import PlannerParams
-from .predictive import Predictive
+from .predictive_planner import Predictive
 
 Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]
 

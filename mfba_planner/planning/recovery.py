@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from ..core.declared_options import check, option
 from ..core.geometry import wrap_angle
-from ..core.options import check, option
-from ..core.types import Ranges
+from ..core.planner_types import Ranges
 
 SECOND_NS = 1e9
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..core.options import check, option
-from ..core.types import Ranges
+from ..core.declared_options import check, option
+from ..core.planner_types import Ranges
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from ..core.geometry import distance
-from ..core.types import NANO, Observation
+from ..core.planner_types import NANO, Observation
 from .mode_transitions import Event
 from .planner_params import PlannerParams
 

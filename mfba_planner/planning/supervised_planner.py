@@ -8,7 +8,7 @@ from typing import Protocol
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, bearing, distance, towards
-from ..core.types import NANO, Decision, Mode, Observation, PathPlanner
+from ..core.planner_types import NANO, Decision, Mode, Observation, PathPlanner
 from .algorithm_1 import Algorithm1
 from .odometry_jump import is_odometry_jump
 from .planner_params import Method, PlannerParams

@@ -10,9 +10,9 @@ from operator import itemgetter
 
 import numpy as np
 
+from ..core.declared_options import check, option
 from ..core.geometry import Point, towards
-from ..core.options import check, option
-from ..core.types import Circle, Ranges
+from ..core.planner_types import Circle, Ranges
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12

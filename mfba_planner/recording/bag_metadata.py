@@ -10,8 +10,8 @@ from typing import Any
 import yaml
 
 from ..core.errors import BagError
-from . import qos_profiles, yaml_text
-from .qos_profiles import OfferedQos
+from . import bag_qos, yaml_text
+from .bag_qos import OfferedQos
 
 FILE_NAME = "metadata.yaml"
 RECORD_NAME = "rosbag2"
@@ -83,7 +83,7 @@ def _content(bag: BagMetadata) -> dict[str, Any]:
                     "name": topic.name,
                     "type": topic.type_name,
                     "serialization_format": "cdr",
-                    "offered_qos_profiles": qos_profiles.to_list(topic.qos),
+                    "offered_qos_profiles": bag_qos.to_list(topic.qos),
                     "type_description_hash": topic.type_hash,
                 },
                 "message_count": topic.message_count,
@@ -174,7 +174,7 @@ def _topic(item: Mapping[str, Any], source: str) -> BagTopic:
     return BagTopic(
         name=str(topic["name"]),
         type_name=str(topic["type"]),
-        qos=qos_profiles.from_list(topic.get("offered_qos_profiles")),
+        qos=bag_qos.from_list(topic.get("offered_qos_profiles")),
         type_hash=str(topic.get("type_description_hash") or ""),
         message_count=int(item["message_count"]),
     )

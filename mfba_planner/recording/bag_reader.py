@@ -15,7 +15,7 @@ from mcap.records import Attachment, AttachmentIndex, Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from ..core.errors import BagError
-from . import bag_metadata, qos_profiles
+from . import bag_metadata, bag_qos
 from .bag_files import find_bag_files
 from .bag_metadata import BagTopic
 from .mcap_file import McapFile, Piece
@@ -280,7 +280,7 @@ class BagReader:
         if self._metadata is not None:
             listed = next((t for t in self._metadata.topics if t.name == name), listed)
         try:
-            offered = qos_profiles.from_list(channel.metadata.get("offered_qos_profiles"))
+            offered = bag_qos.from_list(channel.metadata.get("offered_qos_profiles"))
         except BagError as error:
             self.problems.append(f"{name}: {str(error).split('; ')[0]}")
             offered = ()

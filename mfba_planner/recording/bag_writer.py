@@ -14,10 +14,10 @@ from mcap.well_known import MessageEncoding, Profile
 from mcap.writer import CompressionType, Writer
 
 from ..core.errors import OutputError
-from . import bag_metadata, file_storage, qos_profiles
+from . import atomic_files, bag_metadata, bag_qos
 from .bag_metadata import BagFile, BagMetadata, BagTopic
+from .bag_qos import OfferedQos
 from .message_definitions import Definition, definition_of
-from .qos_profiles import OfferedQos
 
 CHUNK_BYTES = 512 * 1024
 MAX_CHUNK_AGE_S = 0.8  # the limit is 1 s; 0.2 s are left for a late timer
@@ -61,12 +61,12 @@ class BagWriter:
         self._last_call_ns: int | None = None
         self._empty_since_ns = 0  # steady time at which nothing was pending
         self._end_reason = ""  # why nothing more can be written; "" while open
-        self._made_directories = file_storage.make_directory(self.directory)
+        self._made_directories = atomic_files.make_directory(self.directory)
         try:
-            self._stream = file_storage.WholeWriteFile(self.path)
+            self._stream = atomic_files.WholeWriteFile(self.path)
         except OSError as error:
-            file_storage.remove_empty(self._made_directories)
-            raise file_storage.creation_error(self.directory, error) from error
+            atomic_files.remove_empty(self._made_directories)
+            raise atomic_files.creation_error(self.directory, error) from error
         try:
             # This class ends chunks, by size and age; mcap's own limit must never apply.
             self._writer = Writer(
@@ -80,7 +80,7 @@ class BagWriter:
         except BaseException as error:
             self.discard()
             if isinstance(error, OSError):
-                raise file_storage.creation_error(self.directory, error) from error
+                raise atomic_files.creation_error(self.directory, error) from error
             raise
 
     def __enter__(self) -> BagWriter:
@@ -135,7 +135,7 @@ class BagWriter:
                 MessageEncoding.CDR,
                 self._schema_ids[type_name],
                 {
-                    "offered_qos_profiles": qos_profiles.to_text(profiles),
+                    "offered_qos_profiles": bag_qos.to_text(profiles),
                     "topic_type_hash": definition.type_hash,
                 },
             )
@@ -236,7 +236,7 @@ class BagWriter:
             self._writer.finish()
             self._stream.close()
             text = bag_metadata.dump_file(self._content())
-            file_storage.write_atomically(self.directory / bag_metadata.FILE_NAME, text)
+            atomic_files.write_atomically(self.directory / bag_metadata.FILE_NAME, text)
         self._end()
 
     def discard(self) -> None:
@@ -245,7 +245,7 @@ class BagWriter:
         for path in (self.path, self.directory / bag_metadata.FILE_NAME):
             with suppress(OSError):
                 path.unlink()
-        file_storage.remove_empty(self._made_directories)
+        atomic_files.remove_empty(self._made_directories)
 
     def _content(self) -> BagMetadata:
         file = BagFile(

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.errors import FrameError, InputError
 from ..core.geometry import Point, Pose2D, yaw_from_quaternion
-from ..core.types import Decision, Mode, Ranges, RefusalReason, Scan
+from ..core.planner_types import Decision, Mode, Ranges, RefusalReason, Scan
 from ..perception.sensory_vector import blind
 from ..simulation.differential_drive import command
 from ..simulation.robot_model import Base

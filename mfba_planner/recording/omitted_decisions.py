@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TextIO
 
-from .robot_topics import with_robot_name
+from .fleet_topics import with_robot_name
 
 
 def omission_text(stamps: Collection[int], topics: Collection[str]) -> str:

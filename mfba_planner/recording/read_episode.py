@@ -11,17 +11,17 @@ from typing import NamedTuple
 
 from ..core.errors import BagError, InputError
 from ..core.geometry import Pose2D
-from ..core.types import Decision
+from ..core.planner_types import Decision
 from ..evaluation.metrics import MetricsAccumulator, Result, evaluate
 from ..simulation.decision_digest import Digest, digest
 from ..simulation.episode import Episode
 from ..simulation.fleet import scenarios_with_others
 from ..simulation.scenario import Scenario
 from .bag_reader import BagReader
-from .decisions import rising_decisions, stream_decisions
+from .decisions_with_sectors import rising_decisions, stream_decisions
+from .fleet_topics import NO_NAMESPACE, messages_by_robot, robot_topic, select_robots
 from .from_messages import robot_pose, stamp_ns
-from .robot_topics import NO_NAMESPACE, messages_by_robot, robot_topic, select_robots
-from .run_setup import read_setup, read_setups
+from .run_parameters import read_setup, read_setups
 
 TRUTH = "/ground_truth"
 

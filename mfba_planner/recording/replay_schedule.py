@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ..core.errors import ConfigError
+from .bag_qos import OfferedQos
 from .bag_reader import BagReader
-from .qos_profiles import OfferedQos
 
 UNKNOWN_DEPTH = 1000  # messages; rosbag2 records depth 0 if the middleware does not report it
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
-from ..core.types import NANO
+from ..core.planner_types import NANO
 from ..perception.sensory_vector import bits_text
 from .bag_reader import BagReader
-from .decisions import RecordedDecision, rising_decisions
-from .robot_topics import NO_NAMESPACE
+from .decisions_with_sectors import RecordedDecision, rising_decisions
+from .fleet_topics import NO_NAMESPACE
 
 Row = dict[str, Any]
 

@@ -21,7 +21,7 @@ from . import format_values, legend, style
 from .draw_scene import draw_ends, draw_walls
 from .draw_tick import draw_obstacle, draw_robot
 from .figure_sheet import Sheet
-from .html.data import obstacle_names, world_name
+from .html.page_data import obstacle_names, world_name
 from .run_events import closest_passes, is_finite
 from .view_bounds import View, choose_view, fitted
 

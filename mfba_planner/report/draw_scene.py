@@ -19,7 +19,7 @@ from matplotlib.patches import Circle, FancyArrowPatch, Rectangle, Wedge
 from matplotlib.patheffects import withStroke
 
 from mfba_planner.core.geometry import Point, bearing, distance, towards
-from mfba_planner.core.types import Bits, Decision, Mode
+from mfba_planner.core.planner_types import Bits, Decision, Mode
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle, center_at
 

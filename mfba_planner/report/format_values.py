@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.evaluation.metrics import Result
 from mfba_planner.simulation.episode import Episode, Outcome
 

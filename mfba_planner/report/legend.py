@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 
 from . import format_values, style
 from .draw_scene import kinds

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.core.outputs import refuse_existing
-from mfba_planner.core.types import Decision, Mode
+from mfba_planner.core.output_files import refuse_existing
+from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.simulation.batched_motion import Motion
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.obstacle_motion import velocity_at
 
 from . import format_values, style
-from .html.data import clearances, in_one_scene, obstacle_names, speeds
+from .html.page_data import clearances, in_one_scene, obstacle_names, speeds
 from .sector_ring import ring_of
 
 _GREY, _DARK = style.FAINT, style.QUIET

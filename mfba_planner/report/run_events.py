@@ -10,7 +10,7 @@ from itertools import groupby
 import numpy as np
 
 from mfba_planner.core.geometry import Point, distance
-from mfba_planner.core.types import Decision, Mode
+from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.evaluation.metrics import steps_driven, tick_clearances
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, bounce_times, center_at

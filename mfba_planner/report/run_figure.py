@@ -8,7 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from mfba_planner.core.outputs import write_new
+from mfba_planner.core.output_files import write_new
 from mfba_planner.evaluation.metrics import Result, evaluate
 from mfba_planner.simulation.episode import Episode
 

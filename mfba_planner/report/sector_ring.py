@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..core.types import Bits
+from ..core.planner_types import Bits
 from ..planning.gap_vector import GapHeading, gap_heading
 from ..simulation.episode import Episode
 

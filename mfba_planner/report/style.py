@@ -10,7 +10,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 from typing import Any
 
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 
 BLACK = "#000000"
 ORANGE = "#E69F00"

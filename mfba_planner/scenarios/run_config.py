@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..core.declared_options import Scalar, check, flatten, option
 from ..core.errors import ConfigError
 from ..core.geometry import Pose2D
-from ..core.options import Scalar, check, flatten, option
-from ..core.types import NANO
+from ..core.planner_types import NANO
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..simulation.fleet import robot_seed, scenarios_with_others
 from ..simulation.scenario import Scenario
-from .plain_data import scenario_to_json
+from .scenario_json import scenario_to_json
 
 Parameters = dict[str, dict[str, Any]]
 

@@ -9,11 +9,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
-from ..core.options import did_you_mean
-from ..core.resources import scenario_names, scenario_path
+from ..core.shipped_files import scenario_names, scenario_path
 from ..simulation.scenario import Scenario
-from .plain_data import EXAMPLE, UnusualError, as_written
+from .scenario_json import EXAMPLE, UnusualError, as_written
 
 
 def load_scenario(source: str) -> Scenario:

@@ -14,11 +14,11 @@ from typing import Annotated, Any
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
-from ..core.options import did_you_mean
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
-from .plain_data import EXAMPLE, LIMIT, parse_robot
+from .scenario_json import EXAMPLE, LIMIT, parse_robot
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
 _Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=LIMIT)]

@@ -20,7 +20,7 @@ import math
 import struct
 from collections.abc import Iterable
 
-from ..core.types import Decision
+from ..core.planner_types import Decision
 
 HEAD = b"mfba decisions 1\n"
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from ..core.geometry import Pose2D
-from ..core.types import NANO, Decision
+from ..core.planner_types import NANO, Decision
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from .scenario import Scenario

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, bearing, distance, towards
-from ..core.types import NANO, Decision, PathPlanner
+from ..core.planner_types import NANO, Decision, PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import supervised_algorithm_1

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ..core.geometry import Point, distance
-from ..core.types import NANO
+from ..core.planner_types import NANO
 from .batched_motion import Array, Motion
 
 AHEAD_TICKS = 64  # whose centres are computed at once; the paper's trip of 17 m has 57

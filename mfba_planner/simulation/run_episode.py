@@ -6,13 +6,15 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import TypeVar
 
-from ..core.types import Observation, PathPlanner
+from ..core.planner_types import Observation, PathPlanner
 from ..perception.sensory_vector import SensorParams
+from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import supervised_algorithm_1
 from .differential_drive import command
 from .episode import Episode, Outcome
-from .planner_observations import Observe, observe_sectors
+from .fleet import Fleet, run_fleet
+from .planner_observations import Observe, observe_scan, observe_sectors
 from .scenario import Scenario
 from .world import World
 
@@ -90,3 +92,43 @@ def run_to_end(generator: Generator[object, None, T]) -> T:
         except StopIteration as end:
             result: T = end.value
             return result
+
+
+def simulate(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams,
+    sensor: SensorParams,
+    seed: int,
+    go_on: Callable[[World], bool] = lambda _: True,
+) -> Episode:
+    """simulation.run_episode.run with the planner of planner.method."""
+    return run(
+        scenario,
+        planner=planner,
+        sensor=sensor,
+        seed=seed,
+        go_on=go_on,
+        path_planner=make_planner(planner, sensor, seed),
+        observe=observe_scan if planner.tracks_scan else observe_sectors,
+    )
+
+
+def simulate_fleet(
+    scenario: Scenario,
+    *,
+    planner: PlannerParams,
+    sensor: SensorParams,
+    seed: int,
+    go_on: Callable[[Fleet], bool] = lambda _: True,
+) -> tuple[Episode, ...]:
+    """simulation.fleet.run_fleet with a planner of planner.method for every robot."""
+    return run_fleet(
+        scenario,
+        planner=planner,
+        sensor=sensor,
+        seed=seed,
+        go_on=go_on,
+        path_planner=lambda child: make_planner(planner, sensor, child),
+        observe=observe_scan if planner.tracks_scan else observe_sectors,
+    )

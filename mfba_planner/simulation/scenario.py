@@ -9,7 +9,7 @@ from itertools import combinations, pairwise
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, distance
-from ..core.types import ROBOT_RADIUS_M
+from ..core.planner_types import ROBOT_RADIUS_M
 from .obstacle_motion import Obstacle, Walls, center_at
 from .robot_model import Robot
 

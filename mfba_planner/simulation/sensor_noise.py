@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.geometry import Pose2D, pose_as_in_message
-from ..core.types import NANO, Scan
+from ..core.planner_types import NANO, Scan
 from .obstacle_motion import Walls
 from .robot_model import Robot
 from .simulated_lidar import limited, scan_at

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.geometry import Point, Pose2D
-from ..core.types import Scan
+from ..core.planner_types import Scan
 from .obstacle_motion import Walls
 from .robot_model import Lidar
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, distance
-from ..core.types import NANO
+from ..core.planner_types import NANO
 from .batched_motion import Motion
 from .differential_drive import Speeds, apply_command
 from .episode import Outcome, stamp_of

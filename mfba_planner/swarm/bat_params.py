@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from ..core.declared_options import check, option
 from ..core.errors import ConfigError
-from ..core.options import check, option
 
 
 class Algorithm(Enum):

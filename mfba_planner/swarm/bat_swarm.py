@@ -23,7 +23,7 @@ from .bat_params import (
     Velocity,
     Walk,
 )
-from .invalid_values import Failures
+from .objective_failures import Failures
 from .search_region import Box, Disc, Region, Vector
 from .swarm_iteration import BatMotion, Pair
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..core.types import Decision
+from ..core.planner_types import Decision
 from ..simulation.decision_digest import canonical
 
 

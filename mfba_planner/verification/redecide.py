@@ -12,14 +12,15 @@ from typing import Any
 
 from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point, Pose2D
-from ..core.types import Decision, Ranges, RefusalReason, observe
+from ..core.planner_types import Decision, Ranges, RefusalReason, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
-from ..recording.decisions import DECISION, SECTORS, robots_with_decisions
+from ..recording.decisions_with_sectors import DECISION, SECTORS, robots_with_decisions
 from ..recording.file_integrity import check_data
+from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.from_messages import (
     goal_point,
     laser_scan,
@@ -27,7 +28,6 @@ from ..recording.from_messages import (
     stamp_ns,
     value_or_refusal,
 )
-from ..recording.robot_topics import NO_NAMESPACE
 from ..simulation.decision_digest import digest
 from .lidar_extrinsics import StaticFrames
 

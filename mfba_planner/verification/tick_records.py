@@ -11,10 +11,10 @@ from typing import Any
 from ..core.errors import InputError
 from ..core.geometry import Point
 from ..recording.bag_reader import BagReader, DecodedMessage
-from ..recording.decisions import DECISION, SECTORS, ranges_of, require_decisions
+from ..recording.decisions_with_sectors import DECISION, SECTORS, ranges_of, require_decisions
+from ..recording.fleet_topics import messages_by_robot
 from ..recording.from_messages import goal_point, stamp_ns, waypoint_points
 from ..recording.omitted_decisions import omission_text
-from ..recording.robot_topics import messages_by_robot
 
 ODOM, OBSTACLES, VECTOR, SCAN = "/odom", "/obstacles", "/sensory_vector", "/scan"
 GOAL, WAYPOINTS = "/goal_pose", "/waypoints"

@@ -13,12 +13,13 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..core.types import Decision, Mode, Observation, observe
+from ..core.planner_types import Decision, Mode, Observation, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import sense_circles, sensory_vector
 from ..planning.planner_factory import make_planner
 from ..recording.bag_reader import BagReader
 from ..recording.file_integrity import check_data
+from ..recording.fleet_topics import NO_NAMESPACE, select_robots
 from ..recording.from_messages import (
     body_velocity,
     decision_field,
@@ -30,8 +31,7 @@ from ..recording.from_messages import (
     velocity,
 )
 from ..recording.from_messages import decision as read_decision
-from ..recording.robot_topics import NO_NAMESPACE, select_robots
-from ..recording.run_setup import Setup, read_setup, read_setups
+from ..recording.run_parameters import Setup, read_setup, read_setups
 from ..simulation.decision_digest import digest
 from .compare_decisions import Divergence, first_divergence
 from .tick_records import (

@@ -17,8 +17,8 @@ from mfba_planner import cli
 from mfba_planner.cli import animate
 from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.report.result_json import result_to_dict, write_result
-from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.run_episode import run
 
 Capture = pytest.CaptureFixture[str]

@@ -16,11 +16,11 @@ from mfba_planner import cli
 from mfba_planner.cli.sweep import command_line
 from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
-from mfba_planner.evaluation.sweep import chunks as sweep_chunks
+from mfba_planner.evaluation.sweep import sweep_chunks as sweep_chunks
 from mfba_planner.evaluation.sweep.run_sweep import sweep
 from mfba_planner.evaluation.sweep.sweep_spec import Setting, SweepSpec
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.read_episode import read_episode
 
 Capture = pytest.CaptureFixture[str]

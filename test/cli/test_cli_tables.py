@@ -24,9 +24,9 @@ from waiting import wait_until
 
 from mfba_planner import __version__, cli
 from mfba_planner.entry_points import run_and_return_exit_code
-from mfba_planner.paper import doubts, published
-from mfba_planner.paper.readings import PLANNERS
-from mfba_planner.paper.tables.model import Verdict
+from mfba_planner.paper import impossible_numbers, published
+from mfba_planner.paper.readings_of_paper import PLANNERS
+from mfba_planner.paper.tables.table_entries import Verdict
 from mfba_planner.report.tables import html
 from mfba_planner.report.tables.text import Origin
 
@@ -70,7 +70,7 @@ def test_every_printed_number_has_a_verdict_and_a_reason(made: Any) -> None:
         if printed.place in ("Table 3", "Table 5", "Table 7"):
             assert number["why"]
     assert {key for key, n in found.items() if n["verdict"] == Verdict.IMPOSSIBLE.value} == set(
-        doubts.IMPOSSIBLE
+        impossible_numbers.IMPOSSIBLE
     )
 
 

@@ -11,7 +11,7 @@ from report_readers import rows_of
 from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
 from mfba_planner.launcher.run_arguments import read_request
-from mfba_planner.report.html.data import clearances
+from mfba_planner.report.html.page_data import clearances
 from mfba_planner.report.rerun_viewer import save
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from project import ROOT
 
-from mfba_planner.paper.readings import SWARMS
+from mfba_planner.paper.readings_of_paper import SWARMS
 
 PAGE = (ROOT / "docs/optimizer.md").read_text(encoding="utf-8")
 

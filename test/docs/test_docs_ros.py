@@ -6,10 +6,10 @@ import re
 import pytest
 from project import ROOT
 
-from mfba_planner.core.options import walk
+from mfba_planner.core.declared_options import walk
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.recovery import RecoveryParams, longest_s
-from mfba_planner.ros.node_parameters import PlannerSettings, WorldSimSettings
+from mfba_planner.ros.node_settings import PlannerSettings, WorldSimSettings
 
 PAGE = (ROOT / "docs/ros.md").read_text(encoding="utf-8")
 

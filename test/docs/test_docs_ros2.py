@@ -15,7 +15,7 @@ import yaml
 from ros2_session import KINDS, TIMEOUT_S, Session, holds, kind_of
 from shown_commands import PAGES, ROOT
 
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.scenarios.run_config import RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 
@@ -23,7 +23,7 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 MENTIONED = {
     "ros2 bag": "recording/test_bag_writer.py",
     "ros2 bag info": "recording/test_bag_metadata.py",
-    "ros2 bag play": "recording/test_qos_profiles.py",
+    "ros2 bag play": "recording/test_bag_qos.py",
     "ros2 bag record": "recording/test_bag_reader.py",
     "ros2 pkg prefix mfba_planner": "ros/test_viewer_layouts.py",
 }

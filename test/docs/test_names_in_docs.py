@@ -86,8 +86,8 @@ def test_names_are_found_and_wrong_ones_refused() -> None:
     assert sum(len(DOTTED.findall(text)) for text in TEXTS.values()) > 10
     assert sum(len(IN_BACKTICKS.findall(text)) for text in TEXTS.values()) > 20
     assert sum(len(SYMBOL.findall(text)) for text in TEXTS.values()) > 10
-    assert resolves("mfba_planner.core.types.PathPlanner")
-    assert not resolves("mfba_planner.core.types.Absent")
+    assert resolves("mfba_planner.core.planner_types.PathPlanner")
+    assert not resolves("mfba_planner.core.planner_types.Absent")
     assert not resolves("mfba_planner.absent.types")
     assert exists("swarm/bat_swarm.py")
     assert not exists("core/bat_swarm.py")

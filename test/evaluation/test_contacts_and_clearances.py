@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trip_samples import SECOND, post, trip
 
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.evaluation import metrics
 from mfba_planner.evaluation.metrics import MetricsAccumulator, assess, evaluate, run_motion
 from mfba_planner.planning.planner_params import PlannerParams

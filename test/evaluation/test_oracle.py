@@ -13,7 +13,6 @@ from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.oracle import Certificate, Solution, inspect, solve
-from mfba_planner.evaluation.oracle.independent_check import clearance, pieces
 from mfba_planner.evaluation.oracle.infeasibility_proof import ReachParams, unreachable
 from mfba_planner.evaluation.oracle.lattice_search import (
     LatticeParams,
@@ -21,6 +20,7 @@ from mfba_planner.evaluation.oracle.lattice_search import (
     _free_steps,
     lattice_paths,
 )
+from mfba_planner.evaluation.oracle.path_check import clearance, pieces
 from mfba_planner.evaluation.oracle.path_refinement import refine
 from mfba_planner.evaluation.oracle.polyline import FAR_M, gaps, lengths, pair_gaps, path_gaps
 from mfba_planner.evaluation.oracle.solution import Waypoint
@@ -28,12 +28,12 @@ from mfba_planner.evaluation.oracle.tangent_search import SearchParams
 from mfba_planner.evaluation.suites import suite
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.constant_velocity_segments import uniform_segments
 from mfba_planner.simulation.contact import step_clearances
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls, center_at
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
-from mfba_planner.simulation.uniform_segments import uniform_segments
 
 ROOM = Walls(lower_m=(0.0, 0.0), upper_m=(12.0, 12.0))
 V = 0.8

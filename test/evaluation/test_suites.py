@@ -16,13 +16,13 @@ from mfba_planner.evaluation.suites import suite, suite_names
 from mfba_planner.evaluation.suites.adversarial_worlds import FAMILIES, adversarial_obstacles
 from mfba_planner.evaluation.suites.random_crowds import CrowdParams, Motion, crowd
 from mfba_planner.evaluation.suites.survivability import first_contact_s, survivability
-from mfba_planner.evaluation.suites.trip import Trip
-from mfba_planner.scenarios.plain_data import scenario_to_json
+from mfba_planner.evaluation.suites.task_geometry import Trip
 from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.scenarios.scenario_json import scenario_to_json
+from mfba_planner.simulation.constant_velocity_segments import uniform_segments
 from mfba_planner.simulation.contact import step_clearances
 from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls, center_at
 from mfba_planner.simulation.scenario import Scenario
-from mfba_planner.simulation.uniform_segments import uniform_segments
 
 # centre, speed and heading of the first obstacle of random-10, world 0
 GOLDEN = (7.269229725556283, 2.5850024987816624, 0.2851093287992198, -3.0053334499216913)

@@ -16,15 +16,13 @@ import pytest
 from pyarrow import parquet
 
 from mfba_planner.core.errors import ConfigError, OutputError
-from mfba_planner.core.types import Observation
+from mfba_planner.core.planner_types import Observation
 from mfba_planner.evaluation.metrics import assess
 from mfba_planner.evaluation.oracle import solve
 from mfba_planner.evaluation.study.chunk_store import code_digest
 from mfba_planner.evaluation.suites import suite
 from mfba_planner.evaluation.suites.survivability import survivability
-from mfba_planner.evaluation.sweep import chunks, single_run, worker
-from mfba_planner.evaluation.sweep.chunks import chunks_of, make
-from mfba_planner.evaluation.sweep.columns import COLUMNS, TIMINGS, Row
+from mfba_planner.evaluation.sweep import single_run, sweep_chunks, worker
 from mfba_planner.evaluation.sweep.run_sweep import (
     PACKAGES,
     SweepResult,
@@ -38,8 +36,10 @@ from mfba_planner.evaluation.sweep.single_run import (
     run_together,
 )
 from mfba_planner.evaluation.sweep.summary import comparisons, planner_summaries, versus
+from mfba_planner.evaluation.sweep.sweep_chunks import chunks_of, make
 from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, read_run
 from mfba_planner.evaluation.sweep.table import sorted_hash, to_csv, to_parquet, write
+from mfba_planner.evaluation.sweep.table_columns import COLUMNS, TIMINGS, Row
 from mfba_planner.evaluation.sweep.worker import Lost, Worker, run_in_worker
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
@@ -62,8 +62,8 @@ def small() -> SweepResult:
 @pytest.fixture
 def tiny_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many chunks of few runs; they are made in the parent process."""
-    monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 2)
-    monkeypatch.setattr(chunks, "WORLDS_AT_ONCE", 2)
+    monkeypatch.setattr(sweep_chunks, "RUNS_AT_ONCE", 2)
+    monkeypatch.setattr(sweep_chunks, "WORLDS_AT_ONCE", 2)
 
 
 def test_every_run_has_one_row_and_rows_are_sorted(small: SweepResult) -> None:
@@ -162,7 +162,7 @@ def test_runs_of_a_lost_batch_are_run_one_by_one(
     monkeypatch: pytest.MonkeyPatch, lost: Any
 ) -> None:
     plain = sweep(spec_of(planners=("paper",)))
-    monkeypatch.setattr(chunks, "make", lost)
+    monkeypatch.setattr(sweep_chunks, "make", lost)
     again = sweep(spec_of(planners=("paper",), setting=Setting(patience_s=4.0)))
     assert again.hash == plain.hash
     assert all(row["decision_us"] > 0.0 for row in again.timings), "each was a single run"
@@ -267,7 +267,7 @@ def test_a_planner_that_cannot_be_made_fails() -> None:
 def test_a_planner_that_hangs_or_dies_loses_only_its_run(
     planner: str, failure: str, workers: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(chunks, "RUNS_AT_ONCE", 4)
+    monkeypatch.setattr(sweep_chunks, "RUNS_AT_ONCE", 4)
     spec = spec_of(
         planners=(f"faulty_planners:{planner}",),
         worlds=2,

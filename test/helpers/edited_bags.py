@@ -8,11 +8,14 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message, serialize_message
 
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import claim_domain
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
-from mfba_planner.recording.configuration import attach_configuration, read_configuration
+from mfba_planner.recording.configuration_attachment import (
+    attach_configuration,
+    read_configuration,
+)
 from mfba_planner.recording.merge_by_time import RawMessage
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.qos_conversion import offered

@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from mfba_planner.core.types import Decision, Observation
+from mfba_planner.core.planner_types import Decision, Observation
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.peers.straight_line import Straight
 from mfba_planner.planning.planner_params import PlannerParams

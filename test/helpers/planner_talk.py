@@ -10,7 +10,7 @@ from ros_graph import Graph
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Mode, Ranges
+from mfba_planner.core.planner_types import Mode, Ranges
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import odometry_msg, pose_stamped_msg, sectors_msg

@@ -20,9 +20,9 @@ from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float64MultiArray, String
 
+from mfba_planner.recording.bag_qos import OfferedQos
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.message_definitions import definition_of
-from mfba_planner.recording.qos_profiles import OfferedQos
 
 FOREIGN = TEST_DATA / "rosbag2_foreign_scan"
 SECOND = 1_000_000_000

@@ -13,7 +13,7 @@ from rclpy.qos import QoSProfile
 from waiting import spin_until
 
 from mfba_planner.ros.interface.topics import Topic
-from mfba_planner.ros.runtime.graph_node import GraphNode
+from mfba_planner.ros.runtime.base_node import GraphNode
 from mfba_planner.ros.runtime.spin_node import make_executor
 
 N = TypeVar("N", bound=GraphNode)

@@ -4,7 +4,7 @@
 from typing import Any
 
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.types import Decision, Mode
+from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle

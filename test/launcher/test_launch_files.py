@@ -14,18 +14,18 @@ from launch_standin import declared, launched
 from project import ROOT
 from ros_graph import Graph
 
+from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import ConfigError, InputError
-from mfba_planner.core.options import flatten
-from mfba_planner.launcher.robot_launch import (
+from mfba_planner.launcher.robot_launch_description import (
     PLANNER_ARGUMENTS,
     REPLAY_ARGUMENTS,
     replay_nodes,
     robot_nodes,
 )
-from mfba_planner.launcher.simulate_launch import ARGUMENTS, launch_parameters
+from mfba_planner.launcher.simulate_launch_description import ARGUMENTS, launch_parameters
 from mfba_planner.planning.planner_params import Method, PlannerParams
-from mfba_planner.planning.predictive import preset
-from mfba_planner.ros.node_parameters import Source
+from mfba_planner.planning.predictive_planner import preset
+from mfba_planner.ros.node_settings import Source
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.replaying.replay_arguments import parse

@@ -7,16 +7,16 @@ from pathlib import Path
 import pytest
 from launched_programs import Program, complete
 
-from mfba_planner.core.options import override
+from mfba_planner.core.declared_options import override
 from mfba_planner.launcher.run_arguments import read_request
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.configuration_attachment import read_configuration
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios import scenario_files
 from mfba_planner.simulation import episode, run_episode
-from mfba_planner.simulation.simulate import simulate
+from mfba_planner.simulation.run_episode import simulate
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

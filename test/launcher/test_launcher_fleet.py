@@ -17,16 +17,16 @@ from mfba_planner.launcher import node_processes
 from mfba_planner.launcher.run_arguments import MOST_ROBOTS, read_request
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.configuration_attachment import read_configuration
 from mfba_planner.recording.read_episode import read_recording
-from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.run_config import OF_ROBOT, Parameters
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import run_fleet
 from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.run_episode import simulate_fleet
 from mfba_planner.simulation.scenario import FleetRobot, Scenario
-from mfba_planner.simulation.simulate import simulate_fleet
 
 PROCESSES = ["--driver", "multi-process", "--no-picture", "--out", "run"]
 PAPER = ["--planner", "paper"]

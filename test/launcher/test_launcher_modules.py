@@ -17,20 +17,19 @@ from rclpy.context import Context
 from rclpy.node import Node
 from waiting import wait_until
 
+from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import GraphError, OutputError
-from mfba_planner.core.options import flatten
-from mfba_planner.launcher import node_process
+from mfba_planner.launcher import node_processes
 from mfba_planner.launcher.console import RunConsole
-from mfba_planner.launcher.node_process import NodeProcess
-from mfba_planner.launcher.node_processes import NodeProcesses, parameters_yaml
+from mfba_planner.launcher.node_processes import NodeProcess, NodeProcesses, parameters_yaml
 from mfba_planner.launcher.ros_domain import DOMAINS, claim_domain, private_domain, require_network
 from mfba_planner.launcher.run_arguments import read_request
 from mfba_planner.launcher.run_directory import RunDirectory
 from mfba_planner.launcher.set_option import option_rows
 from mfba_planner.launcher.stop_request import StoppedError, StopRequest
-from mfba_planner.paper import readings
+from mfba_planner.paper import readings_of_paper
 from mfba_planner.planning.planner_params import Method, PlannerParams
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.swarm.bat_swarm import Algorithm
@@ -54,8 +53,8 @@ def test_request_applies_readings_then_algorithm_then_single_options() -> None:
         "launcher",
     )
     planner = request.config.planner
-    assert planner.step_length_m == readings.planner("fig1").step_length_m
-    assert planner.bat.population == readings.swarm("table3").population
+    assert planner.step_length_m == readings_of_paper.planner("fig1").step_length_m
+    assert planner.bat.population == readings_of_paper.swarm("table3").population
     assert planner.bat.algorithm is Algorithm.BA
     assert (planner.bat.rho, planner.speed_mps, planner.swarm.value) == (7.0, 1.0, "fresh")
     assert request.config.sensor.sectors == 16
@@ -253,7 +252,7 @@ def programs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Child programs that start faster than nodes."""
     boot = "import sys\nprograms = {programs!r}\nexec(programs[{program!r}])"
     monkeypatch.setattr(
-        node_process,
+        node_processes,
         "_BOOT",
         boot.replace("{programs!r}", repr(PROGRAMS).replace("{", "{{").replace("}", "}}")),
     )

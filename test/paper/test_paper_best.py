@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.paper import readings
-from mfba_planner.paper.functions import FUNCTIONS
+from mfba_planner.paper import readings_of_paper
+from mfba_planner.paper.benchmark_functions import FUNCTIONS
 from mfba_planner.swarm.bat_swarm import BatParams
 from mfba_planner.swarm.batched_swarms import minimize_batch
 
@@ -32,7 +32,7 @@ def means(params: BatParams) -> list[float]:
 
 @pytest.fixture(scope="module")
 def best() -> list[float]:
-    return means(readings.swarm("best"))
+    return means(readings_of_paper.swarm("best"))
 
 
 @pytest.mark.parametrize("name", OTHERS)
@@ -47,10 +47,10 @@ def test_best_reaches_the_minimum_of_each_function(best: list[float]) -> None:
 
 
 def test_best_has_the_budget_of_the_others() -> None:
-    params = readings.swarm("best")
+    params = readings_of_paper.swarm("best")
     assert (params.population, params.iterations) == (40, 200)
 
 
 def test_a_misspelt_reading_gets_a_suggestion() -> None:
     with pytest.raises(ConfigError, match=r"^'bets': unknown swarm reading; did you mean 'best'"):
-        readings.swarm("bets")
+        readings_of_paper.swarm("bets")

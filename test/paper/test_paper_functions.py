@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.paper.functions import FUNCTIONS, Function
+from mfba_planner.paper.benchmark_functions import FUNCTIONS, Function
 
 ALL = [pytest.param(function, id=key) for key, function in FUNCTIONS.items()]
 FLAT = {"F2", "F3", "F4"}  # only two dimensions

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.paper import doubts, published
-from mfba_planner.paper.functions import FUNCTIONS
+from mfba_planner.paper import impossible_numbers, published
+from mfba_planner.paper.benchmark_functions import FUNCTIONS
 from mfba_planner.paper.published import BY_KEY, values
 
 
@@ -60,7 +60,7 @@ def test_values_are_those_of_the_texts() -> None:
 
 
 def test_the_impossible_numbers_are_exactly_these() -> None:
-    assert set(doubts.IMPOSSIBLE) == {
+    assert set(impossible_numbers.IMPOSSIBLE) == {
         "Table 3/F4 MFBA/sd",
         "Table 3/F6 BA/best",
         "Table 3/F6 MFBA/best",
@@ -69,7 +69,7 @@ def test_the_impossible_numbers_are_exactly_these() -> None:
         "Table 7/BA/standard deviation",
         "Table 7/MFBA/standard deviation",
     }
-    assert set(doubts.CONTRADICTED) == {
+    assert set(impossible_numbers.CONTRADICTED) == {
         "Section 6.2, case 1/MFBA/length",
         "Table 5/MFBA/maximum",
         "Section 6.2/optimum/length",
@@ -128,8 +128,8 @@ def test_every_sample_is_within_the_bounds(sample: list[float]) -> None:
         return
     n = len(sample)
     slack = 1e-9 * (high - low) + 1e-9
-    assert np.std(sample, ddof=1) <= doubts.largest_sd(n, low, high, mean) + slack
-    assert np.std(sample) >= doubts.smallest_sd(n, low, high, mean) - slack
+    assert np.std(sample, ddof=1) <= impossible_numbers.largest_sd(n, low, high, mean) + slack
+    assert np.std(sample) >= impossible_numbers.smallest_sd(n, low, high, mean) - slack
 
 
 @given(st.integers(3, 30), st.floats(0.05, 0.95))
@@ -137,6 +137,8 @@ def test_the_bounds_are_reached(n: int, share: float) -> None:
     at_high = max(1, min(n - 1, round(share * n)))
     ends = [0.0] * (n - at_high) + [1.0] * at_high
     mean = at_high / n
-    assert doubts.largest_sd(n, 0.0, 1.0, mean) == pytest.approx(np.std(ends, ddof=1))
+    assert impossible_numbers.largest_sd(n, 0.0, 1.0, mean) == pytest.approx(np.std(ends, ddof=1))
     middle = [0.0, 1.0] + [share] * (n - 2)
-    assert doubts.smallest_sd(n, 0.0, 1.0, float(np.mean(middle))) == pytest.approx(np.std(middle))
+    assert impossible_numbers.smallest_sd(n, 0.0, 1.0, float(np.mean(middle))) == pytest.approx(
+        np.std(middle)
+    )

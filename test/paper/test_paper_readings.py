@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
+from mfba_planner.core.declared_options import override
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.core.options import override
 from mfba_planner.evaluation.metrics import Result, evaluate
-from mfba_planner.paper import readings
+from mfba_planner.paper import readings_of_paper
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.run_episode import run
@@ -34,7 +34,9 @@ def ten_runs(lengths: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize(("reading", "case"), PRINTED)
 def test_intervals_of_ten_runs_contain_the_printed_row(reading: str, case: str) -> None:
-    params = override(readings.planner(reading), {"bat.algorithm": ALGORITHMS[reading].value})
+    params = override(
+        readings_of_paper.planner(reading), {"bat.algorithm": ALGORITHMS[reading].value}
+    )
     scenario = load_scenario(case)
     results: list[Result] = [
         evaluate(run(scenario, planner=params, seed=seed)) for seed in range(SEEDS)
@@ -47,7 +49,7 @@ def test_intervals_of_ten_runs_contain_the_printed_row(reading: str, case: str) 
 
 
 def test_the_fitted_constants_are_these() -> None:
-    section6, fig1 = readings.PLANNERS["section6"], readings.PLANNERS["fig1"]
+    section6, fig1 = readings_of_paper.PLANNERS["section6"], readings_of_paper.PLANNERS["fig1"]
     assert section6 == PlannerParams(
         speed_mps=0.785, step_length_m=0.3, swarm=Swarm.FRESH, bat=BatParams(iterations=5)
     )
@@ -58,6 +60,6 @@ def test_the_fitted_constants_are_these() -> None:
 
 def test_an_unknown_reading_is_refused() -> None:
     with pytest.raises(ConfigError, match="did you mean 'section6'"):
-        readings.planner("section7")
+        readings_of_paper.planner("section7")
     with pytest.raises(ConfigError, match="unknown swarm reading"):
-        readings.swarm("none")
+        readings_of_paper.swarm("none")

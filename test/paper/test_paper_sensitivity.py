@@ -13,9 +13,9 @@ import pytest
 from project import ROOT
 
 from mfba_planner import cli
+from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.options import flatten
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.paper import sensitivity
@@ -25,7 +25,7 @@ from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, 
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report import style
 from mfba_planner.report.figure_sheet import to_bytes
-from mfba_planner.report.figures.sensitivity import draw
+from mfba_planner.report.figures.sensitivity_heat_map import draw
 from mfba_planner.report.sensitivity_table import to_csv, to_markdown, to_table
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.run_episode import run

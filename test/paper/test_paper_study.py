@@ -16,8 +16,8 @@ from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.evaluation.metrics import evaluate, run_motion
 from mfba_planner.evaluation.study import chunk_store as storing
-from mfba_planner.paper.functions import FUNCTIONS
-from mfba_planner.paper.readings import PLANNERS
+from mfba_planner.paper.benchmark_functions import FUNCTIONS
+from mfba_planner.paper.readings_of_paper import PLANNERS
 from mfba_planner.paper.study.chunk import BENCHMARK_STREAM, Benchmark, SampleChunk, Trips, chunks
 from mfba_planner.paper.study.plan import FULL, QUICK, benchmark_plan, trip_plan
 from mfba_planner.paper.study.run import PACKAGES, open_store, run_plan

@@ -10,7 +10,7 @@ import pytest
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.paper import published
-from mfba_planner.paper.functions import FUNCTIONS
+from mfba_planner.paper.benchmark_functions import FUNCTIONS
 from mfba_planner.paper.published import BENCHMARK_COLUMNS, BY_KEY
 from mfba_planner.paper.study.plan import (
     EXCEPTIONS,
@@ -20,11 +20,11 @@ from mfba_planner.paper.study.plan import (
     benchmark_sample,
     trip_sample,
 )
-from mfba_planner.paper.tables.benchmark import benchmark_section, consistent_rows
-from mfba_planner.paper.tables.build import build, check_sections
+from mfba_planner.paper.tables.build_tables import build, check_sections
 from mfba_planner.paper.tables.claims import claim_section
-from mfba_planner.paper.tables.model import Entry, Grid, Ours, Section, Verdict, inside
-from mfba_planner.paper.tables.trips import fitting_columns, printed_lengths, trip_section
+from mfba_planner.paper.tables.table_3 import benchmark_section, consistent_rows
+from mfba_planner.paper.tables.table_entries import Entry, Grid, Ours, Section, Verdict, inside
+from mfba_planner.paper.tables.tables_5_7 import fitting_columns, printed_lengths, trip_section
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.scenario import Scenario
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Point
-from mfba_planner.core.types import Circle
+from mfba_planner.core.planner_types import Circle
 from mfba_planner.perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 
 SECOND = 10**9

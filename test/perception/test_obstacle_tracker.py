@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.types import Circle, Scan
+from mfba_planner.core.planner_types import Circle, Scan
 from mfba_planner.perception.obstacle_tracker import Tracker, TrackingParams
 from mfba_planner.simulation.simulated_lidar import cast_rays
 

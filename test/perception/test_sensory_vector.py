@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Point, towards
-from mfba_planner.core.types import Scan
+from mfba_planner.core.planner_types import Scan
 from mfba_planner.perception.scan_to_sectors import sense_scan
 from mfba_planner.perception.sensory_vector import (
     SensorParams,

@@ -7,14 +7,14 @@ from typing import Any
 import pytest
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Circle, Mode, Observation
+from mfba_planner.core.planner_types import Circle, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.sweep.single_run import run_one
 from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.peers import ablation
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.planning.predictive import Predictive, preset
+from mfba_planner.planning.predictive_planner import Predictive, preset
 from mfba_planner.simulation.episode import Episode, Outcome
 
 SETTING = Setting(params=preset(PlannerParams(speed_mps=0.8)))

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.planner_types import Decision, Mode, Observation
 from mfba_planner.core.random_streams import stream
-from mfba_planner.core.types import Decision, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
-from mfba_planner.paper import readings
+from mfba_planner.paper import readings_of_paper
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.algorithm_1 import Algorithm1, decide
 from mfba_planner.planning.mode_transitions import Event, transition
@@ -380,7 +380,7 @@ def test_reset_ends_the_mode_arrived() -> None:
 
 # --- the persistent swarm of Fig. 1 ---------------------------------------------------------
 
-FIG1 = readings.planner("fig1")
+FIG1 = readings_of_paper.planner("fig1")
 
 
 def test_fig_1_keeps_its_swarm_over_the_trip() -> None:
@@ -448,19 +448,27 @@ def test_fig_1_runs_both_case_studies(name: str, algorithm: Algorithm) -> None:
 
 
 def test_readings_by_name() -> None:
-    assert readings.swarm("robust") == BatParams()
-    assert readings.planner("section6") == PlannerParams()
-    assert readings.swarm("table3").bounds is Bounds.NONE
-    assert readings.swarm("literal").rho == 0.01
+    assert readings_of_paper.swarm("robust") == BatParams()
+    assert readings_of_paper.planner("section6") == PlannerParams()
+    assert readings_of_paper.swarm("table3").bounds is Bounds.NONE
+    assert readings_of_paper.swarm("literal").rho == 0.01
     assert FIG1.swarm is Swarm.PERSISTENT
 
 
 @pytest.mark.parametrize(
     ("look_up", "name", "message"),
     [
-        (readings.swarm, "tabel3", "'tabel3': unknown swarm reading; did you mean 'table3'?"),
-        (readings.planner, "fig2", "'fig2': unknown planner reading; did you mean 'fig1'?"),
-        (readings.planner, "?", "'?': unknown planner reading; known: fig1, section6"),
+        (
+            readings_of_paper.swarm,
+            "tabel3",
+            "'tabel3': unknown swarm reading; did you mean 'table3'?",
+        ),
+        (
+            readings_of_paper.planner,
+            "fig2",
+            "'fig2': unknown planner reading; did you mean 'fig1'?",
+        ),
+        (readings_of_paper.planner, "?", "'?': unknown planner reading; known: fig1, section6"),
     ],
 )
 def test_unknown_readings(look_up: Any, name: str, message: str) -> None:
@@ -469,9 +477,9 @@ def test_unknown_readings(look_up: Any, name: str, message: str) -> None:
     assert str(caught.value) == message
 
 
-@pytest.mark.parametrize("name", sorted(readings.SWARMS))
+@pytest.mark.parametrize("name", sorted(readings_of_paper.SWARMS))
 def test_every_swarm_reading_can_plan(name: str) -> None:
-    bat = replace(readings.swarm(name), population=5, iterations=5)
+    bat = replace(readings_of_paper.swarm(name), population=5, iterations=5)
     result = evaluate(run(load_scenario("empty"), planner=PlannerParams(bat=bat)))
     assert result.outcome in (Outcome.GOAL_REACHED, Outcome.TIME_LIMIT)
     if name != "literal":  # its bats move away from the best

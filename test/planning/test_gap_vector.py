@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from mfba_planner.core.types import Bits
+from mfba_planner.core.planner_types import Bits
 from mfba_planner.planning.gap_vector import GapHeading, gap_heading, gap_vector, nearest_free_gap
 
 BITS = st.lists(st.integers(0, 1), min_size=3, max_size=40).map(tuple)

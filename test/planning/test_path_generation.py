@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.planner_types import Observation
 from mfba_planner.core.random_streams import stream
-from mfba_planner.core.types import Observation
 from mfba_planner.planning import algorithm_1 as module
 from mfba_planner.planning.algorithm_1 import MIN_BATCH, Algorithm1, generate_paths_together
 from mfba_planner.planning.path_generation import (

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Circle, Mode, Observation, Scan
+from mfba_planner.core.planner_types import Circle, Mode, Observation, Scan
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.observed_circles import circle_rows
+from mfba_planner.planning.circles_from_observation import circle_rows
 from mfba_planner.planning.peers import apf
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
-from mfba_planner.core.types import Mode, Observation
+from mfba_planner.core.planner_types import Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.peers.straight_line import Straight

@@ -17,9 +17,9 @@ from mfba_planner.recording.bag_metadata import (
     dump_record,
     load_file,
 )
+from mfba_planner.recording.bag_qos import OfferedQos, from_list
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.message_definitions import definition_of
-from mfba_planner.recording.qos_profiles import OfferedQos, from_list
 
 ROOT = "rosbag2_bagfile_information"
 

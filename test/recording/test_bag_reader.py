@@ -27,9 +27,9 @@ from sensor_msgs.msg import LaserScan
 
 from mfba_planner.recording import mcap_walk
 from mfba_planner.recording.bag_metadata import BagFile, BagMetadata, dump_file
+from mfba_planner.recording.bag_qos import INFINITE_NS, OfferedQos
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.merge_by_time import RawMessage, Source, merge_by_log_time
-from mfba_planner.recording.qos_profiles import INFINITE_NS, OfferedQos
 
 FOREIGN_COUNTS = {"/scan": 133, "/odom": 133, "/chatter": 13, "/goal_pose": 1, "/tf_static": 1}
 

@@ -27,10 +27,10 @@ from recorded_bags import (
 from rosbags.highlevel import AnyReader
 
 from mfba_planner.core.errors import InputError, OutputError
+from mfba_planner.recording.bag_qos import OfferedQos, from_list
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.message_definitions import definition_of
-from mfba_planner.recording.qos_profiles import OfferedQos, from_list
 
 
 def chunk_count(path: Path) -> int:

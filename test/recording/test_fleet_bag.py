@@ -21,7 +21,7 @@ from mfba_planner.core.geometry import distance
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.read_episode import read_episode, read_recording
-from mfba_planner.scenarios.plain_data import scenario_to_json
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.fleet import run_fleet

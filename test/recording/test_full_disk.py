@@ -13,7 +13,7 @@ import pytest
 from recorded_bags import count_with_all, fill, text, write_bag
 
 from mfba_planner.core.errors import OutputError
-from mfba_planner.recording import file_storage
+from mfba_planner.recording import atomic_files
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.recover import recover
@@ -82,7 +82,7 @@ def test_no_room_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     def full(*_: object, **options: Any) -> IO[Any]:
         return open("/dev/full", "wb", **options)
 
-    monkeypatch.setattr(file_storage, "open", full, raising=False)
+    monkeypatch.setattr(atomic_files, "open", full, raising=False)
     with pytest.raises(OutputError, match=r"run1: cannot be created \(No space left on device\)"):
         BagWriter(tmp_path / "new" / "run1")
     assert list(tmp_path.iterdir()) == []
@@ -96,7 +96,7 @@ def test_no_room_for_metadata_yaml(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         path.touch()
         return open("/dev/full", "w", **options)
 
-    monkeypatch.setattr(file_storage, "open", full, raising=False)
+    monkeypatch.setattr(atomic_files, "open", full, raising=False)
     with pytest.raises(OutputError, match=r"disk full after 21 messages \(No space left"):
         writer.close()
     monkeypatch.undo()

@@ -15,16 +15,16 @@ from mfba_planner import cli
 from mfba_planner.core.errors import BagError
 from mfba_planner.launcher.console import RunConsole
 from mfba_planner.launcher.fleet_result import finish_fleet_run
-from mfba_planner.launcher.run import Run
 from mfba_planner.launcher.run_arguments import read_request
 from mfba_planner.launcher.run_directory import RunDirectory
 from mfba_planner.launcher.run_result import finish_run
+from mfba_planner.launcher.run_state import Run
 from mfba_planner.launcher.stop_request import StopRequest
-from mfba_planner.recording import decisions
+from mfba_planner.recording import decisions_with_sectors
+from mfba_planner.recording.fleet_topics import NO_NAMESPACE
 from mfba_planner.recording.read_episode import read_episode, read_recording, summaries, summarize
-from mfba_planner.recording.robot_topics import NO_NAMESPACE
-from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.robot_model import Lidar, Robot
@@ -175,7 +175,7 @@ def test_the_number_of_waiting_decisions_is_limited(
 ) -> None:
     cut = rewrite(bag, tmp_path / "cut", without([SECTORS], *range(-6, 0)))
     read_recording(cut)
-    monkeypatch.setattr(decisions, "MAX_WAITING", 5)
+    monkeypatch.setattr(decisions_with_sectors, "MAX_WAITING", 5)
     with pytest.raises(BagError, match="no sectors at stamp"):
         read_recording(cut)
 

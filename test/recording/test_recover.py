@@ -21,12 +21,12 @@ from recorded_bags import (
 
 from mfba_planner.core.errors import BagError, OutputError
 from mfba_planner.recording.bag_metadata import BagFile, BagMetadata, dump_file
+from mfba_planner.recording.bag_qos import OfferedQos
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.mcap_index import open_file
 from mfba_planner.recording.merge_by_time import RawMessage
 from mfba_planner.recording.message_definitions import definition_of
-from mfba_planner.recording.qos_profiles import OfferedQos
 from mfba_planner.recording.recover import recover
 
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from recorded_bags import FOREIGN, LATCHED, SECOND, SENSOR, START_NS, text
 
 from mfba_planner.core.errors import ConfigError
+from mfba_planner.recording.bag_qos import OfferedQos
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
-from mfba_planner.recording.qos_profiles import OfferedQos
 from mfba_planner.recording.replay_schedule import (
     Schedule,
     due_messages,

@@ -9,7 +9,7 @@ from recorded_bags import count_with_all
 
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.configuration_attachment import read_configuration
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios.scenario_files import load_scenario

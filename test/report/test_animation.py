@@ -15,7 +15,7 @@ from trio_scenario import TRIO
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.report import style
 from mfba_planner.report.animation import (
     LAST_FRAME_MS,

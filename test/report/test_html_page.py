@@ -18,17 +18,17 @@ from selenium.webdriver.common.keys import Keys
 from waiting import wait_until
 
 from mfba_planner.core.errors import InputError, OutputError
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.gap_vector import gap_heading
 from mfba_planner.planning.planner_params import Method, PlannerParams
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.report import format_values
 from mfba_planner.report.html.charts import look
-from mfba_planner.report.html.data import MOST_ROBOTS, MOST_RUNS, clearances
 from mfba_planner.report.html.page import as_json, page, write_page
+from mfba_planner.report.html.page_data import MOST_ROBOTS, MOST_RUNS, clearances
 from mfba_planner.report.result_table import result_rows
 from mfba_planner.report.run_events import closest_passes
 from mfba_planner.scenarios.scenario_files import load_scenario
@@ -36,8 +36,7 @@ from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.fleet import run_fleet
 from mfba_planner.simulation.robot_model import Noise
-from mfba_planner.simulation.run_episode import run
-from mfba_planner.simulation.simulate import simulate
+from mfba_planner.simulation.run_episode import run, simulate
 
 
 @pytest.fixture(scope="module")

@@ -15,25 +15,30 @@ from matplotlib.text import Text
 from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, InputError, OutputError
 from mfba_planner.core.geometry import distance
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.evaluation.metrics import evaluate, within_range
-from mfba_planner.paper import convergence, published
-from mfba_planner.paper.functions import FUNCTIONS
+from mfba_planner.paper import convergence_curves, published
+from mfba_planner.paper.benchmark_functions import FUNCTIONS
 from mfba_planner.planning.gap_vector import gap_vector
 from mfba_planner.report import style
 from mfba_planner.report.figure_sheet import Sheet, to_bytes
 from mfba_planner.report.figures import (
-    beta,
-    enlargement,
-    gaps,
+    fig2_beta,
+    fig4_enlargement,
+    fig5_sectors,
+    fig6_gap_vector,
+    fig7_fig8_trips,
     paper_figures,
-    sectors,
-    sketch,
-    trips,
+    sketch_elements,
 )
 from mfba_planner.swarm.bat_swarm import Algorithm, Schedule
 
-SKETCHES = {"fig2": beta.draw, "fig4": enlargement.draw, "fig5": sectors.draw, "fig6": gaps.draw}
+SKETCHES = {
+    "fig2": fig2_beta.draw,
+    "fig4": fig4_enlargement.draw,
+    "fig5": fig5_sectors.draw,
+    "fig6": fig6_gap_vector.draw,
+}
 TRIPS = ("fig7", "fig8")
 PRINTED_M = {"fig7": 17.0925, "fig8": 18.3533}  # section 6.2
 
@@ -43,7 +48,7 @@ def figure_of(name: str) -> Figure:
     with style.context():
         if name in SKETCHES:
             return SKETCHES[name]()
-        return trips.draw(paper_figures.figure_run(name), name)
+        return fig7_fig8_trips.draw(paper_figures.figure_run(name), name)
 
 
 @pytest.mark.parametrize("name", [*SKETCHES, *TRIPS])
@@ -90,19 +95,21 @@ def test_equal_bytes_without_a_date(name: str, form: str) -> None:
 
 def test_fig_2_is_eq_10() -> None:
     draws = np.array([[0.0, 0.25, 0.5], [1.0, 0.75, 0.5]])
-    draws = np.pad(draws, ((0, 0), (0, beta.HORIZON - 2)))
-    t = np.arange(beta.HORIZON + 1)
-    raw = beta.betas(3.0, Schedule.RAW, draws)
+    draws = np.pad(draws, ((0, 0), (0, fig2_beta.HORIZON - 2)))
+    t = np.arange(fig2_beta.HORIZON + 1)
+    raw = fig2_beta.betas(3.0, Schedule.RAW, draws)
     assert raw == pytest.approx(t * np.exp(-3.0 * draws))
-    assert beta.betas(3.0, Schedule.NORMALIZED, draws) == pytest.approx(raw / beta.HORIZON)
-    assert 0.01 in beta.RHOS
+    assert fig2_beta.betas(3.0, Schedule.NORMALIZED, draws) == pytest.approx(
+        raw / fig2_beta.HORIZON
+    )
+    assert 0.01 in fig2_beta.RHOS
 
 
 def test_fig_5_and_6_are_the_papers_example() -> None:
-    bits = sketch.example_vs()
+    bits = sketch_elements.example_vs()
     assert " ".join(map(str, bits)) == published.EXAMPLE_VS
     assert " ".join(map(str, gap_vector(bits))) == published.EXAMPLE_VG
-    centers = [obstacle.center_m for obstacle in sketch.EXAMPLE.obstacles]
+    centers = [obstacle.center_m for obstacle in sketch_elements.EXAMPLE.obstacles]
     assert all(distance(a, b) >= 0.6 for i, a in enumerate(centers) for b in centers[:i])
     texts = [text.get_text() for text in figure_of("fig5").texts]
     for words in ("S1, S2", "none: out of range", "S7, S8", "S8, S9"):
@@ -125,7 +132,7 @@ def test_the_runs_of_fig_7_and_8_have_the_printed_lengths(name: str) -> None:
 
 def test_the_captions_are_those_of_the_paper() -> None:
     words = {
-        name: [s.caption for s in trips.snapshots(paper_figures.figure_run(name))]
+        name: [s.caption for s in fig7_fig8_trips.snapshots(paper_figures.figure_run(name))]
         for name in TRIPS
     }
     assert words == {
@@ -148,7 +155,7 @@ def test_the_captions_are_those_of_the_paper() -> None:
 @pytest.mark.parametrize("name", TRIPS)
 def test_each_snapshot_is_what_its_caption_names(name: str) -> None:
     episode = paper_figures.figure_run(name)
-    for snapshot in trips.snapshots(episode):
+    for snapshot in fig7_fig8_trips.snapshots(episode):
         tick = episode.ticks[snapshot.index]
         near = within_range(episode, tick)
         named = tuple(int(word) for word in snapshot.caption.split() if word.isdigit())
@@ -160,11 +167,11 @@ def test_a_run_without_avoidance_is_refused() -> None:
     episode = paper_figures.figure_run("fig7")
     free = replace(episode, ticks=episode.ticks[:3])
     with pytest.raises(InputError, match="avoids no obstacle"):
-        trips.snapshots(free)
+        fig7_fig8_trips.snapshots(free)
 
 
 def test_convergence_quantiles_are_sorted_and_never_rise() -> None:
-    found = convergence.curves("F3", range(9))
+    found = convergence_curves.curves("F3", range(9))
     assert [curve.algorithm for curve in found] == list(Algorithm)
     for curve in found:
         low, middle, high = curve.error

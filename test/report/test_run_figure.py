@@ -24,7 +24,7 @@ from matplotlib.text import Text
 
 from mfba_planner.core.errors import OutputError
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.report import style

@@ -11,13 +11,12 @@ from matplotlib.patches import Wedge
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.gap_vector import GapHeading
 from mfba_planner.planning.planner_params import Method, PlannerParams
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.report.draw_tick import draw_snapshot
 from mfba_planner.report.legend import entries
 from mfba_planner.report.sector_ring import ring_of
 from mfba_planner.scenarios.scenario_files import load_scenario
-from mfba_planner.simulation.run_episode import run
-from mfba_planner.simulation.simulate import simulate
+from mfba_planner.simulation.run_episode import run, simulate
 
 
 def degrees(*angles: float) -> list[float]:

@@ -16,7 +16,7 @@ from mfba_planner.ros.endpoints.robot_namespace import below
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import pose_stamped_msg
 from mfba_planner.ros.nodes.world_sim import WorldSim
-from mfba_planner.scenarios.plain_data import scenario_to_json
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.scenario import FleetRobot, Scenario
 

@@ -24,11 +24,11 @@ from rclpy.serialization import serialize_message
 from ros_graph import Graph
 from std_srvs.srv import Trigger
 
-from mfba_planner.core.options import override
-from mfba_planner.core.types import Mode
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.core.declared_options import override
+from mfba_planner.core.planner_types import Mode
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
-from mfba_planner.paper import readings
+from mfba_planner.paper import readings_of_paper
 from mfba_planner.recording.from_messages import decision as read_decision
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import path_msg
@@ -140,7 +140,7 @@ def test_the_same_goal_again_is_new_only_after_arrival(graph: Graph) -> None:
 @pytest.fixture(scope="module")
 def persistent(tmp_path_factory: pytest.TempPathFactory) -> FilePath:
     """A bag of a run with a persistent swarm."""
-    planner = override(readings.planner("fig1"), {"step_length_m": 0.3})
+    planner = override(readings_of_paper.planner("fig1"), {"step_length_m": 0.3})
     scenario = load_scenario("case1")
     config = RunConfig(scenario=scenario, planner=planner, driver=Driver.IN_PROCESS, seed=2)
     bag = tmp_path_factory.mktemp("goals") / "bag"

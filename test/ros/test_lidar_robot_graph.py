@@ -10,10 +10,10 @@ import pytest
 from edited_bags import rewrite
 from ros_graph import Graph
 
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import Method, PlannerParams
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.from_messages import laser_scan, robot_pose
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
@@ -25,8 +25,8 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.run_episode import simulate
 from mfba_planner.simulation.scenario import Scenario
-from mfba_planner.simulation.simulate import simulate
 from mfba_planner.verification.verify_bag import verify
 
 PAPER = PlannerParams(goal_tolerance_m=0.05)

@@ -10,7 +10,7 @@ from planner_talk import FREE, GOAL, LOCKSTEP, PlannerHarness, fields, goal, mod
 from ros_graph import Graph
 from std_srvs.srv import Trigger
 
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.recording.from_messages import decision as read_decision
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.nodes.planner import PlannerNode

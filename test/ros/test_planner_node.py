@@ -29,7 +29,7 @@ from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
-from mfba_planner.core.types import NANO, Decision, Mode, Observation
+from mfba_planner.core.planner_types import NANO, Decision, Mode, Observation
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
 from mfba_planner.recording.from_messages import decision as read_decision

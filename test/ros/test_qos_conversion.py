@@ -7,7 +7,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from ros_graph import Graph
 from std_msgs.msg import String
 
-from mfba_planner.recording.qos_profiles import OfferedQos
+from mfba_planner.recording.bag_qos import OfferedQos
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.qos_conversion import DEPTH, offered, profile
 

@@ -16,13 +16,13 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
+from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import ConfigError, OutputError
-from mfba_planner.core.options import flatten
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.configuration import read_configuration
+from mfba_planner.recording.configuration_attachment import read_configuration
 from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.recording.message_definitions import definition_of
 from mfba_planner.recording.read_episode import read_episode

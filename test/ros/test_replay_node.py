@@ -21,12 +21,12 @@ from std_srvs.srv import Trigger
 
 from mfba_planner.core.errors import BagError, ConfigError, GraphError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
+from mfba_planner.recording.bag_qos import OfferedQos
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.from_messages import decision, sector_ranges
-from mfba_planner.recording.qos_profiles import OfferedQos
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import (
     clock_msg,

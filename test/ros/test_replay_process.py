@@ -15,8 +15,8 @@ from recorded_bags import FOREIGN, odometry, scan, write_bag
 from ros_graph import Graph
 from sensor_msgs.msg import LaserScan
 
-from mfba_planner.core.types import Decision, Mode
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.core.planner_types import Decision, Mode
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.from_messages import decision
 from mfba_planner.ros.interface import topics

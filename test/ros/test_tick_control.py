@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from mfba_planner.core.errors import GraphError
-from mfba_planner.ros.node_parameters import WorldSimSettings
+from mfba_planner.ros.node_settings import WorldSimSettings
 from mfba_planner.ros.runtime.tick_control import TickControl
 
 

@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Scan
+from mfba_planner.core.planner_types import Scan
 from mfba_planner.perception.scan_to_sectors import sense_scan
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
 from mfba_planner.recording.from_messages import stamp_ns

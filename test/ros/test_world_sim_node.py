@@ -18,7 +18,7 @@ from ros_graph import Graph
 from std_srvs.srv import SetBool, Trigger
 
 from mfba_planner.core.errors import ConfigError, GraphError
-from mfba_planner.core.types import NANO
+from mfba_planner.core.planner_types import NANO
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.from_messages import robot_pose, stamp_ns, velocity
 from mfba_planner.ros.interface import topics

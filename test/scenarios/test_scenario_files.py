@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.evaluation.metrics import evaluate
-from mfba_planner.scenarios.plain_data import scenario_to_dict, scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
+from mfba_planner.scenarios.scenario_json import scenario_to_dict, scenario_to_json
 from mfba_planner.scenarios.yaml_schema import checked
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle, Turn, Walls

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Decision, Mode
+from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation import run_episode
 from mfba_planner.simulation.decision_digest import HEAD, canonical, digest

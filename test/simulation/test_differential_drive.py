@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, distance, pose_as_in_message
-from mfba_planner.core.types import Decision, Mode
+from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.differential_drive import (
     Speeds,
     apply_command,

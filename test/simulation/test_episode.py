@@ -10,7 +10,7 @@ from trip_samples import post, trip
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.types import Mode, Observation
+from mfba_planner.core.planner_types import Mode, Observation
 from mfba_planner.evaluation.metrics import Result, evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
 from mfba_planner.planning.algorithm_1 import Algorithm1

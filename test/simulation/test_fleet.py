@@ -15,18 +15,18 @@ from hypothesis import strategies as st
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, closest_approach, distance
-from mfba_planner.core.types import Decision, Mode, Observation
+from mfba_planner.core.planner_types import Decision, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.planner_registry import make
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.planning.speed_limit import SpeedLimitParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.read_episode import read_episode, read_recording
 from mfba_planner.report.result_json import read_result
-from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.fleet import (
@@ -39,9 +39,8 @@ from mfba_planner.simulation.fleet import (
 from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at
 from mfba_planner.simulation.planner_observations import Perception
 from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
-from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.run_episode import run, simulate_fleet
 from mfba_planner.simulation.scenario import FleetRobot, Kidnapping, Scenario
-from mfba_planner.simulation.simulate import simulate_fleet
 from mfba_planner.simulation.world import World
 
 TICK_NS = PlannerParams().tick_ns

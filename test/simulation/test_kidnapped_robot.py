@@ -14,30 +14,29 @@ from ros_graph import Graph
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, distance
-from mfba_planner.core.types import Mode, observe
+from mfba_planner.core.planner_types import Mode, observe
 from mfba_planner.evaluation.metrics import assess, evaluate, tick_clearances
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.odometry_jump import is_odometry_jump
 from mfba_planner.planning.planner_factory import make_planner
 from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
-from mfba_planner.planning.predictive import preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import pose_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
-from mfba_planner.scenarios.plain_data import scenario_to_json
 from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.robot_model import Drive
-from mfba_planner.simulation.run_episode import run
+from mfba_planner.simulation.run_episode import run, simulate
 from mfba_planner.simulation.scenario import Kidnapping, Scenario
-from mfba_planner.simulation.simulate import simulate
 from mfba_planner.verification.verify_bag import verify
 
 KIDNAPPED = load_scenario("kidnapped")

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Pose2D, distance
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.evaluation.metrics import evaluate
-from mfba_planner.launcher.in_process import run_in_process
+from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.scan_to_sectors import sense_scan
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles, sensory_vector
 from mfba_planner.planning.algorithm_1 import Algorithm1
@@ -26,9 +26,9 @@ from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.obstacle_motion import Walls
 from mfba_planner.simulation.planner_observations import observe_sectors, sense
 from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.run_episode import simulate
 from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.simulation.sensor_noise import NoisySensors
-from mfba_planner.simulation.simulate import simulate
 from mfba_planner.simulation.simulated_lidar import cast_walls, rays, scan_at
 from mfba_planner.simulation.world import World
 

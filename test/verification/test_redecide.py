@@ -18,7 +18,7 @@ from sensor_msgs.msg import LaserScan
 
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, MfbaError
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.ros.interface.serialized_message import type_name

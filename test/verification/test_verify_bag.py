@@ -20,7 +20,7 @@ from edited_bags import (
 )
 
 from mfba_planner.core.errors import BagError
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.recording.file_integrity import check_data
 from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.scenarios.scenario_files import load_scenario

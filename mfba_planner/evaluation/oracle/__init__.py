@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The oracle: shortest collision-free trajectory with full knowledge, and certificates."""
 
-from .independent_check import Fault, inspect
+from .path_check import Fault, inspect
 from .solution import Certificate, Solution
 from .solve import solve
 

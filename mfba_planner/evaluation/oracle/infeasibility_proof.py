@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.scenario import Scenario
-from ...simulation.uniform_segments import UniformSegments
 
 GOAL_TOLERANCE_M = 0.05  # larger than the tolerance of any planner here
 

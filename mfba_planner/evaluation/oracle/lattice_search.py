@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.geometry import Point
+from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.obstacle_motion import Walls
-from ...simulation.uniform_segments import UniformSegments
 from .polyline import edge_gaps, within
 from .tangent_search import CLEAR_M
 

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
+from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.obstacle_motion import Walls
-from ...simulation.uniform_segments import UniformSegments
 from .polyline import gaps, lengths, pair_gaps, path_gaps, within
 from .tangent_search import CLEAR_M
 

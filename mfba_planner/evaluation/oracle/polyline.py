@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from ...core.geometry import Point
+from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.obstacle_motion import Walls
-from ...simulation.uniform_segments import UniformSegments
 
 Segment = tuple[float, float, float, float, float, float, float]  # UniformSegments[:7]
 FAR_M = 9.0  # gap reported for a pair that never moves at the same time

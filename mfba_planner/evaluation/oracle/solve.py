@@ -10,12 +10,12 @@ import numpy as np
 
 from ...core.errors import ConfigError
 from ...core.geometry import distance
+from ...simulation.constant_velocity_segments import UniformSegments, uniform_segments
 from ...simulation.obstacle_motion import Walls
 from ...simulation.scenario import Scenario
-from ...simulation.uniform_segments import UniformSegments, uniform_segments
-from .independent_check import inspect
 from .infeasibility_proof import unreachable
 from .lattice_search import LatticeParams, lattice_paths
+from .path_check import inspect
 from .path_refinement import refine
 from .polyline import gaps, lengths
 from .solution import Certificate, Solution, Waypoint

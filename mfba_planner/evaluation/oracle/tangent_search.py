@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...core.geometry import Point
+from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.obstacle_motion import Walls
-from ...simulation.uniform_segments import UniformSegments
 from .polyline import edge_gaps, within
 
 CLEAR_M = 1e-5  # clearance to every circle, so that rounding makes no contact

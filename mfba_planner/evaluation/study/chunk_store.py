@@ -14,7 +14,7 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import OutputError
-from ...core.outputs import write_new
+from ...core.output_files import write_new
 from .chunk import Chunk, Columns
 
 SCHEMA_VERSION = 1

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core.geometry import Point, bearing, distance, towards
 from ...simulation.obstacle_motion import Obstacle, Turn
-from .trip import OBSTACLE_RADIUS_M, ROBOT_RADIUS_M, Trip, leaves_room
+from .task_geometry import OBSTACLE_RADIUS_M, ROBOT_RADIUS_M, Trip, leaves_room
 
 ENLARGED_M = OBSTACLE_RADIUS_M + ROBOT_RADIUS_M
 _MARGIN_M = 0.3  # free space around start and goal at t = 0

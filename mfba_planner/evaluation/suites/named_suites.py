@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...core.declared_options import did_you_mean
 from ...core.errors import ConfigError
-from ...core.options import did_you_mean
 from ...simulation.scenario import Scenario
 from .adversarial_worlds import FAMILIES, adversarial_obstacles
 from .random_crowds import CrowdParams, Motion, crowd
-from .trip import ROOM, Trip, scenario
+from .task_geometry import ROOM, Trip, scenario
 
 WORLD_STREAM = 3  # spawn key of worlds' SeedSequence children; one number per purpose
 SPEED_MPS = 0.8  # robot speed at which gaps to the optimum are reported

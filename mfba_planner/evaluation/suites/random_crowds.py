@@ -9,10 +9,10 @@ from enum import Enum
 
 import numpy as np
 
+from ...core.declared_options import check, option
 from ...core.errors import ConfigError
-from ...core.options import check, option
 from ...simulation.obstacle_motion import Obstacle, Turn
-from .trip import OBSTACLE_RADIUS_M, ROOM, leaves_room
+from .task_geometry import OBSTACLE_RADIUS_M, ROOM, leaves_room
 
 _TRIES = 10_000
 

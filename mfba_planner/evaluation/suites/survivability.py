@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.geometry import distance
+from ...simulation.constant_velocity_segments import UniformSegments, uniform_segments
 from ...simulation.scenario import Scenario
-from ...simulation.uniform_segments import UniformSegments, uniform_segments
-from .trip import ROOM
+from .task_geometry import ROOM
 
 _CELLS = 10  # raster cells per side of the area
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...core.geometry import Point, bearing, distance, wrap_angle
-from ...core.types import Decision
+from ...core.planner_types import Decision
 from ...perception.sensory_vector import bits_text
 from ...simulation.batched_motion import Motion
 from ...simulation.episode import Episode, Outcome

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from time import perf_counter_ns
 
 from ...core.errors import MfbaError
-from ...core.types import Decision, Observation, PathPlanner
+from ...core.planner_types import Decision, Observation, PathPlanner
 from ...planning.planner_params import PlannerParams
 
 SPEED_SLACK = 1e-6  # a tick is a whole number of nanoseconds

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...core.declared_options import override
 from ...core.errors import ConfigError, InputError
-from ...core.options import override
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ..study.chunk_store import code_digest, read_chunk, read_manifest
-from .chunks import chunks_of
-from .columns import Row
 from .run_sweep import COMMAND, PACKAGES
+from .sweep_chunks import chunks_of
 from .sweep_spec import Setting, SweepSpec
 from .table import build
+from .table_columns import Row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...core.declared_options import flatten
 from ...core.errors import ConfigError, MfbaError
-from ...core.options import flatten
 from ..study.chunk import Chunk
 from ..study.chunk_store import Store
 from ..study.compute_chunks import compute
-from .chunks import chunks_of
-from .columns import Row
+from .sweep_chunks import chunks_of
 from .sweep_spec import SweepSpec
 from .table import build, sorted_hash
+from .table_columns import Row
 
 COMMAND = "mfba sweep"
 # The folders whose code determines the results.

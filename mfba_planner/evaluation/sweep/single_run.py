@@ -7,7 +7,7 @@ from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from ...core.types import NANO, Observation
+from ...core.planner_types import NANO, Observation
 from ...planning.algorithm_1 import Algorithm1, generate_paths_together
 from ...planning.planner_params import Swarm
 from ...planning.planner_registry import find_factory

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..oracle import Certificate
 from ..statistics import Interval, Paired, estimate, generator, mean, paired, rate
-from .columns import FAILED, Row
+from .table_columns import FAILED, Row
 
 REASONS = 3  # of failure that are named in reports
 Value = Callable[[Row], float]

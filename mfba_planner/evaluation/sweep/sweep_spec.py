@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
+from ...core.declared_options import flatten
 from ...core.errors import ConfigError
-from ...core.options import flatten
-from ...core.types import PathPlanner
+from ...core.planner_types import PathPlanner
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ...planning.planner_registry import Factory, find_factory, preset_of

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import ConfigError, OutputError
-from ...core.outputs import write_same
+from ...core.output_files import write_same
 from ..study.chunk import Columns
 from ..suites import suite
-from .chunks import OracleChunk, RunsChunk, gather
-from .columns import COLUMNS, TIMINGS, Row, with_optimum
+from .sweep_chunks import OracleChunk, RunsChunk, gather
 from .sweep_spec import SweepSpec
+from .table_columns import COLUMNS, TIMINGS, Row, with_optimum
 
 Kinds = Mapping[str, tuple[type, str]]
 

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from ...core.child_process import end_with_parent
-from . import chunks as _chunks  # noqa: F401  # imported now, so that its time does not count as work
+from . import sweep_chunks as _chunks  # noqa: F401  # imported now, so that its time does not count as work
 
 MANY = 50_000  # new objects before garbage collection: runs are large and have no cycles
 

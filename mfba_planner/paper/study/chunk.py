@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ...core.options import Scalar, flatten
+from ...core.declared_options import Scalar, flatten
 from ...evaluation.metrics import assess
 from ...planning.planner_params import PlannerParams
 from ...simulation.run_episode import run
 from ...simulation.scenario import Scenario
 from ...swarm.bat_swarm import BatParams
 from ...swarm.batched_swarms import BatchResult, minimize_batch
-from ..functions import FUNCTIONS
+from ..benchmark_functions import FUNCTIONS
 
 Columns = dict[str, list[float]]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 from ...simulation.scenario import Scenario
 from ...swarm.bat_swarm import Algorithm, BatParams, Schedule
-from ..functions import FUNCTIONS
-from ..readings import PLANNERS, SWARMS
+from ..benchmark_functions import FUNCTIONS
+from ..readings_of_paper import PLANNERS, SWARMS
 from .chunk import Benchmark, SampleChunk, Trips, chunks
 
 DIMENSION = 2  # of F1 and F5 too: the paper does not say; the other four have it

@@ -13,11 +13,11 @@ from ...evaluation.statistics import Array, Comparison
 from ...simulation.contact import step_clearances
 from ...simulation.scenario import Scenario
 from .. import published
-from ..readings import PLANNERS
+from ..readings_of_paper import PLANNERS
 from ..study.plan import LAWS, PLANNER_READINGS, trip_sample
 from ..study.run import Sample
-from .model import Entry, Ours, Section, Verdict
-from .trips import fitting_columns, ten_runs
+from .table_entries import Entry, Ours, Section, Verdict
+from .tables_5_7 import fitting_columns, ten_runs
 
 Samples = Mapping[str, Sample]
 CASES = tuple(published.TRIP_TABLES)

@@ -10,13 +10,13 @@ from types import SimpleNamespace
 from typing import Any
 
 from ...core.geometry import Point, wrap_angle
-from ...core.types import NANO, Circle, Observation
+from ...core.planner_types import NANO, Circle, Observation
 from ...perception.obstacle_memory import ObstacleMemoryParams
 from ...perception.sensory_vector import SensorParams
 from ..base_planner import Move
 from ..mode_transitions import Event
 from ..planner_params import PlannerParams
-from ..predictive import Predictive, PredictiveParams
+from ..predictive_planner import Predictive, PredictiveParams
 from ..trajectory_cost import Candidate, RiskParams, TrajectoryCost
 
 

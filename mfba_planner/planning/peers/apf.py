@@ -8,10 +8,10 @@ import math
 import numpy as np
 
 from ...core.geometry import Point
-from ...core.types import Observation
+from ...core.planner_types import Observation
 from ..base_planner import BasePlanner, Move
+from ..circles_from_observation import circle_rows
 from ..mode_transitions import Event
-from ..observed_circles import circle_rows
 
 REPULSION = 0.3  # relative to the attraction, which has length 1
 NEAREST_M = 0.02  # the repulsion does not grow below this distance

@@ -8,10 +8,10 @@ import math
 import numpy as np
 
 from ...core.geometry import Point
-from ...core.types import NANO, Observation
+from ...core.planner_types import NANO, Observation
 from ..base_planner import BasePlanner, Move
+from ..circles_from_observation import circle_rows
 from ..mode_transitions import Event
-from ..observed_circles import circle_rows
 
 HEADINGS, SPEEDS = 36, (1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0)
 HORIZON_S = 2.0

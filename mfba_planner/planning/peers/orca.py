@@ -7,7 +7,7 @@ import math
 
 from ...core.errors import ConfigError
 from ...core.geometry import Point
-from ...core.types import NANO, Observation
+from ...core.planner_types import NANO, Observation
 from ...perception.sensory_vector import SensorParams
 from ..base_planner import BasePlanner, Move
 from ..mode_transitions import Event

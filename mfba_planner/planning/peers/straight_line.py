@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from ...core.geometry import Point
-from ...core.types import Observation
+from ...core.planner_types import Observation
 from ..base_planner import BasePlanner, Move
 
 

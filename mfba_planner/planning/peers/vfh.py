@@ -8,10 +8,10 @@ import math
 import numpy as np
 
 from ...core.geometry import Point, bearing
-from ...core.types import Observation
+from ...core.planner_types import Observation
 from ..base_planner import BasePlanner, Move
+from ..circles_from_observation import circle_rows
 from ..mode_transitions import Event
-from ..observed_circles import circle_rows
 
 HEADINGS = 72
 MARGIN_M = 0.3  # added to every radius, as circles move while the robot passes

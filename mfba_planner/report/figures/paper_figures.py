@@ -6,7 +6,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from ...paper import readings
+from ...paper import readings_of_paper
 from ...scenarios.scenario_files import load_scenario
 from ...simulation.episode import Episode
 from ...simulation.run_episode import run
@@ -21,11 +21,11 @@ FIGURES = {
     "convergence": "BA and MFBA on F1 to F6",
 }
 _MODULES = {
-    "fig2": "beta",
-    "fig4": "enlargement",
-    "fig5": "sectors",
-    "fig6": "gaps",
-    "convergence": "convergence",
+    "fig2": "fig2_beta",
+    "fig4": "fig4_enlargement",
+    "fig5": "fig5_sectors",
+    "fig6": "fig6_gap_vector",
+    "convergence": "convergence_curves",
 }
 _TITLES = {
     "fig7": "Fig. 7: case study 1",
@@ -47,13 +47,13 @@ def render(name: str, forms: tuple[str, ...] = FORMATS) -> dict[str, bytes]:
 
 def figure_run(name: str) -> Episode:
     """The run that fig7 or fig8 shows."""
-    case, seed = readings.FIGURE_RUNS[name]
-    return run(load_scenario(case), planner=readings.planner("section6"), seed=seed)
+    case, seed = readings_of_paper.FIGURE_RUNS[name]
+    return run(load_scenario(case), planner=readings_of_paper.planner("section6"), seed=seed)
 
 
 def _draw(name: str) -> Any:
     if name in _MODULES:
         return import_module(f"mfba_planner.report.figures.{_MODULES[name]}").draw()
-    from . import trips
+    from . import fig7_fig8_trips
 
-    return trips.draw(figure_run(name), _TITLES[name], _CHOICE)
+    return fig7_fig8_trips.draw(figure_run(name), _TITLES[name], _CHOICE)

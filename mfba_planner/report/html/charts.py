@@ -17,12 +17,12 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mfba_planner.core.types import Mode
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.report import style
 from mfba_planner.report.run_events import stretches
 from mfba_planner.simulation.episode import Episode
 
-from .data import MOST_RUNS, clearances, speeds
+from .page_data import MOST_RUNS, clearances, speeds
 
 # (smallest page width in CSS pixels, width and height in points)
 SHEETS = ((0, 290.0, 300.0), (500, 470.0, 300.0), (900, 860.0, 280.0))

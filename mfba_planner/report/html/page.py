@@ -14,15 +14,17 @@ from string import Template
 
 from mfba_planner import __version__
 from mfba_planner.core.errors import InputError
-from mfba_planner.core.outputs import write_new
+from mfba_planner.core.output_files import write_new
 from mfba_planner.report import format_values
 from mfba_planner.simulation.episode import Episode
 
 from .charts import charts, look
-from .data import MOST_ROBOTS, MOST_RUNS, MOST_TICKS, in_one_scene, page_data, world_name
+from .page_data import MOST_ROBOTS, MOST_RUNS, MOST_TICKS, in_one_scene, page_data, world_name
 
 # Joined to one script in this sequence; each file uses only what the files before it define.
-_SCRIPTS = ("dom", "clock", "scene", "readout", "charts", "tables", "transport", "main")
+_SCRIPTS = (
+    "dom", "playback_clock", "scene", "readout", "charts", "tables", "playback_bar", "main",
+)  # fmt: skip
 
 
 def write_page(

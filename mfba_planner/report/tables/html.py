@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from mfba_planner.paper.tables.model import Entry, Grid, Section, Verdict
+from mfba_planner.paper.tables.table_entries import Entry, Grid, Section, Verdict
 from mfba_planner.report import style
 
 from . import markdown, text

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from mfba_planner.core.errors import InputError
-from mfba_planner.paper.tables.model import Grid, Section, Verdict
+from mfba_planner.paper.tables.table_entries import Grid, Section, Verdict
 
 from . import text
 from .text import Origin

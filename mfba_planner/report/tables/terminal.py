@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from mfba_planner.paper.tables.model import Entry, Grid, Section, Verdict
+from mfba_planner.paper.tables.table_entries import Entry, Grid, Section, Verdict
 
 from ..terminal_output import print_encodable
 from . import markdown, text

@@ -12,7 +12,7 @@ import numpy as np
 
 from mfba_planner import __version__
 from mfba_planner.evaluation.statistics import Interval
-from mfba_planner.paper.tables.model import Cell, Entry, Grid, Section, Verdict
+from mfba_planner.paper.tables.table_entries import Cell, Entry, Grid, Section, Verdict
 
 NOTHING = "–"
 

@@ -15,10 +15,10 @@ from ...recording.from_messages import command_from_twist, stamp_ns
 from ...simulation.world import World
 from ..interface import topics
 from ..interface.serialized_message import header_stamp_ns
-from ..node_parameters import WorldSimSettings
+from ..node_settings import WorldSimSettings
+from ..runtime.base_node import GraphNode
 from ..runtime.command_matching import CommandMatching
 from ..runtime.command_timeout import CommandTimeout
-from ..runtime.graph_node import GraphNode
 from ..runtime.polled_subscriptions import PolledSubscriptions, SerializedMessage
 from ..runtime.refused_inputs import RefusedInputs
 from .robot_namespace import NamespacedNode

@@ -6,11 +6,11 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from ...core.types import NANO
+from ...core.planner_types import NANO
 from ..interface import to_messages, topics
-from ..interface.health import Status
-from ..node_parameters import PlannerSettings, VirtualSensorSettings
-from ..runtime.graph_node import GraphNode
+from ..interface.diagnostic_status import Status
+from ..node_settings import PlannerSettings, VirtualSensorSettings
+from ..runtime.base_node import GraphNode
 
 
 class DiagnosticsPublisher:

@@ -10,11 +10,11 @@ from std_srvs.srv import Trigger
 
 from ...core.errors import InputError
 from ...core.geometry import Point, Pose2D
-from ...core.types import RefusalReason
+from ...core.planner_types import RefusalReason
 from ...recording.from_messages import goal_point, waypoint_points
 from ..interface import topics
+from ..runtime.base_node import GraphNode
 from ..runtime.goal_queue import GoalQueue
-from ..runtime.graph_node import GraphNode
 from ..runtime.refused_inputs import RefusedInputs
 
 

@@ -9,15 +9,16 @@ from dataclasses import replace
 from typing import Any
 
 from ...core.errors import InputError
-from ...core.types import Observation, Scan
+from ...core.planner_types import Observation, Scan
 from ...perception.scan_to_sectors import aligned
 from ...planning.planner_params import PlannerParams
 from ...recording.from_messages import laser_scan, robot_pose, sector_ranges, stamp_ns
 from ..interface import topics
-from ..node_parameters import PlannerSettings
-from ..runtime.graph_node import GraphNode
-from ..runtime.planner_inputs import Inputs, LockstepInputs, NewestInputs
+from ..node_settings import PlannerSettings
+from ..runtime.base_node import GraphNode
+from ..runtime.lockstep_inputs import Inputs, LockstepInputs
 from ..runtime.refused_inputs import RefusedInputs
+from ..runtime.stale_inputs import NewestInputs
 from ..runtime.stamp_pairing import StampPairs
 from .planner_diagnostics import PlannerDiagnostics
 

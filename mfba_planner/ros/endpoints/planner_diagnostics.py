@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import time
 
-from ...core.types import Decision
+from ...core.planner_types import Decision
 from ...planning.supervised_planner import SupervisedPlanner
 from ...recording.from_messages import points_text
-from ..interface.health import InputHealth, driving_status
-from ..node_parameters import PlannerSettings
+from ..interface.diagnostic_status import InputHealth, driving_status
+from ..node_settings import PlannerSettings
+from ..runtime.base_node import GraphNode
 from ..runtime.goal_queue import GoalQueue
-from ..runtime.graph_node import GraphNode
 from ..runtime.refused_inputs import RefusedInputs
 from .diagnostics_publisher import DiagnosticsPublisher
 

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping
 from geometry_msgs.msg import Twist, TwistStamped
 
 from ...core.geometry import Point
-from ...core.types import Decision, Mode
+from ...core.planner_types import Decision, Mode
 from ...planning.odometry_jump import is_odometry_jump
 from ..interface import markers, to_messages, topics
-from ..node_parameters import PlannerSettings
-from ..runtime.graph_node import GraphNode
+from ..node_settings import PlannerSettings
+from ..runtime.base_node import GraphNode
 
 
 class PlannerPublishers:

@@ -11,7 +11,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from ..interface.topics import GRAPH, Topic
-from ..runtime.graph_node import GraphNode
+from ..runtime.base_node import GraphNode
 from ..runtime.polled_subscriptions import Deliver, PolledSubscriptions
 
 

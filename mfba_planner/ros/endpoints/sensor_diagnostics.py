@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import time
 
-from ..interface.health import InputHealth
-from ..node_parameters import VirtualSensorSettings
-from ..runtime.graph_node import GraphNode
-from ..runtime.planner_inputs import watch_period_s
+from ..interface.diagnostic_status import InputHealth
+from ..node_settings import VirtualSensorSettings
+from ..runtime.base_node import GraphNode
 from ..runtime.refused_inputs import RefusedInputs
+from ..runtime.stale_inputs import watch_period_s
 from .diagnostics_publisher import DiagnosticsPublisher
 
 

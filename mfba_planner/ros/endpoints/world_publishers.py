@@ -11,8 +11,8 @@ from ...simulation.episode import Outcome
 from ...simulation.robot_model import Robot
 from ...simulation.world import World
 from ..interface import markers, to_messages, topics
-from ..node_parameters import WorldSimSettings
-from ..runtime.graph_node import GraphNode
+from ..node_settings import WorldSimSettings
+from ..runtime.base_node import GraphNode
 from .robot_namespace import NamespacedNode
 
 TRAIL_POINTS = 500  # one per view period; of a longer trail the newest is shown

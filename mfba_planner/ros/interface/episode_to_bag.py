@@ -9,12 +9,12 @@ from typing import Any
 
 from rclpy.serialization import serialize_message
 
-from ...core.types import Decision
+from ...core.planner_types import Decision
 from ...perception.sensory_vector import sense_circles, sensory_vector
 from ...recording.bag_writer import BagWriter
-from ...recording.configuration import attach_configuration
-from ...scenarios.plain_data import scenario_to_json
+from ...recording.configuration_attachment import attach_configuration
 from ...scenarios.run_config import Driver, RunConfig, node_parameters, run_facts
+from ...scenarios.scenario_json import scenario_to_json
 from ...simulation.episode import Episode, Outcome
 from . import to_messages, topics
 from .qos_conversion import offered

@@ -14,7 +14,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ...core.geometry import Point, bearing, towards
-from ...core.types import NANO, Decision, Mode, Ranges
+from ...core.planner_types import NANO, Decision, Mode, Ranges
 from ...simulation.world import World
 from .to_messages import pose_msg, set_header
 

@@ -12,7 +12,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
-from ...recording.qos_profiles import OfferedQos
+from ...recording.bag_qos import OfferedQos
 
 DEPTH = 1000  # for publishers whose recorded history is unknown (rosbag2 records depth 0)
 FOREVER_NS = 2**63 - 1

@@ -17,13 +17,13 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
 from ...core.geometry import Point, Pose2D, quaternion_from_yaw
-from ...core.types import Bits, Decision, Mode, Ranges, Scan
+from ...core.planner_types import Bits, Decision, Mode, Ranges, Scan
 from ...perception.sensory_vector import SensorParams, bits_text, longest_range_m
 from ...planning.odometry_jump import is_odometry_jump
 from ...recording.from_messages import SECOND_NS, body_velocity, points_text, rotated
 from ...simulation.episode import Outcome
 from ...simulation.robot_model import Base
-from .health import Status
+from .diagnostic_status import Status
 
 OMNIDIRECTIONAL = Base()
 

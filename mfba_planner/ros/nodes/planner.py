@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...core.geometry import Pose2D
-from ...core.types import NANO, Decision, Mode, Observation, observe
+from ...core.planner_types import NANO, Decision, Mode, Observation, observe
 from ...planning.planner_factory import make_planner
 from ...planning.planner_params import PlannerParams
 from ...planning.recovery import Phase
@@ -15,11 +15,12 @@ from ..endpoints.input_subscriptions import InputSubscriptions
 from ..endpoints.planner_diagnostics import PlannerDiagnostics
 from ..endpoints.planner_publishers import PlannerPublishers
 from ..interface import parameters, topics
-from ..node_parameters import PlannerSettings, names
+from ..node_settings import PlannerSettings, names
 from ..runtime.lifecycle_node import ManagedNode
-from ..runtime.planner_inputs import Inputs, watch_period_s
+from ..runtime.lockstep_inputs import Inputs
 from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.spin_node import spin_node
+from ..runtime.stale_inputs import watch_period_s
 
 
 class PlannerNode(ManagedNode):

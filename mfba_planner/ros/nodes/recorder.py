@@ -15,19 +15,19 @@ from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMsg
 
 from ...core.errors import ConfigError
-from ...core.outputs import new_run_directory
+from ...core.output_files import new_run_directory
+from ...recording.bag_qos import OfferedQos
 from ...recording.bag_writer import BagWriter
-from ...recording.configuration import attach_configuration
+from ...recording.configuration_attachment import attach_configuration
 from ...recording.from_messages import stamp_ns
 from ...recording.message_definitions import definition_of
-from ...recording.qos_profiles import OfferedQos
 from ..endpoints.robot_namespace import graph_topics
 from ..interface import parameters, topics
 from ..interface.qos_conversion import offered
 from ..interface.serialized_message import has_header, header_stamp_ns, type_name
-from ..node_parameters import RecorderSettings, names
-from ..runtime.drain import drain
-from ..runtime.graph_node import GraphNode
+from ..node_settings import RecorderSettings, names
+from ..runtime.base_node import GraphNode
+from ..runtime.drain_subscriptions import drain
 from ..runtime.parameter_client import NodeParameters, ParameterClient
 from ..runtime.polled_subscriptions import Deliver, PolledSubscriptions, SerializedMessage
 from ..runtime.spin_node import spin_node

@@ -11,7 +11,7 @@ from std_srvs.srv import Trigger
 
 from ..replaying.bag_player import Phase, Player
 from ..replaying.replay_arguments import ReplaySettings, parse, split_ros_args
-from ..runtime.graph_node import SPIN_S, GraphNode
+from ..runtime.base_node import SPIN_S, GraphNode
 from ..runtime.spin_node import spin_node
 
 FINE_S = 0.0015  # an executor wakes up late: it is left this long before a message is due

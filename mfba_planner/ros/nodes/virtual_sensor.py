@@ -9,15 +9,15 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...core.geometry import Point, Pose2D
-from ...core.types import Ranges
+from ...core.planner_types import Ranges
 from ...perception.scan_to_sectors import sense_scan
 from ...perception.sensory_vector import SensorParams, sense_circles, sensory_vector
 from ...recording.from_messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
 from ..endpoints.sensor_diagnostics import SensorDiagnostics
 from ..interface import parameters, topics
 from ..interface.to_messages import sectors_msg, sensory_vector_msg
-from ..node_parameters import Source, VirtualSensorSettings, names
-from ..runtime.graph_node import GraphNode
+from ..node_settings import Source, VirtualSensorSettings, names
+from ..runtime.base_node import GraphNode
 from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.spin_node import spin_node
 from ..runtime.stamp_pairing import StampPairs

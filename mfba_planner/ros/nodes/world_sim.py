@@ -13,14 +13,14 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from std_srvs.srv import SetBool, Trigger
 
 from ...core.errors import ConfigError, InputError
-from ...core.types import NANO
+from ...core.planner_types import NANO
 from ...recording.from_messages import pose2d
 from ...simulation.episode import stamp_of
-from ..endpoints.fleet_interface import FleetInterface
-from ..endpoints.scenario_parameter import declare_scenario
+from ..endpoints.declare_scenario_parameter import declare_scenario
+from ..endpoints.simulated_fleet_interface import FleetInterface
 from ..interface import parameters, topics
-from ..node_parameters import WorldSimSettings, names
-from ..runtime.graph_node import GraphNode
+from ..node_settings import WorldSimSettings, names
+from ..runtime.base_node import GraphNode
 from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.spin_node import spin_node
 from ..runtime.tick_control import TickControl

@@ -21,7 +21,7 @@ from ...recording.replay_schedule import (
 )
 from ..interface import topics
 from ..interface.to_messages import clock_msg
-from ..runtime.graph_node import SPIN_S, GraphNode
+from ..runtime.base_node import SPIN_S, GraphNode
 from .flow_control import FlowControl, all_acknowledged, windowed
 from .reader_readiness import Readiness
 from .replay_arguments import ReplaySettings

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from ...core.types import NANO
-from ..node_parameters import WorldSimSettings
+from ...core.planner_types import NANO
+from ..node_settings import WorldSimSettings
 
 TICKS = 1.25  # a Twist is meant for one tick: it holds at least that long
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
-from .graph_node import GraphNode
+from .base_node import GraphNode
 
 
 class ManagedNode(GraphNode, LifecycleNodeMixin):

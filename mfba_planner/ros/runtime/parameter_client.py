@@ -12,7 +12,7 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
 from ..interface import parameters
-from .graph_node import GraphNode
+from .base_node import GraphNode
 
 PERIOD_S = 0.05
 RETRY_S = 1.0  # a response can get lost while a server has not discovered its client yet

@@ -10,7 +10,7 @@ import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from .graph_node import GraphNode
+from .base_node import GraphNode
 
 
 class StopFlag:

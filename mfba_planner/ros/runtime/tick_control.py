@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from ...core.errors import GraphError
-from ..node_parameters import WorldSimSettings
+from ..node_settings import WorldSimSettings
 
 
 class TickControl:

@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The predictive planner: bits and gaps as in the paper, but of predicted obstacle motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..core.declared_options import check, option
+from ..core.geometry import Point, distance
+from ..core.planner_types import NANO, ROBOT_RADIUS_M, Bits, Circle, Observation
+from ..core.random_streams import stream
+from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
+from ..perception.obstacle_tracker import Tracker, TrackingParams
+from ..perception.sensory_vector import SensorParams
+from ..swarm.bat_swarm import BatSwarm
+from ..swarm.search_region import Disc
+from .base_planner import BasePlanner, Move
+from .mode_transitions import Event
+from .planner_params import PlannerParams
+from .trajectory_cost import (
+    Candidate,
+    RiskParams,
+    TrajectoryCost,
+    circles_from_sectors,
+    predicted_circles,
+)
+
+LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
+WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
+SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a direction is needed
+HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
+_FREE_M = 1e-9
+_LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictiveParams:
+    """Options of the predictive planner in addition to PlannerParams."""
+
+    headings: int = option(72, "number of headings, one bit each", minimum=12, maximum=3600)
+    reach_m: float = option(
+        2.5, "largest distance of a waypoint", unit="m", minimum=0.01, maximum=100.0
+    )
+    search_m: float = option(
+        0.3, "radius of the disc the bats search", unit="m", minimum=0.001, maximum=100.0
+    )
+    robot_radius_m: float = option(
+        ROBOT_RADIUS_M,
+        "radius of the robot, by which scan obstacles are enlarged",
+        unit="m",
+        minimum=0.0,
+        maximum=10.0,
+    )
+    sector_radius_m: float = option(
+        0.3,
+        "radius of the circle that replaces a set sector",
+        unit="m",
+        minimum=0.01,
+        maximum=10.0,
+    )
+    memory: ObstacleMemoryParams = field(default_factory=ObstacleMemoryParams)
+    tracking: TrackingParams = field(default_factory=TrackingParams)
+    risk: RiskParams = field(default_factory=RiskParams)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+def preset(params: PlannerParams | None = None) -> PlannerParams:
+    """The given options with the goal step and the swarm tuned for the predictive planner.
+
+    A goal step of 0.08 m takes 0.1 s at 0.8 m/s, so obstacles move little between ticks. One
+    iteration of five bats per tick is enough, as the next tick continues from their best.
+    """
+    params = params or PlannerParams()
+    bat = replace(params.bat, population=5, iterations=1)
+    return replace(params, step_length_m=0.08, bat=bat)
+
+
+class Predictive(BasePlanner):
+    """Straight to the goal if free; otherwise the cheapest candidate waypoint, refined by bats.
+
+    A heading's bit is set if at full speed the robot comes too close to a circle within tau. The
+    candidates lie in the nearest free headings on both sides of the goal direction (in every
+    sixth heading if all are closed), and on the straight line after waiting at rest or at half
+    speed. The bats then search a disc around the best. The objective of all is
+    TrajectoryCost.cost: eq. 1 through the waypoint, plus waiting, plus risk. The waypoint of the
+    last tick is a candidate again, so that the search continues from tick to tick.
+    """
+
+    reads_sectors = False
+    preset = staticmethod(preset)
+
+    def __init__(
+        self,
+        params: PlannerParams,
+        sensor: SensorParams,
+        seed: int,
+        options: PredictiveParams | None = None,
+    ) -> None:
+        """Start idle; ConfigError for a negative seed."""
+        self.options = options or PredictiveParams()
+        n = self.options.headings
+        angles = 2.0 * math.pi / n * np.arange(1, n + 1)
+        self._cos, self._sin = np.cos(angles), np.sin(angles)
+        lengths = [share * self.options.reach_m for share in LENGTHS]
+        self._rays = [
+            [((c * length, s * length), length) for length in lengths]
+            for c, s in zip(self._cos.tolist(), self._sin.tolist())
+        ]
+        self._waypoint: Point | None = None
+        self._memory = ObstacleMemory(self.options.memory)
+        self._tracker = Tracker(self.options.tracking)
+        super().__init__(params, sensor, seed)
+
+    def move(self, obs: Observation, goal: Point) -> Move:
+        """Choose waypoint and speed; no search while the straight line is free."""
+        position, speed = obs.pose.position, self.params.speed_mps
+        straight = self.straight(position, goal, speed)
+        last_waypoint, self._waypoint = self._waypoint, None
+        circles = self._circles(obs)
+        if not circles:
+            return Move(velocity=straight, reason="no obstacle within SR")
+        tick_s = self.tick_s
+        (x, y), (gx, gy) = position, goal
+        to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
+        costs = TrajectoryCost(position, circles, self.options.risk, tick_s, speed)
+        share = min(1.0, speed * tick_s / goal_distance)
+        waypoint, t1 = (to_goal[0] * share, to_goal[1] * share), share * goal_distance / speed
+        least = costs.cost(waypoint, t1, to_goal, speed)
+        if least <= goal_distance + _FREE_M:
+            return Move(velocity=straight, reason="the straight way is free")
+        vs: Bits = tuple(costs.closed(self._cos * speed, self._sin * speed).tolist())
+        gaps = self._nearest_free(vs, to_goal)
+        candidates = self._waypoints(gaps, to_goal, goal_distance)
+        if last_waypoint is not None:  # often still the best: then most others need no evaluation
+            q = (last_waypoint[0] - x, last_waypoint[1] - y)
+            candidates.insert(
+                0, (-math.inf, q, max(distance((0.0, 0.0), q) / speed, tick_s), _LAST_WAYPOINT)
+            )
+        found = costs.cheapest(candidates, to_goal, speed, least)
+        if found is not None:
+            waypoint, t1, least = found
+        swarm = self._refine(costs, waypoint, to_goal, least, obs.stamp_ns)
+        if swarm.best_value < least:
+            (qx, qy), least = swarm.best_x, swarm.best_value
+            waypoint = (qx, qy)
+            t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
+        if distance((0.0, 0.0), waypoint) > 0.999 * t1 * speed:
+            self._waypoint = (x + waypoint[0], y + waypoint[1])
+        scale = 1.0 / max(t1, distance((0.0, 0.0), waypoint) / speed)
+        u = (waypoint[0] * scale, waypoint[1] * scale)
+        gap, excess = self._gap(waypoint), least - goal_distance
+        reason = f"the straight way closes; {excess:.3g} m longer"
+        if all(vs):
+            reason, gap = f"every heading closes; the least risk costs {excess:.3g} m", 0
+        elif vs[gap - 1]:
+            gap = 0
+        return Move(
+            velocity=u,
+            reason=f"{reason}, at {1e2 * distance((0.0, 0.0), u) / speed:.0f} % speed",
+            event=Event.OBSTACLE,
+            vs=vs,
+            vg=vs,  # here a heading is both sector and gap
+            gap=gap,
+            waypoint=(x + waypoint[0], y + waypoint[1]),
+            candidates=tuple((x + dx, y + dy) for dx, dy in swarm.candidates),
+        )
+
+    def forget(self) -> None:
+        """Drop the last waypoint, the tracks and the remembered circles."""
+        self._waypoint = None
+        self._memory = ObstacleMemory(self.options.memory)
+        self._tracker = Tracker(self.options.tracking)
+
+    def _circles(self, obs: Observation) -> Sequence[Circle]:
+        """Circles at obs.stamp_ns: given and remembered, tracked, or one for each set sector."""
+        stamp_ns, pose = obs.sensed or (obs.stamp_ns, obs.pose)
+        if obs.circles is not None:
+            reach_m = self.sensor.sensing_range_m
+            known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
+            return predicted_circles(known, (obs.stamp_ns - stamp_ns) * NANO)
+        if obs.scan is not None:
+            self._tracker.update(stamp_ns, pose, obs.scan)
+            radius_m = self.params.scan_radius_m or self.options.robot_radius_m
+            return self._tracker.circles(obs.stamp_ns, radius_m)
+        return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
+
+    def _nearest_free(self, closed: Bits, to_goal: Point) -> list[int]:
+        """The free headings nearest to the goal's on both sides; every sixth if none is free."""
+        n = len(closed)
+        if 0 not in closed:
+            return list(range(0, n, n // HEADINGS_IF_CLOSED))
+        above = math.floor(math.atan2(to_goal[1], to_goal[0]) * n / (2.0 * math.pi)) % n
+        around = closed[above:] + closed[:above]
+        left, right = around.index(0), n - 1 - around[::-1].index(0)
+        return [(above + k) % n for k in sorted({left, right})]
+
+    def _gap(self, waypoint: Point) -> int:
+        """Number (from 1) of the heading nearest to a waypoint; the last one is +x."""
+        n = self.options.headings
+        return (round(math.atan2(waypoint[1], waypoint[0]) * n / (2.0 * math.pi)) - 1) % n + 1
+
+    def _waypoints(self, gaps: list[int], to_goal: Point, goal_distance: float) -> list[Candidate]:
+        """Candidate waypoints, numbered by heading, or from n on for those with waiting.
+
+        They are sorted by their least possible cost, so that most need no evaluation.
+        """
+        speed, (gx, gy), candidates = self.params.speed_mps, to_goal, []
+        for k in gaps:
+            for q, length in self._rays[k]:
+                rx, ry = gx - q[0], gy - q[1]
+                candidates.append((length + math.sqrt(rx * rx + ry * ry), q, length / speed, k))
+        ex, ey = gx / goal_distance * speed, gy / goal_distance * speed
+        waiting = self.options.risk.waiting * speed
+        for number, share in enumerate(SPEEDS, self.options.headings):
+            for t in WAITS_S:
+                lower = goal_distance + waiting * t * (1.0 - share)
+                candidates.append((lower - _FREE_M, (ex * share * t, ey * share * t), t, number))
+        candidates.sort()
+        return candidates
+
+    def _refine(
+        self, costs: TrajectoryCost, center: Point, to_goal: Point, bound: float, stamp_ns: int
+    ) -> BatSwarm:
+        """Search around the best waypoint by bats; costs not below the bound are cut short."""
+        bat, speed, tick_s = self.params.bat, self.params.speed_mps, self.tick_s
+        disc = Disc(self.options.search_m, center)
+        swarm = BatSwarm(bat, disc, stream(self.seed, stamp_ns), ahead=bat.iterations)
+        for _ in range(bat.iterations + 1):
+            values = []
+            for qx, qy in swarm.ask():
+                # At least one tick: the velocity is held that long and must not overshoot.
+                t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
+                values.append(costs.cost((qx, qy), t1, to_goal, speed, bound))
+            swarm.tell(values)
+            bound = min(bound, swarm.best_value)
+        return swarm

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenario to plain data and JSON, and back: the form that nodes and bags use."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+from ..core.declared_options import override
+from ..core.errors import ConfigError
+from ..core.geometry import Point
+from ..simulation.obstacle_motion import Obstacle, Turn, Walls
+from ..simulation.robot_model import Robot
+from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
+
+EXAMPLE = "compare config/scenarios/case1.yaml"
+
+
+LIMIT = 1e6  # no number in a scenario is larger
+
+
+def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as plain data; load_scenario makes an equal one of it."""
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(scenario), default=lambda e: e.value))
+    # Unused keys are left out, as recordings compare scenarios as text.
+    if scenario.robot == Robot():
+        del plain["robot"]
+    if not scenario.kidnappings:
+        del plain["kidnappings"]
+    if not scenario.robots:
+        del plain["robots"]
+    for obstacle in plain["obstacles"]:
+        if not obstacle["turns"]:
+            del obstacle["turns"]
+    return plain
+
+
+def scenario_to_json(scenario: Scenario) -> str:
+    """One line of JSON for load_scenario; equal scenarios give equal text."""
+    return json.dumps(scenario_to_dict(scenario), sort_keys=True)
+
+
+def parse_robot(options: dict[str, Any]) -> Robot:
+    """The robot from options of simulation.robot_model, nested or dotted.
+
+    Raises ConfigError for an unknown option or a bad value.
+    """
+    try:
+        return override(Robot(), dict(_dotted(options)))
+    except ConfigError as error:
+        raise ConfigError(f"robot.{error}") from None
+
+
+def _dotted(options: dict[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in options.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+class UnusualError(Exception):
+    """Data that scenario_to_dict would not write: invalid, or written by hand."""
+
+
+def as_written(data: dict[str, Any]) -> Scenario:
+    """The scenario from data that scenario_to_dict wrote, without the slow import of yaml_schema.
+
+    Raises UnusualError for any other data; yaml_schema.checked accepts all that this accepts.
+    """
+    name, description, walls = data.get("name"), data.get("description"), data.get("walls")
+    if not isinstance(name, str) or not re.fullmatch(r"\w[\w .+-]{0,99}", name, re.ASCII):
+        raise UnusualError
+    if not isinstance(description, str):
+        raise UnusualError
+    _require_keys(data, Scenario, "robot", "kidnappings", "robots")
+    robot = data.get("robot", {})
+    if not isinstance(robot, dict):
+        raise UnusualError
+    return Scenario(
+        name=name,
+        description=description,
+        start_m=_point(data["start_m"]),
+        goal_m=_point(data["goal_m"]),
+        robot_radius_m=_positive(data["robot_radius_m"]),
+        obstacles=tuple(_obstacle(entry) for entry in _list(data["obstacles"])),
+        walls=None if walls is None else _walls(walls),
+        time_limit_s=_positive(data["time_limit_s"]),
+        robot=parse_robot(robot),
+        kidnappings=tuple(_kidnapping(entry) for entry in _list(data.get("kidnappings", []))),
+        robots=tuple(_member(entry) for entry in _list(data.get("robots", []))),
+    )
+
+
+def _member(data: Any) -> FleetRobot:
+    _require_keys(data, FleetRobot)
+    if not isinstance(data["name"], str):
+        raise UnusualError
+    return FleetRobot(
+        name=data["name"], start_m=_point(data["start_m"]), goal_m=_point(data["goal_m"])
+    )
+
+
+def _kidnapping(data: Any) -> Kidnapping:
+    _require_keys(data, Kidnapping)
+    return Kidnapping(at_s=_positive(data["at_s"]), to_m=_point(data["to_m"]))
+
+
+def _obstacle(data: Any) -> Obstacle:
+    _require_keys(data, Obstacle, "turns")
+    return Obstacle(
+        center_m=_point(data["center_m"]),
+        radius_m=_positive(data["radius_m"]),
+        speed_mps=_not_negative(data["speed_mps"]),
+        heading_rad=_number(data["heading_rad"]),
+        turns=tuple(_turn(entry) for entry in _list(data.get("turns", []))),
+    )
+
+
+def _turn(data: Any) -> Turn:
+    _require_keys(data, Turn)
+    return Turn(
+        at_s=_positive(data["at_s"]),
+        speed_mps=_not_negative(data["speed_mps"]),
+        heading_rad=_number(data["heading_rad"]),
+    )
+
+
+def _walls(data: Any) -> Walls:
+    _require_keys(data, Walls)
+    return Walls(lower_m=_point(data["lower_m"]), upper_m=_point(data["upper_m"]))
+
+
+def _require_keys(data: Any, kind: type, *optional: str) -> None:
+    wanted = set(kind.__dataclass_fields__)  # type: ignore[attr-defined]
+    if not isinstance(data, dict) or not wanted - {*optional} <= set(data) <= wanted:
+        raise UnusualError
+
+
+def _list(data: Any) -> list[Any]:
+    if not isinstance(data, list):
+        raise UnusualError
+    return data
+
+
+def _point(data: Any) -> Point:
+    if len(_list(data)) != 2:
+        raise UnusualError
+    return (_number(data[0]), _number(data[1]))
+
+
+def _number(value: Any) -> float:
+    if type(value) is not float or not -LIMIT <= value <= LIMIT:  # NaN is neither
+        raise UnusualError
+    return value
+
+
+def _not_negative(value: Any) -> float:
+    if _number(value) < 0.0:
+        raise UnusualError
+    return float(value)
+
+
+def _positive(value: Any) -> float:
+    if _number(value) <= 0.0:
+        raise UnusualError
+    return float(value)
