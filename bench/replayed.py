@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A new planner fed from a replayed bag at any rate: whether it reaches the recorded digest.
 
-Replay and planner are processes of their own, in lockstep; every sectors message must give one decision.
-Bags of both case studies, algorithms and readings, as fast as possible.
+Replay and planner are separate processes, in lockstep; every sectors message must give one
+decision. Bags of both case studies, algorithms and readings, as fast as possible.
 """
 
 from __future__ import annotations
@@ -84,7 +84,8 @@ def main() -> int:
         equal += same
         print(
             f"{index}: {case}, {algorithm}, {reading}: {count} of "
-            f"{len(recorded.ticks)} decisions, {'same digest' if same else f'OTHER digest {found}'}",
+            f"{len(recorded.ticks)} decisions, "
+            f"{'same digest' if same else f'OTHER digest {found}'}",
             flush=True,
         )
     print(f"{equal} of {options.bags} digests equal to the recorded ones")
