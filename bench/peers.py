@@ -194,7 +194,7 @@ def sphere(x: Any) -> float:
 
 
 def speed(rounds: int) -> None:
-    """Print microseconds per evaluation and ratios: population 5 alone, and many runs at once."""
+    """Print microseconds per evaluation and ratios: one small run at a time, and many at once."""
     box, many = FUNCTIONS["F1"].box(DIMENSION), 200
     subjects: dict[str, tuple[Callable[[int], object], int]] = {}
     for name, run in PEERS.items():

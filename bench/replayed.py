@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A new planner fed from a replayed bag at any rate: whether it reaches the recorded digest.
 
-Replay and planner are two processes, in lockstep; every sectors message must give one decision.
-Bags of both case studies, algorithms and readings, as fast as possible.
+Replay and planner are separate processes, in lockstep; every sectors message must give one
+decision. Bags of both case studies, algorithms and readings, as fast as possible.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mfba_planner.core.declared_options import flatten, override
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.node_processes import parameters_yaml
 from mfba_planner.launcher.ros_domain import private_domain
-from mfba_planner.paper import readings_of_paper
+from mfba_planner.paper import readings_of_paper as readings
 from mfba_planner.recording.from_messages import decision, stamp_ns
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
@@ -72,8 +72,8 @@ def main() -> int:
     equal = 0
     for index in range(options.bags):
         case, algorithm = ("case1", "case2")[index % 2], ("mfba", "ba")[index // 2 % 2]
-        reading = list(readings_of_paper.PLANNERS)[index // 4 % len(readings_of_paper.PLANNERS)]
-        planner = override(readings_of_paper.planner(reading), {"bat.algorithm": algorithm})
+        reading = list(readings.PLANNERS)[index // 4 % len(readings.PLANNERS)]
+        planner = override(readings.planner(reading), {"bat.algorithm": algorithm})
         config = replace(RunConfig(scenario=load_scenario(case)), planner=planner, seed=index)
         with tempfile.TemporaryDirectory() as name, private_domain() as domain:
             root = Path(name)
