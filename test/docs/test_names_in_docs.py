@@ -91,3 +91,10 @@ def test_names_are_found_and_wrong_ones_refused() -> None:
     assert not resolves("mfba_planner.absent.types")
     assert exists("swarm/bat_swarm.py")
     assert not exists("core/bat_swarm.py")
+
+
+@pytest.mark.parametrize("name", [name for name in TEXTS if name.startswith("docs/")])
+def test_a_page_begins_with_its_readers_and_what_they_can_do_after_it(name: str) -> None:
+    generated = name.startswith("docs/reference/")  # lists to look things up
+    starts = re.match(r"# .+\n\n\*For [^*]+ After this page you [^*]+\*\n", TEXTS[name])
+    assert generated or starts, name
