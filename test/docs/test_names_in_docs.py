@@ -96,5 +96,5 @@ def test_names_are_found_and_wrong_ones_refused() -> None:
 @pytest.mark.parametrize("name", [name for name in TEXTS if name.startswith("docs/")])
 def test_a_page_begins_with_its_readers_and_what_they_can_do_after_it(name: str) -> None:
     generated = name.startswith("docs/reference/")  # lists to look things up
-    starts = re.match(r"# .+\n\n\*For [^*]+ After this page you [^*]+\*\n", TEXTS[name])
+    starts = re.match(r"# .+\n\n\*For [^*]+\sAfter this page you [^*]+\*\n", TEXTS[name])
     assert generated or starts, name
