@@ -14,7 +14,7 @@ import tempfile
 from itertools import product
 from pathlib import Path
 
-from mfba_planner.core.declared_options import override
+from mfba_planner.core.option_specs import override
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.read_episode import read_episode

@@ -19,7 +19,7 @@ import numpy as np
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import LaserScan
 
-from mfba_planner.core.declared_options import flatten
+from mfba_planner.core.option_specs import flatten
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.bag_writer import BagWriter

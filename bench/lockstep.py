@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 from manual_run import ALL, ManualRun
 
-from mfba_planner.core.declared_options import override
+from mfba_planner.core.option_specs import override
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings_of_paper

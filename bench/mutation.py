@@ -36,23 +36,23 @@ PACKAGE = ROOT / "mfba_planner"
 # By module, as a path below mfba_planner/: its test files below test/, the closest first.
 TESTS = {
     "swarm/bat_swarm": [
-        "swarm/test_bat_swarm", "core/test_declared_options", "planning/test_algorithm_1",
+        "swarm/test_bat_swarm", "core/test_option_specs", "planning/test_algorithm_1",
         "simulation/test_episode",
     ],
-    "swarm/bat_params": ["core/test_declared_options", "swarm/test_bat_swarm"],
+    "swarm/bat_params": ["core/test_option_specs", "swarm/test_bat_swarm"],
     "swarm/swarm_iteration": ["swarm/test_bat_swarm", "planning/test_algorithm_1"],
     "swarm/search_region": ["swarm/test_bat_swarm", "planning/test_algorithm_1"],
     "swarm/objective_failures": ["swarm/test_bat_swarm"],
     "swarm/batched_swarms": ["swarm/test_batched_swarms"],
     "perception/sensory_vector": [
-        "perception/test_sensory_vector", "core/test_declared_options",
+        "perception/test_sensory_vector", "core/test_option_specs",
         "planning/test_algorithm_1", "simulation/test_episode",
     ],
     "planning/gap_vector": [
         "planning/test_gap_vector", "planning/test_algorithm_1", "simulation/test_episode",
     ],
     "planning/algorithm_1": [
-        "planning/test_algorithm_1", "core/test_declared_options", "simulation/test_episode",
+        "planning/test_algorithm_1", "core/test_option_specs", "simulation/test_episode",
     ],
     "simulation/obstacle_motion": [
         "simulation/test_scenario_and_motion", "simulation/test_episode",
@@ -65,7 +65,7 @@ TESTS = {
         "perception/test_sensory_vector", "planning/test_gap_vector",
         "planning/test_algorithm_1", "simulation/test_episode",
     ],
-    "core/declared_options": ["core/test_declared_options"],
+    "core/option_specs": ["core/test_option_specs"],
 }  # fmt: skip
 SLOW = "not 200_seeds and not fig_1_runs_both"
 TIMEOUT_S = 120

@@ -19,7 +19,7 @@ DIGESTS = """
 import hashlib, platform, numpy
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.run_episode import run
-from mfba_planner.core.declared_options import override
+from mfba_planner.core.option_specs import override
 from mfba_planner.paper.readings_of_paper import PLANNERS
 from mfba_planner.scenarios import load_scenario
 sums, runs = hashlib.sha256(), 0

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from rclpy.context import Context
 
-from mfba_planner.core.declared_options import flatten, override
+from mfba_planner.core.option_specs import flatten, override
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.node_processes import parameters_yaml
 from mfba_planner.launcher.ros_domain import private_domain

@@ -23,7 +23,7 @@ from typing import Any
 from reference_text import PARAMETERS_TEXT, SERVICES, SERVICES_TEXT, TOPICS_TEXT, YAML_HEAD
 
 from mfba_planner import cli
-from mfba_planner.core.declared_options import override, walk
+from mfba_planner.core.option_specs import override, walk
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_factory import DEFAULT_METHOD
 from mfba_planner.planning.planner_params import PlannerParams

@@ -6,8 +6,8 @@ from __future__ import annotations
 from importlib import import_module
 
 from .. import __version__
-from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
+from ..core.option_specs import did_you_mean
 
 # Each is a module of this package with main(args) -> exit code.
 COMMANDS = {

@@ -6,12 +6,12 @@ from __future__ import annotations
 import argparse
 
 from ..core.argument_parser import Parser
-from ..core.declared_options import flatten
 from ..core.errors import BagError
+from ..core.option_specs import flatten
 from ..core.output_files import bag_in
 from ..evaluation.metrics import evaluate
+from ..recording.decisions_without_inputs import print_omissions
 from ..recording.fleet_topics import with_robot_name
-from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import Recording, read_recording
 from ..report.result_table import comparison_text
 from ..simulation.decision_digest import digest

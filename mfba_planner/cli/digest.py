@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.output_files import bag_in
+from ..recording.decisions_without_inputs import print_omissions
 from ..recording.fleet_topics import NO_NAMESPACE, select_robots
-from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import summaries
 from ..report.result_json import read_result
 

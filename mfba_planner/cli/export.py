@@ -15,8 +15,8 @@ from ..core.errors import BagError, ConfigError
 from ..core.output_files import bag_in, new_file
 from ..recording.bag_reader import BagReader
 from ..recording.decisions_with_sectors import robots_with_decisions
+from ..recording.decisions_without_inputs import print_omissions
 from ..recording.fleet_topics import select_robots
-from ..recording.omitted_decisions import print_omissions
 from ..recording.tick_table import COLUMNS, Row, read_rows
 
 BATCH = 5000  # rows in memory at a time

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
+from ..core.option_specs import did_you_mean
 from ..core.output_files import new_run_directory, refuse_existing, write_new
 from ..report.figures.paper_figures import FIGURES, FORMATS, render
 

@@ -9,8 +9,8 @@ from ..core.output_files import bag_in
 from ..launcher.run_result import show
 from ..recording.bag_info import describe, format_info
 from ..recording.configuration_attachment import ATTACHMENT_NAME
+from ..recording.decisions_without_inputs import print_omissions
 from ..recording.fleet_topics import NO_NAMESPACE
-from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import Summary, summaries
 from ..report.fleet_table import fleet_text
 

@@ -7,7 +7,7 @@ from enum import Enum
 from typing import Any
 
 from ..core.argument_parser import Parser
-from ..core.declared_options import Spec, flatten
+from ..core.option_specs import Spec, flatten
 from ..launcher.set_option import option_rows
 from ..planning.planner_factory import params_for_method
 from ..planning.planner_params import PlannerParams

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.output_files import bag_in
-from ..recording.omitted_decisions import print_omissions
+from ..recording.decisions_without_inputs import print_omissions
 from ..recording.read_episode import read_recording
 
 

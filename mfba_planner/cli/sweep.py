@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.argument_parser import Parser
-from ..core.declared_options import Scalar, flatten
+from ..core.option_specs import Scalar, flatten
 from ..core.output_files import new_run_directory, write_same
 from ..evaluation.study.compute_chunks import check_workers
 from ..evaluation.suites import suite_names

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from .declared_options import did_you_mean
 from .errors import ConfigError
+from .option_specs import did_you_mean
 
 
 class Parser(argparse.ArgumentParser):

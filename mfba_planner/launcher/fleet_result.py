@@ -7,7 +7,7 @@ import sys
 
 from ..core.errors import MfbaError
 from ..evaluation.metrics import evaluate
-from ..recording.omitted_decisions import print_omissions
+from ..recording.decisions_without_inputs import print_omissions
 from ..recording.read_episode import read_recording
 from ..report.fleet_table import fleet_text, why_no_success
 from .run_state import Run

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.argument_parser import Parser
-from ..core.declared_options import override
 from ..core.errors import ConfigError
+from ..core.option_specs import override
 from ..paper import readings_of_paper
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD, params_for_method

@@ -10,8 +10,8 @@ from pathlib import Path
 from ..core.errors import MfbaError
 from ..core.geometry import distance
 from ..evaluation.metrics import Result, evaluate
+from ..recording.decisions_without_inputs import print_omissions
 from ..recording.fleet_topics import NO_NAMESPACE
-from ..recording.omitted_decisions import print_omissions
 from ..recording.read_episode import read_recording
 from ..simulation.episode import Episode, Outcome
 from .run_state import Run

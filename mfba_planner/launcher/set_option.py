@@ -7,8 +7,8 @@ import argparse
 from collections.abc import Iterable
 from typing import Any
 
-from ..core.declared_options import did_you_mean, override, walk
 from ..core.errors import ConfigError
+from ..core.option_specs import did_you_mean, override, walk
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..simulation.robot_model import Robot

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.declared_options import override
 from ..core.errors import ConfigError
+from ..core.option_specs import override
 from ..paper import readings_of_paper
 from ..planning.planner_factory import DEFAULT_METHOD, params_for_method
 from ..planning.planner_params import Method

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
+from ..core.option_specs import did_you_mean
 from ..planning.planner_params import PlannerParams, Swarm
 from ..swarm.bat_swarm import BatParams, Bounds, Epsilon, Initial, Schedule, Step, Velocity, Walk
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..core.declared_options import Scalar, flatten, override
 from ..core.geometry import Point, bearing, distance, towards
+from ..core.option_specs import Scalar, flatten, override
 from ..evaluation import statistics
 from ..evaluation.metrics import evaluate
 from ..perception.sensory_vector import SensorParams

@@ -7,8 +7,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..core.declared_options import check, option
 from ..core.geometry import Point, distance
+from ..core.option_specs import check, option
 from ..core.planner_types import NANO, Circle
 
 _SAME_SHARE = 0.25  # of the radius: circles at most this far apart are the same one

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.declared_options import check, option
 from ..core.geometry import Point, Pose2D
+from ..core.option_specs import check, option
 from ..core.planner_types import NANO, Circle, Scan
 
 Array = np.ndarray

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.declared_options import check, option
 from ..core.errors import InputError
 from ..core.geometry import Point, ray_circle_distance, tangent_half_angle
+from ..core.option_specs import check, option
 from ..core.planner_types import Bits, Ranges
 
 TWO_PI = 2.0 * math.pi

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from ..core.declared_options import check, option
+from ..core.option_specs import check, option
 from ..core.planner_types import NANO
 from ..swarm.bat_swarm import BatParams
 from .gap_vector import GapHeading

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
+from ..core.option_specs import did_you_mean
 from ..core.planner_types import PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..swarm.bat_swarm import Algorithm

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..core.declared_options import check, option
 from ..core.geometry import Point, distance
+from ..core.option_specs import check, option
 from ..core.planner_types import NANO, ROBOT_RADIUS_M, Bits, Circle, Observation
 from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams

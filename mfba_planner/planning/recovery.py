@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from ..core.declared_options import check, option
 from ..core.geometry import wrap_angle
+from ..core.option_specs import check, option
 from ..core.planner_types import Ranges
 
 SECOND_NS = 1e9

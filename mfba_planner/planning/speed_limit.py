@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..core.declared_options import check, option
+from ..core.option_specs import check, option
 from ..core.planner_types import Ranges
 
 

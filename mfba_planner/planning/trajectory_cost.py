@@ -10,8 +10,8 @@ from operator import itemgetter
 
 import numpy as np
 
-from ..core.declared_options import check, option
 from ..core.geometry import Point, towards
+from ..core.option_specs import check, option
 from ..core.planner_types import Circle, Ranges
 
 _ROUNDING = 1.0 - 1e-9

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 from ..core.errors import BagError, InputError
 from ..core.planner_types import Decision, Ranges
 from .bag_reader import BagReader, DecodedMessage
+from .decisions_without_inputs import omission_text
 from .fleet_topics import NO_NAMESPACE, messages_by_robot, robot_topic, with_robot_name
 from .from_messages import decision, sector_ranges, stamp_ns
-from .omitted_decisions import omission_text
 
 SECTORS, DECISION = "/sectors", "/planner/decision"
 MAX_WAITING = 10_000  # sectors without decision, decisions without sectors, matched stamps: each

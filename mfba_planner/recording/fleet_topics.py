@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
-from ..core.declared_options import did_you_mean
 from ..core.errors import BagError
+from ..core.option_specs import did_you_mean
 from .bag_reader import BagReader, DecodedMessage
 
 NO_NAMESPACE = ""

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar
 
-from ..core.declared_options import flatten, override
 from ..core.errors import BagError, ConfigError, InputError
 from ..core.geometry import Pose2D
+from ..core.option_specs import flatten, override
 from ..core.planner_types import Decision
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams

@@ -15,8 +15,8 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from mfba_planner import __version__
-from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import InputError
+from mfba_planner.core.option_specs import flatten
 from mfba_planner.core.output_files import write_new
 from mfba_planner.evaluation.metrics import Result, evaluate
 from mfba_planner.scenarios.scenario_json import scenario_to_dict

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ..core.declared_options import check, option
+from ..core.option_specs import check, option
 from ..core.planner_types import ROBOT_RADIUS_M
 from ..planning.planner_params import PlannerParams
 from ..simulation.robot_model import Base, Robot

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..core.declared_options import Scalar, check, flatten, option
 from ..core.errors import ConfigError
 from ..core.geometry import Pose2D
+from ..core.option_specs import Scalar, check, flatten, option
 from ..core.planner_types import NANO
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams

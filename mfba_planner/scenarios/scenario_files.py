@@ -9,8 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
+from ..core.option_specs import did_you_mean
 from ..core.shipped_files import scenario_names, scenario_path
 from ..simulation.scenario import Scenario
 from .scenario_json import EXAMPLE, UnusualError, as_written

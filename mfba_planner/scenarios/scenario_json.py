@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from ..core.declared_options import override
 from ..core.errors import ConfigError
 from ..core.geometry import Point
+from ..core.option_specs import override
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.robot_model import Robot
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario

@@ -14,8 +14,8 @@ from typing import Annotated, Any
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError
+from ..core.option_specs import did_you_mean
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
 from .scenario_json import EXAMPLE, LIMIT, parse_robot

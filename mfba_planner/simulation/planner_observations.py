@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.declared_options import did_you_mean
 from ..core.errors import ConfigError, InputError
 from ..core.geometry import Pose2D, distance
+from ..core.option_specs import did_you_mean
 from ..core.planner_types import Circle, Observation, Ranges, RefusalReason, Scan, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams, blind, sense_circles

@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from ..core.declared_options import check, option
 from ..core.errors import ConfigError
+from ..core.option_specs import check, option
 
 FEWEST_BEAMS = 12
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ..core.declared_options import check, option
 from ..core.errors import ConfigError
+from ..core.option_specs import check, option
 
 
 class Algorithm(Enum):

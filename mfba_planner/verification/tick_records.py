@@ -12,9 +12,9 @@ from ..core.errors import InputError
 from ..core.geometry import Point
 from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions_with_sectors import DECISION, SECTORS, ranges_of, require_decisions
+from ..recording.decisions_without_inputs import omission_text
 from ..recording.fleet_topics import messages_by_robot
 from ..recording.from_messages import goal_point, stamp_ns, waypoint_points
-from ..recording.omitted_decisions import omission_text
 
 ODOM, OBSTACLES, VECTOR, SCAN = "/odom", "/obstacles", "/sensory_vector", "/scan"
 GOAL, WAYPOINTS = "/goal_pose", "/waypoints"
@@ -175,7 +175,7 @@ def _join_unstamped(
 
 
 def _omit_decisions(records: TickRecords, inputs: Sequence[str]) -> None:
-    """Note the decisions after the end of an input, see recording/omitted_decisions.py.
+    """Note the decisions after the end of an input, see recording/decisions_without_inputs.py.
 
     Not if these are all decisions, nor for an input that was never recorded.
     """

@@ -6,7 +6,7 @@ import re
 import pytest
 from project import ROOT
 
-from mfba_planner.core.declared_options import walk
+from mfba_planner.core.option_specs import walk
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.recovery import RecoveryParams, longest_s
 from mfba_planner.ros.node_settings import PlannerSettings, WorldSimSettings

@@ -10,8 +10,8 @@ import pytest
 from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
 from ros_graph import Graph
 
-from mfba_planner.core.declared_options import override
 from mfba_planner.core.errors import GraphError
+from mfba_planner.core.option_specs import override
 from mfba_planner.core.planner_types import NANO, Mode
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.in_process_driver import run_in_process

@@ -14,8 +14,8 @@ from launch_standin import declared, launched
 from project import ROOT
 from ros_graph import Graph
 
-from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import ConfigError, InputError
+from mfba_planner.core.option_specs import flatten
 from mfba_planner.launcher.robot_launch_description import (
     PLANNER_ARGUMENTS,
     REPLAY_ARGUMENTS,

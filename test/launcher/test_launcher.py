@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from launched_programs import Program, complete
 
-from mfba_planner.core.declared_options import override
+from mfba_planner.core.option_specs import override
 from mfba_planner.launcher.run_arguments import read_request
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.recording.bag_reader import BagReader

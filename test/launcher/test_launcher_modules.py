@@ -17,8 +17,8 @@ from rclpy.context import Context
 from rclpy.node import Node
 from waiting import wait_until
 
-from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import GraphError, OutputError
+from mfba_planner.core.option_specs import flatten
 from mfba_planner.launcher import node_processes
 from mfba_planner.launcher.console import RunConsole
 from mfba_planner.launcher.node_processes import NodeProcess, NodeProcesses, parameters_yaml

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from mfba_planner.core.declared_options import override
 from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.option_specs import override
 from mfba_planner.evaluation.metrics import Result, evaluate
 from mfba_planner.paper import readings_of_paper
 from mfba_planner.planning.planner_params import PlannerParams, Swarm

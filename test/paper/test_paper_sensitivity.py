@@ -13,9 +13,9 @@ import pytest
 from project import ROOT
 
 from mfba_planner import cli
-from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import ConfigError, OutputError
 from mfba_planner.core.geometry import distance
+from mfba_planner.core.option_specs import flatten
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.paper import sensitivity

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mfba_planner.core.declared_options import override
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D, distance
+from mfba_planner.core.option_specs import override
 from mfba_planner.core.planner_types import Decision, Mode, Observation
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
 from mfba_planner.planning.algorithm_1 import Algorithm1

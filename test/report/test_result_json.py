@@ -17,8 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner import __version__
-from mfba_planner.core.declared_options import override
 from mfba_planner.core.errors import InputError, OutputError
+from mfba_planner.core.option_specs import override
 from mfba_planner.core.output_files import write_new
 from mfba_planner.evaluation.metrics import Result, evaluate
 from mfba_planner.perception.sensory_vector import SensorParams

@@ -24,7 +24,7 @@ from rclpy.serialization import serialize_message
 from ros_graph import Graph
 from std_srvs.srv import Trigger
 
-from mfba_planner.core.declared_options import override
+from mfba_planner.core.option_specs import override
 from mfba_planner.core.planner_types import Mode
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain

@@ -16,8 +16,8 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import ConfigError, OutputError
+from mfba_planner.core.option_specs import flatten
 from mfba_planner.core.planner_types import Mode
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams

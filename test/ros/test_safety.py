@@ -13,7 +13,7 @@ from message_relay import SPEED_FACTOR, TIMEOUT_S, RelayedGraph, Tamper
 from ros_graph import Graph
 from std_srvs.srv import SetBool
 
-from mfba_planner.core.declared_options import flatten
+from mfba_planner.core.option_specs import flatten
 from mfba_planner.planning.recovery import RecoveryParams, longest_s
 from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.ros.endpoints.diagnostics_publisher import DiagnosticsPublisher

@@ -3,8 +3,8 @@
 
 import pytest
 
-from mfba_planner.core.declared_options import flatten
 from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.option_specs import flatten
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.scenarios.run_config import NODES, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...core.argument_parser import Parser
-from ...core.declared_options import override
 from ...core.errors import ConfigError, InputError
+from ...core.option_specs import override
 from ...core.output_files import bag_in
 from ...core.shipped_files import scenario_names
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
+from ...recording.decisions_without_inputs import print_omissions
 from ...recording.fleet_topics import NO_NAMESPACE, select_robots
-from ...recording.omitted_decisions import print_omissions
 from ...recording.read_episode import Recording, read_recording
 from ...report.result_json import read_result
 from ...scenarios.scenario_files import load_scenario

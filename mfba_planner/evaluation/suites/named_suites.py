@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core.declared_options import did_you_mean
 from ...core.errors import ConfigError
+from ...core.option_specs import did_you_mean
 from ...simulation.scenario import Scenario
 from .adversarial_worlds import FAMILIES, adversarial_obstacles
 from .random_crowds import CrowdParams, Motion, crowd

@@ -9,8 +9,8 @@ from enum import Enum
 
 import numpy as np
 
-from ...core.declared_options import check, option
 from ...core.errors import ConfigError
+from ...core.option_specs import check, option
 from ...simulation.obstacle_motion import Obstacle, Turn
 from .task_geometry import OBSTACLE_RADIUS_M, ROOM, leaves_room
 

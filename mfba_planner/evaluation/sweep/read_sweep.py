@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...core.declared_options import override
 from ...core.errors import ConfigError, InputError
+from ...core.option_specs import override
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ..study.chunk_store import code_digest, read_chunk, read_manifest

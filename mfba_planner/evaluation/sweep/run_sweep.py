@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...core.declared_options import flatten
 from ...core.errors import ConfigError, MfbaError
+from ...core.option_specs import flatten
 from ..study.chunk import Chunk
 from ..study.chunk_store import Store
 from ..study.compute_chunks import compute

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
-from ...core.declared_options import flatten
 from ...core.errors import ConfigError
+from ...core.option_specs import flatten
 from ...core.planner_types import PathPlanner
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.declared_options import Scalar, flatten
+from ...core.option_specs import Scalar, flatten
 from ...evaluation.metrics import assess
 from ...planning.planner_params import PlannerParams
 from ...simulation.run_episode import run

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from ...core.declared_options import did_you_mean
 from ...core.errors import ConfigError
+from ...core.option_specs import did_you_mean
 from ...simulation.scenario import Scenario
 from ..study.chunk import SampleChunk
 from ..study.plan import Size, benchmark_plan, trip_plan

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mfba_planner.core.declared_options import walk
+from mfba_planner.core.option_specs import walk
 from mfba_planner.core.planner_types import Bits, Mode
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances, within_range
 from mfba_planner.perception.sensory_vector import SensorParams

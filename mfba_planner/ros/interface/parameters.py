@@ -19,8 +19,8 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ...core.declared_options import Spec, did_you_mean, override, walk
 from ...core.errors import ConfigError
+from ...core.option_specs import Spec, did_you_mean, override, walk
 
 T = TypeVar("T")
 

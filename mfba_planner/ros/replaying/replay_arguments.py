@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.argument_parser import Parser
-from ...core.declared_options import check, did_you_mean, option, walk
 from ...core.errors import ConfigError
+from ...core.option_specs import check, did_you_mean, option, walk
 
 CLOCK_HZ = 40.0  # as `ros2 bag play --clock`
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core import errors
-from mfba_planner.core.declared_options import (
+from mfba_planner.core.errors import ConfigError, MfbaError
+from mfba_planner.core.option_specs import (
     Spec,
     check,
     did_you_mean,
@@ -19,7 +20,6 @@ from mfba_planner.core.declared_options import (
     override,
     walk,
 )
-from mfba_planner.core.errors import ConfigError, MfbaError
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.swarm.bat_swarm import Algorithm, BatParams, Bounds
