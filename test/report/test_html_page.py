@@ -283,7 +283,7 @@ turn();
 """
 
 
-@pytest.mark.parametrize("calm", [False, True], ids=["smooth", "calm"])
+@pytest.mark.parametrize("reduced_motion", [False, True], ids=["smooth", "reduced"])
 def test_positions_are_interpolated_unless_motion_is_reduced(
     browser: Browser, single: Path, episode: Episode, reduced_motion: bool
 ) -> None:

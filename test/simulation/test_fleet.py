@@ -376,7 +376,7 @@ def test_commands_for_one_robot_refuse_a_fleet(driven: Path) -> None:
     with pytest.raises(BagError, match="holds 4 robots, but this reads a bag of one"):
         read_episode(driven / "bag")
     for args, what in (
-        (["--real-time"], "--real-time: 10 robots run in lockstep here; leave it out"),
+        (["--real-time"], "--real-time: 10 robots run in lockstep only; leave it out"),
         (["--driver", "core"], "use `mfba sim`"),
     ):
         with pytest.raises(ConfigError, match=what):
