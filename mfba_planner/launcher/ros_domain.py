@@ -16,6 +16,9 @@ from ..core.errors import GraphError
 # at another id and goes round, so that a domain is not reused at once.
 DOMAINS = range(1, 102)
 FIRST_PORT, PORTS = 7400, 250  # first port of domain 0, ports per domain: RTPS port mapping
+# Variables that let other domains or hosts take part: participants of one discovery server
+# find each other whatever their domains, and static peers are asked wherever they are.
+LEAVING = ("ROS_DISCOVERY_SERVER", "ROS_SUPER_CLIENT", "ROS_STATIC_PEERS")
 _next_domains = itertools.islice(itertools.cycle(DOMAINS), os.getpid() % len(DOMAINS), None)
 
 
@@ -66,18 +69,20 @@ def require_network(address: str = "127.0.0.1") -> None:
 
 @contextmanager
 def private_domain() -> Iterator[int]:
-    """Claim a domain, and set it for this process and its children; discovery is local only."""
+    """Claim a domain, and set it for this process and its children; discovery is local only.
+
+    Variables that would undo this are removed meanwhile: a simulated run must not command a robot.
+    """
     require_network()
     domain, lock = claim_domain()
     variables = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    previous = {name: os.environ.get(name) for name in variables}
+    previous = {name: os.environ.pop(name, None) for name in (*variables, *LEAVING)}
     os.environ.update(variables)
     with lock:
         try:
             yield domain
         finally:
             for name, value in previous.items():
-                if value is None:
-                    del os.environ[name]
-                else:
+                os.environ.pop(name, None)
+                if value is not None:
                     os.environ[name] = value

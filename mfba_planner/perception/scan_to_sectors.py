@@ -12,6 +12,9 @@ from ..core.errors import InputError
 from ..core.planner_types import Ranges, Scan
 from .sensory_vector import SensorParams, mark_sectors, single_precision
 
+# A driver may send the first beam of the next turn as well, and rounds the increment.
+FULL_TURN_RAD = 1.01 * 2.0 * math.pi
+
 
 def aligned(scan: Scan, yaw_rad: float) -> Scan:
     """The scan in a frame in which the scan's own frame has the yaw yaw_rad."""
@@ -34,6 +37,12 @@ def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: Sensor
             " check the lidar driver"
         )
     r = np.asarray(scan.ranges_m, dtype=np.float64)
+    turn_rad = abs(scan.angle_increment_rad) * (r.size - 1)
+    if r.size > 1 and not 0.0 < turn_rad <= FULL_TURN_RAD:
+        raise InputError(
+            f"scan of {r.size} beams with angle_increment={scan.angle_increment_rad}: they span "
+            f"{turn_rad:.4g} rad, not more than 0 and at most a full turn; check the lidar driver"
+        )
     near = np.isneginf(r)
     hits = near | ((r >= scan.range_min_m) & (r <= scan.range_max_m) & np.isfinite(r))
     if not (hits | np.isposinf(r)).any():

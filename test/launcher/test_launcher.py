@@ -43,6 +43,15 @@ def check_bag(bag: Path, expected: episode.Episode) -> None:
     assert configuration["run"]["driver"] == recorded.driver
 
 
+@pytest.mark.parametrize("driver", ["in-process", "multi-process"])
+def test_a_run_is_private_whatever_discovery_server_is_set(tmp_path: Path, driver: str) -> None:
+    """Through a server, nodes of every domain find each other; without one, none does."""
+    words = ("empty", "--driver", driver, *PAPER)
+    absent = {"ROS_DISCOVERY_SERVER": "127.0.0.1:11811", "ROS_SUPER_CLIENT": "TRUE"}
+    done = complete("launcher", *words, cwd=tmp_path, **absent)
+    assert (done.process.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize(("scenario", "algorithm"), [("case1", "mfba"), ("case2", "ba")])
 def test_multi_process_run_equals_the_core_s(
     tmp_path: Path, scenario: str, algorithm: str

@@ -378,6 +378,25 @@ def test_a_scan_of_impossible_geometry_is_refused(changes: dict[str, Any]) -> No
         sense_scan(replace(scan([1.0]), **changes), 0.0, 0.3, PAPER)
 
 
+@pytest.mark.parametrize(
+    "increment_rad", [0.0, -0.0, 2.2 * math.pi / 359.0, -2.2 * math.pi / 359.0]
+)
+def test_beams_in_one_direction_or_beyond_a_full_turn_are_refused(increment_rad: float) -> None:
+    wrong = replace(scan([1.0] * 360), angle_increment_rad=increment_rad)
+    with pytest.raises(
+        InputError, match=r"^scan of 360 beams with angle_increment=.*lidar driver$"
+    ):
+        sense_scan(wrong, 0.0, 0.3, PAPER)
+
+
+@pytest.mark.parametrize("beams", [1, 2, 12, 360, 1081])
+@pytest.mark.parametrize("sign", [1, -1], ids=["upright", "upside down"])
+def test_a_full_turn_with_both_its_ends_is_a_scan(beams: int, sign: int) -> None:
+    increment_rad = sign * 2.0 * math.pi / max(beams - 1, 1)
+    whole = replace(scan([0.5] * beams), angle_increment_rad=increment_rad)
+    assert any(sensory_vector(sense_scan(whole, 0.0, 0.3, PAPER)))
+
+
 def test_a_pose_without_yaw_is_refused() -> None:
     with pytest.raises(InputError, match=r"yaw=nan: unusable"):
         sense_scan(scan([1.0]), math.nan, 0.3, PAPER)
