@@ -39,10 +39,13 @@ class BasePlanner:
 
     Subclasses define move(), and forget() if they keep state; forget() is called before the
     first observation and by reset(). A subclass that never reads ranges_m when circles or a scan
-    are given sets reads_sectors to False; sweeps then do not compute sectors.
+    are given sets reads_sectors to False; sweeps then do not compute sectors. inputs are the ways
+    to observe obstacles of which one is enough; without any of them the planner stops, because
+    it must not take unknown space for free. () is for a planner that ignores obstacles.
     """
 
     reads_sectors = True
+    inputs: tuple[str, ...] = ("sectors", "circles", "scan")
 
     def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
         """Start idle; ConfigError for a negative seed."""
@@ -76,7 +79,7 @@ class BasePlanner:
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
             self._goal = obs.goal
-        stop = reason_to_stop(obs, self.params, sectors=False)
+        stop = reason_to_stop(obs, self.params, sectors=False) or self._missing_input(obs)
         if stop is None and self.mode is not Mode.ARRIVED:
             assert obs.goal is not None
             move = self.move(obs, obs.goal)
@@ -87,6 +90,16 @@ class BasePlanner:
             move = Move(velocity=(0.0, 0.0), reason=reason, event=event)
         self.mode = transition(self.mode, move.event)
         return with_odometry_jump(self._decision(obs, move), odometry_jump_reason)
+
+    def _missing_input(self, obs: Observation) -> tuple[Event, str] | None:
+        given = {
+            "sectors": bool(obs.ranges_m),
+            "circles": obs.circles is not None,
+            "scan": obs.scan is not None,
+        }
+        if not self.inputs or any(given[name] for name in self.inputs):
+            return None
+        return Event.INVALID, f"refused input: none of {', '.join(self.inputs)}"
 
     def straight(self, position: Point, target: Point, speed_mps: float) -> Point:
         """Velocity towards the target, at most speed_mps, and not beyond the target in a tick."""

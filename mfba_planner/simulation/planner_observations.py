@@ -23,6 +23,8 @@ from .world import World
 SENSOR_STREAM = 2  # spawn key of the noise's SeedSequence child; the planner's is 1
 BEAMS = {"scan-12": 12, "scan-360": 360}
 NAMES = ("sectors", "known", *BEAMS)
+# What an Observation holds of the obstacles, beside the sectors.
+INPUTS = {"sectors": "sectors", "known": "circles"} | dict.fromkeys(BEAMS, "scan")
 
 Sensed = tuple[tuple[Circle, ...] | None, Scan | None]
 

@@ -385,6 +385,15 @@ def test_seeds_of_a_world_are_a_single_case() -> None:
         ({"planners": ("math:Mine",)}, "planner math:Mine: cannot be imported"),
         ({"planners": ()}, "--planner: none given"),
         ({"planners": ("paper", "paper")}, "--planner paper: given twice"),
+        (
+            {"planners": ("orca",), "setting": Setting(perception="scan-360")},
+            "--perception scan-360: planner orca uses none of it; give --perception known",
+        ),
+        (
+            {"planners": ("paper", "dwa"), "setting": Setting(perception="sectors")},
+            "--perception sectors: planner dwa uses none of it; "
+            "give --perception known or scan-12 or scan-360",
+        ),
         ({"worlds": 0}, "--worlds=0: out of range; give at least 1"),
         ({"first": -1}, "--first=-1: out of range; give at least 0"),
         ({"seeds": 0}, "--seeds=0: out of range; give at least 1"),

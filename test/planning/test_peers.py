@@ -150,8 +150,31 @@ def test_a_scan_gives_the_same_velocity_as_circles(name: str) -> None:
     )
     by_scan = make(name, PARAMS).plan(replace(OBSERVATION, circles=None, scan=scan)).velocity
     assert by_scan == pytest.approx(velocity(name, circle(0.9, 0.0, radius_m=0.3)))
-    blind = make(name, PARAMS).plan(replace(OBSERVATION, circles=None)).velocity
-    assert blind == pytest.approx((0.8, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "observed", "inputs"),
+    [
+        ("apf", {}, "circles, scan"),
+        ("vfh", {}, "circles, scan"),
+        ("dwa", {}, "circles, scan"),
+        ("orca", {}, "circles"),
+        ("orca", {"scan": Scan(
+            ranges_m=np.full(36, np.inf), angle_min_rad=0.0, angle_increment_rad=math.pi / 18,
+            range_min_m=0.0, range_max_m=1.1,
+        )}, "circles"),
+    ],
+    ids=["apf", "vfh", "dwa", "orca", "orca, scan"],
+)  # fmt: skip
+def test_without_an_input_that_it_uses_a_planner_stops(
+    name: str, observed: dict[str, Scan], inputs: str
+) -> None:
+    """Sectors are given: unknown is not free."""
+    blind = replace(OBSERVATION, circles=None, **observed)  # type: ignore[arg-type]
+    decision = make(name, PARAMS).plan(blind)
+    assert (decision.mode, decision.velocity) == (Mode.STOPPED, (0.0, 0.0))
+    assert decision.reason == f"refused input: none of {inputs}"
+    assert make("straight", PARAMS).plan(blind).velocity == pytest.approx((0.8, 0.0))
 
 
 def test_circle_rows_are_relative_to_the_robot() -> None:

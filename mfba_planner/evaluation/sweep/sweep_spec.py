@@ -6,7 +6,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ from ...core.planner_types import PathPlanner
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ...planning.planner_registry import Factory, find_factory, preset_of
-from ...simulation.planner_observations import Perception
+from ...simulation.planner_observations import INPUTS, Perception
 from ...simulation.scenario import Scenario
 from ..suites import suite
 from ..suites.named_suites import SPEED_MPS
@@ -122,7 +122,9 @@ class SweepSpec:
         if not self.planners:
             raise ConfigError("--planner: none given; name at least one")
         for k, name in enumerate(self.planners):
-            self.setting_of(name).make_planner(Run(self.suite, 0, name, 0))
+            setting = self.setting_of(name)
+            planner = setting.make_planner(Run(self.suite, 0, name, 0))
+            _check_inputs(name, getattr(planner, "inputs", ()), setting.perception)
             if name in self.planners[:k]:
                 raise ConfigError(f"--planner {name}: given twice; name each planner once")
 
@@ -149,6 +151,17 @@ class SweepSpec:
             for world in worlds
             for seed in self.run_seeds(world)
         ]
+
+
+def _check_inputs(planner: str, inputs: Sequence[str], perception: str) -> None:
+    """Raise ConfigError for a planner that could not observe any obstacle."""
+    if not inputs or "sectors" in inputs or INPUTS[perception] in inputs:
+        return
+    usable = [name for name, given in INPUTS.items() if given in inputs]
+    raise ConfigError(
+        f"--perception {perception}: planner {planner} uses none of it; "
+        f"give --perception {' or '.join(usable)}"
+    )
 
 
 def make_planner(name: str, params: PlannerParams, sensor: SensorParams, seed: int) -> PathPlanner:

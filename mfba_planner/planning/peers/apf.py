@@ -25,6 +25,7 @@ class PotentialField(BasePlanner):
     """
 
     reads_sectors = False
+    inputs = ("circles", "scan")
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """Follow the force."""

@@ -27,6 +27,7 @@ class DynamicWindow(BasePlanner):
     """
 
     reads_sectors = False
+    inputs = ("circles", "scan")
 
     def __init__(self, *args: object) -> None:
         """Prepare the samples."""

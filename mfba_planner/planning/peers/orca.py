@@ -24,6 +24,7 @@ class Orca(BasePlanner):
     """One ORCA agent among agents at constant velocity; needs known circles."""
 
     reads_sectors = False
+    inputs = ("circles",)
 
     def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
         """Raise ConfigError where pyrvo is not installed."""
@@ -41,7 +42,7 @@ class Orca(BasePlanner):
         self._velocity: Point = (0.0, 0.0)
 
     def move(self, obs: Observation, goal: Point) -> Move:
-        """The velocity of ORCA; straight to the goal without circles."""
+        """The velocity of ORCA; straight to the goal if no circle is within SR."""
         wanted = self.straight(obs.pose.position, goal, self.params.speed_mps)
         circles = obs.circles or ()
         if not circles:

@@ -12,6 +12,7 @@ class Straight(BasePlanner):
     """Drives straight to the goal at full speed."""
 
     reads_sectors = False
+    inputs = ()
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """Straight to the goal."""

@@ -26,6 +26,7 @@ class VectorFieldHistogram(BasePlanner):
     """
 
     reads_sectors = False
+    inputs = ("circles", "scan")
 
     def forget(self) -> None:
         """Drop the last heading."""
