@@ -38,6 +38,8 @@ REPLACED = {
     "flight": "iteration",
     "legs": "segments",
     "conduct": "contacts and clearances",
+    "doubt": "standard deviation, uncertainty, reason",
+    "doubts": "standard deviations",
     "evidence": "tick records",
     "mounting": "extrinsics",
     "scratch": "redecide",

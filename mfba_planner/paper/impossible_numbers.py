@@ -52,9 +52,9 @@ def _benchmark() -> dict[str, str]:
     found = {}
     for row in dict.fromkeys(p.row for p in published.BENCHMARK):
         v = published.values("Table 3", row)
-        doubt = _spread(published.BENCHMARK_RUNS, v["best"], v["worst"], v["mean"], v["sd"])
-        if doubt:
-            found[f"Table 3/{row}/sd"] = doubt
+        reason = _spread(published.BENCHMARK_RUNS, v["best"], v["worst"], v["mean"], v["sd"])
+        if reason:
+            found[f"Table 3/{row}/sd"] = reason
         minimum = TABLE_2_MINIMUM[row.split()[0]]
         for column in ("best", "worst", "mean"):
             if v[column] < minimum - SMALLEST_FIGURE:
@@ -70,15 +70,15 @@ def _trips() -> dict[str, str]:
     for table in published.TRIPS:
         for row in ("BA", "MFBA"):
             v = published.values(table, row)
-            doubt = _spread(
+            reason = _spread(
                 published.TRIP_RUNS,
                 v["minimum"],
                 v["maximum"],
                 v["mean"],
                 v["standard deviation"],
             )
-            if doubt:
-                found[f"{table}/{row}/standard deviation"] = doubt
+            if reason:
+                found[f"{table}/{row}/standard deviation"] = reason
     return found
 
 

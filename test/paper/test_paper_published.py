@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The printed numbers, and each impossible one recomputed independently of doubts.py."""
+"""The printed numbers; each impossible one is recomputed by other formulas."""
 
 import math
 import re
