@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Differential drive and lidar in the real graph: the core's decisions, and the messages."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from edited_bags import rewrite
+from planner_talk import PlannerHarness, fields, odom, sectors
 from ros_graph import Graph
 
+from mfba_planner.core.planner_types import Scan
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import Method, PlannerParams
@@ -17,6 +21,7 @@ from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.from_messages import laser_scan, robot_pose
 from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.to_messages import scan_msg
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
@@ -119,9 +124,9 @@ def test_the_messages_of_a_lidar_robot(graph: Graph, beams: int) -> None:
     expected = simulate(
         near(robot), planner=PAPER, sensor=SensorParams(), seed=3, go_on=lambda w: w.tick < 6
     )
-    for scan, odom, tick in zip(scans, odoms, expected.ticks):
-        assert (scan.header.stamp, len(scan.ranges)) == (odom.header.stamp, beams)
-        assert robot_pose(odom) == tick.pose
+    for scan, odometry, tick in zip(scans, odoms, expected.ticks):
+        assert (scan.header.stamp, len(scan.ranges)) == (odometry.header.stamp, beams)
+        assert robot_pose(odometry) == tick.pose
         assert laser_scan(scan).range_max_m == pytest.approx(3.5)
     for twist in twists:
         assert twist.linear.y == 0.0
@@ -145,3 +150,23 @@ def test_it_drives_in_real_time_too(tmp_path: Path, domain_id: int) -> None:
     run_in_process(config, tmp_path / "bag", domain_id=domain_id)
     recorded = read_episode(tmp_path / "bag")
     assert recorded.outcome is Outcome.GOAL_REACHED
+
+
+def test_a_decision_has_the_scan_of_its_stamp_however_late_its_odom_is(graph: Graph) -> None:
+    """An obstacle ahead in the first scan, none in the second; then the odometry of both."""
+    config = run_config(near(SCANNING), TRACKING)
+    harness = PlannerHarness(graph, node_parameters(config, peers=())["planner"], at=(9.0, 0.0))
+    scans = graph.writer(topics.SCAN)
+    free = Scan(
+        ranges_m=np.full(360, np.inf), angle_min_rad=-math.pi,
+        angle_increment_rad=math.radians(1.0), range_min_m=0.1, range_max_m=3.5,
+    )  # fmt: skip
+    blocked = free.ranges_m.copy()
+    blocked[180 - 57 - 20 : 180 - 57 + 20] = 0.8  # towards +x: the lidar's yaw is 1 rad
+    for stamp, ranges in ((1, blocked), (2, free.ranges_m)):
+        scans.publish(scan_msg(replace(free, ranges_m=ranges), stamp, "base_scan"))
+        harness.sectors.publish(sectors(stamp))
+        graph.settle()
+    first, second = harness.decide_all(odom(1), odom(2))
+    assert "1" in fields(first)["vs"]
+    assert fields(second)["vs"] != fields(first)["vs"]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -21,6 +22,8 @@ from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.stale_inputs import NewestInputs
 from ..runtime.stamp_pairing import StampPairs
 from .planner_diagnostics import PlannerDiagnostics
+
+SCANS_KEPT = 100  # by so many ticks odom may come after its scan
 
 
 class InputSubscriptions:
@@ -53,7 +56,7 @@ class InputSubscriptions:
             LockstepInputs() if lockstep else NewestInputs()
         )
         self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True)
-        self._scan: Scan | None = None
+        self._scans: OrderedDict[int, Scan] = OrderedDict()  # by stamp, for odom that is late
 
     def subscribe(self) -> None:
         """Subscribe to odom and sectors, and to scan where it is needed."""
@@ -69,10 +72,13 @@ class InputSubscriptions:
 
     def add_scan(self, observation: Observation) -> Observation:
         """Return the observation with the scan that its sectors were computed from."""
-        if self._scan is None or observation.refused:
+        stamp = observation.stamp_ns
+        while self._scans and next(iter(self._scans)) < stamp:
+            self._scans.popitem(last=False)
+        if stamp not in self._scans or observation.refused:
             return observation
         yaw = observation.pose.yaw + self._settings.scan_yaw
-        return replace(observation, scan=aligned(self._scan, yaw))
+        return replace(observation, scan=aligned(self._scans[stamp], yaw))
 
     def _on_odom(self, message: Any) -> None:
         self._receive("odom", message, robot_pose, self._pairs.add_odom)
@@ -94,7 +100,9 @@ class InputSubscriptions:
             return
         if pair is not None:
             sectors, scan = pair
-            self._scan = laser_scan(scan)
+            self._scans[stamp_ns(scan.header.stamp)] = laser_scan(scan)
+            if len(self._scans) > SCANS_KEPT:
+                self._scans.popitem(last=False)
             self._receive_sectors(sectors)
 
     def _receive_sectors(self, message: Any) -> None:
