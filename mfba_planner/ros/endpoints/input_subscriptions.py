@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ...core.errors import InputError
@@ -22,8 +22,6 @@ from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.stale_inputs import NewestInputs
 from ..runtime.stamp_pairing import StampPairs
 from .planner_diagnostics import PlannerDiagnostics
-
-SCANS_KEPT = 100  # by so many ticks odom may come after its scan
 
 
 class InputSubscriptions:
@@ -56,7 +54,6 @@ class InputSubscriptions:
             LockstepInputs() if lockstep else NewestInputs()
         )
         self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True)
-        self._scans: OrderedDict[int, Scan] = OrderedDict()  # by stamp, for odom that is late
 
     def subscribe(self) -> None:
         """Subscribe to odom and sectors, and to scan where it is needed."""
@@ -70,15 +67,12 @@ class InputSubscriptions:
         """In real time the newest inputs if one is older than timeout_s."""
         return self._pairs.stale(time.monotonic(), timeout_s)
 
-    def add_scan(self, observation: Observation) -> Observation:
+    def add_scan(self, observation: Observation, scan: Scan | None) -> Observation:
         """Return the observation with the scan that its sectors were computed from."""
-        stamp = observation.stamp_ns
-        while self._scans and next(iter(self._scans)) < stamp:
-            self._scans.popitem(last=False)
-        if stamp not in self._scans or observation.refused:
+        if scan is None or observation.refused:
             return observation
         yaw = observation.pose.yaw + self._settings.scan_yaw
-        return replace(observation, scan=aligned(self._scans[stamp], yaw))
+        return replace(observation, scan=aligned(scan, yaw))
 
     def _on_odom(self, message: Any) -> None:
         self._receive("odom", message, robot_pose, self._pairs.add_odom)
@@ -100,14 +94,13 @@ class InputSubscriptions:
             return
         if pair is not None:
             sectors, scan = pair
-            self._scans[stamp_ns(scan.header.stamp)] = laser_scan(scan)
-            if len(self._scans) > SCANS_KEPT:
-                self._scans.popitem(last=False)
-            self._receive_sectors(sectors)
+            self._receive_sectors(sectors, laser_scan(scan))
 
-    def _receive_sectors(self, message: Any) -> None:
+    def _receive_sectors(self, message: Any, scan: Scan | None = None) -> None:
         self.range_max_m = message.range_max
-        self._receive("sectors", message, sector_ranges, self._pairs.add_sectors)
+        self._receive(
+            "sectors", message, sector_ranges, partial(self._pairs.add_sectors, scan=scan)
+        )
 
     def _receive(self, name: str, message: Any, convert: Any, add: Any) -> None:
         """Convert one message and pair it; a complete pair goes to on_inputs."""

@@ -120,11 +120,11 @@ class PlannerNode(ManagedNode):
         self._publish(self._plan(self._perceive(inputs)))
 
     def _perceive(self, inputs: Inputs) -> Observation:
-        stamp, pose, ranges, age_s = inputs
+        stamp, pose, ranges, age_s, scan = inputs
         goal = self.goals.advance(pose, self.path_planner.params.goal_tolerance_m)
         observation = observe(stamp, pose, ranges, goal, self._pose, round(age_s / NANO))
         self._pose = observation.pose
-        return self._inputs.add_scan(observation)
+        return self._inputs.add_scan(observation, scan)
 
     def _plan(self, observation: Observation) -> Decision:
         self._last = self.path_planner.plan(observation)

@@ -6,17 +6,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ...core.geometry import Pose2D
-from ...core.planner_types import Ranges, RefusalReason
+from ...core.planner_types import Ranges, RefusalReason, Scan
 from .stamp_pairing import StampPairs
 
 
 class Inputs(NamedTuple):
-    """What one decision is made on."""
+    """What one decision is made on; scan is the one of the sectors, for a tracking planner."""
 
     stamp_ns: int
     pose: Pose2D | RefusalReason
     ranges_m: Ranges | RefusalReason
     age_s: float = 0.0
+    scan: Scan | None = None
 
 
 class LockstepInputs:
@@ -24,24 +25,36 @@ class LockstepInputs:
 
     def __init__(self) -> None:
         """Start with nothing received."""
-        self._pairs: StampPairs[Pose2D | RefusalReason, Ranges | RefusalReason] = StampPairs(
-            repeat=True
-        )
+        self._pairs: StampPairs[
+            Pose2D | RefusalReason, tuple[Ranges | RefusalReason, Scan | None]
+        ] = StampPairs(repeat=True)
 
     def add_odom(
         self, stamp_ns: int, pose: Pose2D | RefusalReason, _now_s: float
     ) -> Inputs | None:
         """Add odom; StampError for a stamp older than the last pair's."""
-        pair = self._pairs.add_a(stamp_ns, pose)
-        return Inputs(stamp_ns, *pair) if pair else None
+        return _inputs(stamp_ns, self._pairs.add_a(stamp_ns, pose))
 
     def add_sectors(
-        self, stamp_ns: int, ranges_m: Ranges | RefusalReason, _now_s: float
+        self,
+        stamp_ns: int,
+        ranges_m: Ranges | RefusalReason,
+        _now_s: float,
+        scan: Scan | None = None,
     ) -> Inputs | None:
-        """Add sectors; StampError for a stamp older than the last pair's."""
-        pair = self._pairs.add_b(stamp_ns, ranges_m)
-        return Inputs(stamp_ns, *pair) if pair else None
+        """Add sectors and their scan; StampError for a stamp older than the last pair's."""
+        return _inputs(stamp_ns, self._pairs.add_b(stamp_ns, (ranges_m, scan)))
 
     def stale(self, _now_s: float, _timeout_s: float) -> Inputs | None:
         """None: in lockstep time does not pass without a message."""
         return None
+
+
+def _inputs(
+    stamp_ns: int,
+    pair: tuple[Pose2D | RefusalReason, tuple[Ranges | RefusalReason, Scan | None]] | None,
+) -> Inputs | None:
+    if pair is None:
+        return None
+    pose, (ranges_m, scan) = pair
+    return Inputs(stamp_ns, pose, ranges_m, scan=scan)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from ...core.errors import StampError
 from ...core.geometry import Pose2D
-from ...core.planner_types import Ranges, RefusalReason
+from ...core.planner_types import Ranges, RefusalReason, Scan
 from .lockstep_inputs import Inputs
 
 
@@ -21,6 +21,7 @@ class NewestInputs:
         """Start with nothing received."""
         self._pose: Pose2D | RefusalReason = "no odom yet"
         self._ranges: Ranges | RefusalReason = "no sectors yet"
+        self._scan: Scan | None = None
         self._odom_ns = self._sectors_ns = -1
         self._odom_s = self._sectors_s = 0.0
 
@@ -34,12 +35,17 @@ class NewestInputs:
         return None
 
     def add_sectors(
-        self, stamp_ns: int, ranges_m: Ranges | RefusalReason, now_s: float
+        self,
+        stamp_ns: int,
+        ranges_m: Ranges | RefusalReason,
+        now_s: float,
+        scan: Scan | None = None,
     ) -> Inputs | None:
         """Return sectors with the newest odom; StampError for a stamp that does not rise."""
         if stamp_ns <= self._sectors_ns:
             raise StampError(_goes_back("sectors", stamp_ns, self._sectors_ns))
         self._sectors_ns, self._ranges, self._sectors_s = stamp_ns, ranges_m, now_s
+        self._scan = scan
         return self._newest(now_s - self._odom_s if self._odom_ns >= 0 else 0.0)
 
     def stale(self, now_s: float, timeout_s: float) -> Inputs | None:
@@ -49,7 +55,7 @@ class NewestInputs:
         return self._newest(now_s - oldest_s) if too_old else None
 
     def _newest(self, age_s: float) -> Inputs:
-        return Inputs(self._sectors_ns, self._pose, self._ranges, age_s)
+        return Inputs(self._sectors_ns, self._pose, self._ranges, age_s, self._scan)
 
 
 def _goes_back(what: str, stamp_ns: int, last_ns: int) -> str:
