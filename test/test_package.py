@@ -54,7 +54,6 @@ OUTSIDE: dict[str, set[str]] = {
 # What decides is handed the time and its random generators, and lets others do the talking.
 DECIDING = ("core", "swarm", "perception", "planning", "simulation")
 NEVER = {"asyncio", "datetime", "logging", "multiprocessing", "random", "threading", "time"}
-# core's own tools for programs: files, processes, arguments.
 TOP = {"__init__.py", "entry_points.py", "py.typed"}
 
 
@@ -117,6 +116,8 @@ def test_the_picture_of_the_rooms_is_that_of_the_imports() -> None:
 def test_a_picture_shows_every_room_and_no_arrow_that_follows_from_others() -> None:
     drawn = import_graph.direct({("c", "b"), ("b", "a"), ("c", "a")})
     assert drawn == {("c", "b"), ("b", "a")}
+    picture = import_graph.svg()
+    assert all(f">{name}</text>" in picture for name in ROOMS)
 
 
 def test_no_node_imports_another() -> None:

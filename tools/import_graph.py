@@ -166,8 +166,9 @@ def main(args: list[str]) -> int:
         PICTURE.write_text(svg(), encoding="utf-8")
         print(f"wrote {PICTURE.relative_to(ROOT)}")
         return 0
+    pairs = arrows()
     for room in ROOMS:
-        print(f"{room:13s} -> {', '.join(b for b in ROOMS if (room, b) in arrows()) or '-'}")
+        print(f"{room:13s} -> {', '.join(b for b in ROOMS if (room, b) in pairs) or '-'}")
     return 0
 
 

@@ -11,6 +11,7 @@ from time import monotonic
 from ..core.argument_parser import Parser
 from ..core.errors import ConfigError
 from ..core.output_files import new_file
+from ..report.animation_options import AnimationOptions
 from .support.load_episodes import named_episodes
 
 _DESCRIPTION = """Write a run as an animation for a web page or slides: WebP or GIF, by the suffix.
@@ -23,29 +24,33 @@ _QUIET_S = 2.0  # no progress bar before
 
 def main(args: list[str]) -> int:
     """Write the animation."""
+    usual = AnimationOptions()
     parser = Parser(prog="mfba animate", description=_DESCRIPTION)
     parser.add_argument(
         "path", type=Path, metavar="BAG|RESULT", help="run or bag directory, or file"
     )
     parser.add_argument("out", type=Path, metavar="OUT", help="file to create: .webp or .gif")
     parser.add_argument(
-        "--fps", type=float, default=12.0, metavar="N", help="frames per second (default: 12)"
-    )
-    parser.add_argument(
-        "--speed", type=float, default=3.0, metavar="N",
-        help="simulated seconds per second (default: 3)",
+        "--fps", type=float, default=usual.fps, metavar="N",
+        help=f"frames per second (default: {usual.fps:g})",
     )  # fmt: skip
     parser.add_argument(
-        "--width", type=int, default=640, metavar="PX", help="pixels (default: 640)"
-    )
+        "--speed", type=float, default=usual.speed, metavar="N",
+        help=f"simulated seconds per second (default: {usual.speed:g})",
+    )  # fmt: skip
     parser.add_argument(
-        "--max-bytes", type=int, default=1_500_000, metavar="N",
-        help="size limit: colours, then frames are left out until it fits (default: 1500000)",
+        "--width", type=int, default=usual.width_px, metavar="PX",
+        help=f"pixels (default: {usual.width_px})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--max-bytes", type=int, default=usual.max_bytes, metavar="N",
+        help="size limit: colours, then frames are left out until it fits "
+        f"(default: {usual.max_bytes})",
     )  # fmt: skip
     parser.add_robots()
     found = parser.parse(args)
     # Pillow and matplotlib take their time: not for --help.
-    from ..report.animation import SUFFIXES, AnimationOptions, animation_bytes
+    from ..report.animation import SUFFIXES, animation_bytes
 
     suffix = found.out.suffix.lower()
     if suffix not in SUFFIXES:

@@ -18,7 +18,7 @@ DOMAINS = range(1, 102)
 FIRST_PORT, PORTS = 7400, 250  # first port of domain 0, ports per domain: RTPS port mapping
 # Variables that let other domains or hosts take part: participants of one discovery server
 # find each other whatever their domains, and static peers are asked wherever they are.
-LEAVING = ("ROS_DISCOVERY_SERVER", "ROS_SUPER_CLIENT", "ROS_STATIC_PEERS")
+DISCOVERY_VARIABLES = ("ROS_DISCOVERY_SERVER", "ROS_SUPER_CLIENT", "ROS_STATIC_PEERS")
 _next_domains = itertools.islice(itertools.cycle(DOMAINS), os.getpid() % len(DOMAINS), None)
 
 
@@ -76,7 +76,7 @@ def private_domain() -> Iterator[int]:
     require_network()
     domain, lock = claim_domain()
     variables = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    previous = {name: os.environ.pop(name, None) for name in (*variables, *LEAVING)}
+    previous = {name: os.environ.pop(name, None) for name in (*variables, *DISCOVERY_VARIABLES)}
     os.environ.update(variables)
     with lock:
         try:

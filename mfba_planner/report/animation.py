@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An animated WebP or GIF of a run: options, frame times, encoding within a size limit."""
+"""An animated WebP or GIF of a run: frame times, encoding within a size limit."""
 
 from __future__ import annotations
 
 import io
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from mfba_planner.core.errors import ConfigError
 
 from . import style
 from .animation_frames import FrameDrawer, Runs
+from .animation_options import AnimationOptions
 from .run_events import span_s
 
 # by suffix: Pillow's name, unit of a frame's duration (ms), options; both without loss
@@ -30,30 +30,6 @@ _PALETTES = ((128, 16), (64, 24), (32, 32), (16, 48))  # colours, and how far ap
 _PLAIN = Image.Dither.NONE
 _SAMPLES = 8  # frames that the palette is taken from
 _THINNING = (1, 2, 3, 4)  # every frame, every second one, ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AnimationOptions:
-    """Frames per second, simulated seconds per second, width in pixels, size limit in bytes."""
-
-    fps: float = 12.0
-    speed: float = 3.0
-    width_px: int = 640
-    max_bytes: int = 1_500_000
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number out of its range."""
-        for option, value, low, high in (
-            ("fps", self.fps, 1, 50),
-            ("speed", self.speed, 0.01, 1000),
-            ("width", self.width_px, 160, 1920),
-            ("max-bytes", self.max_bytes, 1000, 1_000_000_000),
-        ):
-            if not low <= value <= high:
-                given = f"{value:g}" if isinstance(value, float) else value
-                raise ConfigError(
-                    f"--{option}={given}: out of range; give a number from {low} to {high}"
-                )
 
 
 def animation_bytes(

@@ -23,8 +23,8 @@ from mfba_planner.launcher import node_processes
 from mfba_planner.launcher.console import RunConsole
 from mfba_planner.launcher.node_processes import NodeProcess, NodeProcesses, parameters_yaml
 from mfba_planner.launcher.ros_domain import (
+    DISCOVERY_VARIABLES,
     DOMAINS,
-    LEAVING,
     claim_domain,
     private_domain,
     require_network,
@@ -203,7 +203,7 @@ def test_domains_are_held_once_and_given_back(monkeypatch: pytest.MonkeyPatch) -
     assert "ROS_DOMAIN_ID" not in os.environ
 
 
-@pytest.mark.parametrize("name", LEAVING)
+@pytest.mark.parametrize("name", DISCOVERY_VARIABLES)
 def test_what_would_open_a_private_domain_is_removed_meanwhile(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

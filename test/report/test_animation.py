@@ -20,10 +20,10 @@ from mfba_planner.report import style
 from mfba_planner.report.animation import (
     LAST_FRAME_MS,
     SUFFIXES,
-    AnimationOptions,
     animation_bytes,
 )
 from mfba_planner.report.animation_frames import FrameDrawer
+from mfba_planner.report.animation_options import AnimationOptions
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.fleet import run_fleet
