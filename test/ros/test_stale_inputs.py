@@ -3,15 +3,24 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.planner_types import Scan
 from mfba_planner.ros.runtime.lockstep_inputs import Inputs, LockstepInputs
 from mfba_planner.ros.runtime.stale_inputs import NewestInputs
 
 POSE, OTHER_POSE = Pose2D(1.0, 2.0), Pose2D(3.0, 4.0)
 FREE = (math.inf,) * 12
+SCAN, NEXT_SCAN = (
+    Scan(
+        ranges_m=np.full(3, range_m), angle_min_rad=0.0, angle_increment_rad=1.0,
+        range_min_m=0.1, range_max_m=9.0,
+    )
+    for range_m in (1.0, 2.0)
+)  # fmt: skip
 
 
 def test_lockstep_returns_pairs_of_one_stamp() -> None:
@@ -104,3 +113,21 @@ def test_stale_is_the_older_of_the_two() -> None:
     inputs.add_sectors(2, FREE, 11.5)
     assert inputs.stale(12.0, 1.0) is None
     assert inputs.stale(12.25, 1.0) == Inputs(2, POSE, FREE, 1.25)
+
+
+@pytest.mark.parametrize("inputs", [LockstepInputs(), NewestInputs()], ids=["lockstep", "newest"])
+def test_sectors_come_with_their_own_scan(inputs: LockstepInputs | NewestInputs) -> None:
+    found = []
+    for stamp, scan in ((1, SCAN), (2, NEXT_SCAN), (3, None)):
+        inputs.add_odom(stamp, POSE, 0.0)
+        found.append(inputs.add_sectors(stamp, FREE, 0.0, scan))
+    assert [each.scan for each in found if each] == [SCAN, NEXT_SCAN, None]
+
+
+def test_stale_inputs_keep_their_scan() -> None:
+    inputs = NewestInputs()
+    inputs.add_odom(1, POSE, 0.0)
+    inputs.add_sectors(1, FREE, 0.0, SCAN)
+    stale = inputs.stale(now_s=9.0, timeout_s=1.0)
+    assert stale is not None
+    assert stale.scan is SCAN
