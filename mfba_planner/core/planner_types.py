@@ -98,7 +98,11 @@ def observe(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """One decision and its reason; gap counts from 1, 0 means none; lengths in metres."""
+    """One decision and its reason; gap counts from 1, 0 means none; lengths in metres.
+
+    perception is what obstacles were perceived by: sectors, scan or circles; "" for none or, in
+    an old recording, unknown. The decision digest leaves it out.
+    """
 
     stamp_ns: int
     mode: Mode
@@ -112,6 +116,7 @@ class Decision:
     waypoint: Point
     velocity: Point
     candidates: tuple[Point, ...] = ()
+    perception: str = ""
 
 
 class PathPlanner(Protocol):

@@ -8,10 +8,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..core.errors import ConfigError
-from ..core.option_specs import did_you_mean, override, walk
+from ..core.option_specs import did_you_mean, flatten, override, walk
+from ..core.robot_base import Base
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..simulation.robot_model import Robot
+
+OF_ROBOT = ("robot_radius_m", *flatten(Base()))  # options of a planner that the scenario sets
 
 
 def add_set_argument(parser: argparse.ArgumentParser) -> None:
@@ -55,7 +58,8 @@ def option_rows() -> Iterable[tuple[str, Any, Any]]:
         ("robot", Robot()),
     ):
         for name, value, item in walk(defaults):
-            yield f"{group}.{name}", value, item.metadata["spec"]
+            if group != "planner" or name not in OF_ROBOT:
+                yield f"{group}.{name}", value, item.metadata["spec"]
 
 
 def _setting(text: str) -> tuple[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
-from ..core.planner_types import NANO, ROBOT_RADIUS_M, Bits, Circle, Observation
+from ..core.planner_types import NANO, Bits, Circle, Observation
 from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
@@ -47,13 +47,6 @@ class PredictiveParams:
     )
     search_m: float = option(
         0.3, "radius of the disc the bats search", unit="m", minimum=0.001, maximum=100.0
-    )
-    robot_radius_m: float = option(
-        ROBOT_RADIUS_M,
-        "radius of the robot, by which scan obstacles are enlarged",
-        unit="m",
-        minimum=0.0,
-        maximum=10.0,
     )
     sector_radius_m: float = option(
         0.3,
@@ -187,8 +180,7 @@ class Predictive(BasePlanner):
             return predicted_circles(known, (obs.stamp_ns - stamp_ns) * NANO)
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
-            radius_m = self.params.scan_radius_m or self.options.robot_radius_m
-            return self._tracker.circles(obs.stamp_ns, radius_m)
+            return self._tracker.circles(obs.stamp_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
     def _nearest_free(self, closed: Bits, to_goal: Point) -> list[int]:

@@ -16,9 +16,9 @@ import numpy as np
 from ..core.errors import FrameError, InputError
 from ..core.geometry import Point, Pose2D, yaw_from_quaternion
 from ..core.planner_types import Decision, Mode, Ranges, RefusalReason, Scan
+from ..core.robot_base import Base
 from ..perception.sensory_vector import blind
-from ..simulation.differential_drive import command
-from ..simulation.robot_model import Base
+from ..planning.differential_drive import command
 
 SECOND_NS = 1_000_000_000
 
@@ -206,6 +206,7 @@ def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:
             waypoint=parse_points(fields["waypoint"])[0],
             velocity=parse_points(fields["velocity"])[0],
             candidates=parse_points(fields["candidates"]),
+            perception=fields.get("perception", ""),
         )
     except (KeyError, ValueError, IndexError) as error:
         raise InputError(

@@ -24,7 +24,7 @@ from .fleet_topics import NO_NAMESPACE
 T = TypeVar("T")
 
 # Options that older bags lack; their defaults are the behaviour of that time.
-NEWER_OPTIONS = ("method", "jump_m", "scan_radius_m", "speed_limit.", "recovery.")
+NEWER_OPTIONS = ("method", "jump_m", "perception", "robot_radius_m", "speed_limit.", "recovery.")
 
 
 class Setup(NamedTuple):

@@ -12,7 +12,7 @@ from enum import Enum
 from ..core.option_specs import check, option
 from ..core.planner_types import ROBOT_RADIUS_M
 from ..planning.planner_params import PlannerParams
-from ..simulation.robot_model import Base, Robot
+from ..simulation.robot_model import Robot
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
 _WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause (false) starts it"
@@ -90,7 +90,7 @@ class VirtualSensorSettings:
     source: Source = option(Source.OBSTACLES, "obstacles (the paper) or scan (any LaserScan)")
     robot_radius_m: float = option(
         ROBOT_RADIUS_M,
-        "added to every obstacle (Fig. 4)",
+        "radius of the robot: every obstacle is enlarged by it (Fig. 4)",
         unit="m",
         minimum=0.0,
         maximum=100.0,
@@ -103,7 +103,7 @@ class VirtualSensorSettings:
     odom_frame: str = option("odom", "frame the sectors are aligned with")
     input_timeout_s: float = option(
         1.0,
-        "age at which /diagnostics calls odometry and scan stale",
+        "age at which odometry, sectors or scan are stale",
         unit="s",
         minimum=0.001,
         maximum=3600.0,
@@ -118,7 +118,7 @@ class VirtualSensorSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerSettings(Base):
+class PlannerSettings:
     """Settings of planner; PlannerParams are its parameters too."""
 
     seed: int = option(0, "seed of all random draws", minimum=0, maximum=2**63 - 1)

@@ -241,7 +241,7 @@ class _PlannerRun:
         goal = next((g for t, g in reversed(self._goals) if t <= log_time_ns), None)
         observation = observe(stamp, pose, ranges, goal, self._pose, max(stamp - pose_stamp, 0))
         self._pose = observation.pose
-        if self._params.planner.tracks_scan and not observation.refused:
+        if self._params.planner.reads_scan and not observation.refused:
             yaw = observation.pose.yaw + self._scan_yaw.yaw_rad(scan)
             observation = replace(observation, scan=aligned(laser_scan(scan), yaw))
         return self._planner.plan(observation)

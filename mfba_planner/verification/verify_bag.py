@@ -155,7 +155,7 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
         observation = observe(tick.stamp_ns, pose_input, ranges, goal, pose)
         pose = observation.pose
         recorded.append(decision)
-        decided.append(planner.plan(_with_scan(setup, tick, observation)))
+        decided.append(planner.plan(_with_scan(setup, tick, decision, observation)))
         faults += _contradictions(setup, tick, decision)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
@@ -174,13 +174,13 @@ def _inputs(setup: Setup) -> list[str]:
     return [
         SECTORS,
         *([ODOM] if setup.lockstep else []),  # in real time the pose of the decision is used
-        *([SCAN] if setup.planner.tracks_scan else []),
+        *([SCAN] if setup.planner.reads_scan and setup.scenario.robot.lidar.beams else []),
     ]
 
 
-def _with_scan(setup: Setup, tick: Tick, obs: Observation) -> Observation:
-    """The observation with the scan, for a planner that tracks scans."""
-    if not setup.planner.tracks_scan or obs.refused or SCAN not in tick.messages:
+def _with_scan(setup: Setup, tick: Tick, recorded: Decision, obs: Observation) -> Observation:
+    """The observation with the scan, where the recorded decision was made on one."""
+    if recorded.perception != "scan" or obs.refused or SCAN not in tick.messages:
         return obs
     yaw = obs.pose.yaw + setup.scenario.robot.lidar.yaw_rad
     return replace(obs, scan=aligned(laser_scan(tick.messages[SCAN]), yaw))

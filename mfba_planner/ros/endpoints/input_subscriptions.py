@@ -12,7 +12,7 @@ from typing import Any
 from ...core.errors import InputError
 from ...core.planner_types import Observation, Scan
 from ...perception.scan_to_sectors import aligned
-from ...planning.planner_params import PlannerParams
+from ...planning.planner_params import PerceptionInput, PlannerParams
 from ...recording.from_messages import laser_scan, robot_pose, sector_ranges, stamp_ns
 from ..interface import topics
 from ..node_settings import PlannerSettings
@@ -27,7 +27,8 @@ from .planner_diagnostics import PlannerDiagnostics
 class InputSubscriptions:
     """Calls on_inputs for each pair of odom and sectors; a refused message is its error text.
 
-    Where the planner tracks obstacles, sectors wait for the scan of their stamp.
+    For a planner that reads scans, sectors wait for the scan of their stamp. With perception=auto
+    they wait only while `scan` has a publisher: without a lidar the sectors are all there is.
     """
 
     def __init__(
@@ -39,9 +40,10 @@ class InputSubscriptions:
         diagnostics: PlannerDiagnostics,
         on_inputs: Callable[[Inputs], None],
     ) -> None:
-        """params.tracks_scan is read once: whether scan is subscribed to."""
+        """Subscribe to nothing yet."""
         self._node, self._settings = node, settings
-        self._tracks_scan = params.tracks_scan
+        self._params = params
+        self._is_subscribed = self._is_subscribed_to_scan = False
         self._refused_inputs, self._diagnostics = refused_inputs, diagnostics
         self._on_inputs = on_inputs
         self.range_max_m = 0.0  # of the newest sectors
@@ -60,8 +62,19 @@ class InputSubscriptions:
         lockstep = self._settings.lockstep
         self._node.subscribe(topics.ODOM, self._on_odom, foreign_writers=not lockstep)
         self._node.subscribe(topics.SECTORS, self._on_sectors)
-        if self._tracks_scan:
+        self._is_subscribed, self._is_subscribed_to_scan = True, False
+        self.set_reads_scan(self._params)
+
+    def set_reads_scan(self, params: PlannerParams) -> None:
+        """Use scans, or not, from now on; params are the planner's."""
+        self._params = params
+        if params.reads_scan and self._is_subscribed and not self._is_subscribed_to_scan:
             self._node.subscribe(topics.SCAN, self._on_scan)
+            self._is_subscribed_to_scan = True
+
+    def unsubscribed(self) -> None:
+        """The node has destroyed all subscriptions."""
+        self._is_subscribed = self._is_subscribed_to_scan = False
 
     def stale(self, timeout_s: float) -> Inputs | None:
         """In real time the newest inputs if one is older than timeout_s."""
@@ -78,12 +91,21 @@ class InputSubscriptions:
         self._receive("odom", message, robot_pose, self._pairs.add_odom)
 
     def _on_sectors(self, message: Any) -> None:
-        if self._tracks_scan:
+        if self._waits_for_scan():
             self._pair_scan(message, self._scan_pairs.add_a)
         else:
             self._receive_sectors(message)
 
+    def _waits_for_scan(self) -> bool:
+        params = self._params
+        if not params.reads_scan or params.perception is PerceptionInput.SCAN:
+            return params.reads_scan
+        name = self._node.resolve_topic_name(topics.SCAN.name)
+        return self._node.count_publishers(name) > 0
+
     def _on_scan(self, message: Any) -> None:
+        if not self._params.reads_scan:
+            return
         self._pair_scan(message, self._scan_pairs.add_b)
 
     def _pair_scan(self, message: Any, add: Any) -> None:

@@ -55,7 +55,7 @@ class PlannerNode(ManagedNode):
     def configure(self) -> None:
         """Advertise and subscribe."""
         s = self.settings
-        self._outputs = PlannerPublishers(self, s, lambda: self.path_planner.params.tick_ns)
+        self._outputs = PlannerPublishers(self, s, lambda: self.path_planner.params)
         self._inputs.subscribe()
         self.goals.subscribe()
 
@@ -68,6 +68,7 @@ class PlannerNode(ManagedNode):
     def clean_up(self) -> None:
         """Forget all but the parameters; destroy publishers and subscriptions."""
         self.unsubscribe(keep=[topics.DIAGNOSTICS])
+        self._inputs.unsubscribed()
         self.goals.reset()
         self._reset()
 
@@ -91,6 +92,7 @@ class PlannerNode(ManagedNode):
         if changed.method is not self.path_planner.params.method:
             self.path_planner = make_planner(changed, seed=self.settings.seed)
         self.path_planner.params = changed
+        self._inputs.set_reads_scan(changed)
 
     def _is_finished(self) -> bool:
         arrived = self._last is not None and self._last.mode is Mode.ARRIVED
