@@ -13,9 +13,11 @@ import numpy as np
 from ..core.geometry import Point, towards
 from ..core.option_specs import check, option
 from ..core.planner_types import Circle, Ranges
+from .turn_delay import TurnDelay
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12
+MOVES = 0.01  # share of the speed below which a candidate waits
 _Row = tuple[float, float, float, float, float, float, float, float, float]
 _by_clearance = itemgetter(0)
 Candidate = tuple[float, Point, float, int]
@@ -69,8 +71,13 @@ class TrajectoryCost:
         params: RiskParams,
         tick_s: float,
         speed_mps: float = math.inf,
+        turn_delay: TurnDelay | None = None,
     ) -> None:
-        """Take the present circles; those out of reach within the horizon are left out."""
+        """Take the present circles; those out of reach within the horizon are left out.
+
+        With a turn_delay the robot stands while it turns, at the start and at the waypoint.
+        """
+        self._turn_delay = turn_delay
         self.params = params
         px, py = position
         tau, per_mps = params.horizon_s, params.margin_ticks * tick_s
@@ -96,6 +103,10 @@ class TrajectoryCost:
         if not self._rows:
             return np.zeros(ux.shape, dtype=int)
         _, x, y, vx, vy, _, _, outer, away = np.array(self._rows).T[:, :, None]
+        if self._turn_delay is not None:
+            delay = self._turn_delay.towards_all(ux, uy)
+            x, y = x + vx * delay, y + vy * delay
+            away = x * x + y * y
         wx, wy = vx - ux, vy - uy
         b = x * wx
         b += y * wy
@@ -157,6 +168,8 @@ class TrajectoryCost:
         if total >= bound:
             return total
         budget, tau = bound - total, self._tau
+        if self._turn_delay is not None:
+            return total + self._risk_with_turns(qx, qy, t1, rx, ry, speed, budget)
         risk = self._segment_risk(
             0.0, 0.0, 0.0, 0.0, qx / t1, qy / t1, t1 if t1 < tau else tau, budget
         )
@@ -168,6 +181,38 @@ class TrajectoryCost:
             if later > risk:
                 risk = later
         return total + risk
+
+    def _risk_with_turns(
+        self, qx: float, qy: float, t1: float, rx: float, ry: float, speed: float, budget: float
+    ) -> float:
+        """The risk of cost() for a base that stands while it turns; turning reduces no risk."""
+        assert self._turn_delay is not None
+        tau, first, second = self._tau, math.hypot(qx, qy), math.hypot(rx, ry)
+        t0 = self._turn_delay.towards(qx, qy)
+        if first < MOVES * speed * t1:  # it waits, and turns meanwhile
+            t0, wait = 0.0, t1 if t1 > t0 else t0
+            risk = self._segment_risk(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, min(wait, tau), budget)
+            t1 = wait
+        else:
+            risk = self._segment_risk(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, min(t0, tau), budget)
+            if risk >= budget:
+                return risk
+            ux, uy = qx / t1, qy / t1
+            risk = max(risk, self._segment_risk(0.0, 0.0, t0, 0.0, ux, uy, min(t1, tau), budget))
+            t1 += t0
+        driven = first / speed
+        if risk >= budget or driven >= tau or second == 0.0:
+            return risk
+        turn_s = self._turn_delay.between(qx, qy, rx, ry)
+        if turn_s > 0.0:
+            risk = max(
+                risk, self._segment_risk(qx, qy, t1, driven, 0.0, 0.0, min(turn_s, tau), budget)
+            )
+            if risk >= budget:
+                return risk
+        ux, uy = rx * speed / second, ry * speed / second
+        duration = min(second / speed, tau - driven)
+        return max(risk, self._segment_risk(qx, qy, t1 + turn_s, driven, ux, uy, duration, budget))
 
     def _leave_out_unreachable(self, to_goal: Point, bound: float) -> None:
         """Leave circles out of cost() that no candidate with a cost below the bound can reach.
