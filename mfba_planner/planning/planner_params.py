@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of all planners: method, speed, goal step, swarm, speed limit, recovery."""
+"""Parameters of all planners: method, speed, goal step, swarm, speed limit, recovery, progress."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from ..core.option_specs import check, option
 from ..core.planner_types import NANO
 from ..swarm.bat_swarm import BatParams
 from .gap_vector import GapHeading
+from .progress_checker import ProgressParams
 from .recovery import RecoveryParams
 from .speed_limit import SpeedLimitParams
 
@@ -67,6 +68,7 @@ class PlannerParams:
     bat: BatParams = field(default_factory=BatParams)
     speed_limit: SpeedLimitParams = field(default_factory=SpeedLimitParams)
     recovery: RecoveryParams = field(default_factory=RecoveryParams)
+    progress: ProgressParams = field(default_factory=ProgressParams)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range."""

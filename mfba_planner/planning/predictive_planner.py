@@ -11,15 +11,16 @@ import numpy as np
 
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
-from ..core.planner_types import NANO, ROBOT_RADIUS_M, Bits, Circle, Observation
+from ..core.planner_types import NANO, ROBOT_RADIUS_M, Bits, Circle, Observation, Ranges
 from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
-from ..perception.sensory_vector import SensorParams
+from ..perception.sensory_vector import SensorParams, sense_circles
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
 from .mode_transitions import Event
+from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
 from .trajectory_cost import (
     Candidate,
@@ -95,6 +96,7 @@ class Predictive(BasePlanner):
 
     reads_sectors = False
     preset = staticmethod(preset)
+    _perceived: Sequence[Circle] = ()
 
     def __init__(
         self,
@@ -119,14 +121,29 @@ class Predictive(BasePlanner):
         super().__init__(params, sensor, seed)
 
     def move(self, obs: Observation, goal: Point) -> Move:
-        """Choose waypoint and speed; no search while the straight line is free."""
-        position, speed = obs.pose.position, self.params.speed_mps
-        straight = self.straight(position, goal, speed)
+        """Choose waypoint and speed, and never touch what stands before the robot can stop."""
+        position = obs.pose.position
         last_waypoint, self._waypoint = self._waypoint, None
-        circles = self._circles(obs)
+        self._perceived = circles = self._circles(obs)
         if not circles:
+            straight = self.straight(position, goal, self.params.speed_mps)
             return Move(velocity=straight, reason="no obstacle within SR")
-        tick_s = self.tick_s
+        at_rest = ObstaclesAtRest(position, circles)
+        misplaced = at_rest.misplaced()
+        if misplaced:
+            return Move(velocity=(0.0, 0.0), reason=misplaced, event=Event.NO_GAP)
+        return self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
+
+    def _choose(
+        self,
+        obs: Observation,
+        goal: Point,
+        last_waypoint: Point | None,
+        at_rest: ObstaclesAtRest,
+    ) -> Move:
+        """The cheapest waypoint and speed; no search while the straight line is free."""
+        position, circles = obs.pose.position, self._perceived
+        speed, tick_s = self.params.speed_mps, self.tick_s
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
         costs = TrajectoryCost(position, circles, self.options.risk, tick_s, speed)
@@ -134,8 +151,12 @@ class Predictive(BasePlanner):
         waypoint, t1 = (to_goal[0] * share, to_goal[1] * share), share * goal_distance / speed
         least = costs.cost(waypoint, t1, to_goal, speed)
         if least <= goal_distance + _FREE_M:
+            straight = self.straight(position, goal, speed)
             return Move(velocity=straight, reason="the straight way is free")
-        vs: Bits = tuple(costs.closed(self._cos * speed, self._sin * speed).tolist())
+        vs = self._closed_headings(costs)
+        enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
+        if enclosure:
+            return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
         candidates = self._waypoints(gaps, to_goal, goal_distance)
         if last_waypoint is not None:  # often still the best: then most others need no evaluation
@@ -172,9 +193,37 @@ class Predictive(BasePlanner):
             candidates=tuple((x + dx, y + dy) for dx, dy in swarm.candidates),
         )
 
+    def _closed_headings(self, costs: TrajectoryCost) -> Bits:
+        speed = self.params.speed_mps
+        return tuple(costs.closed(self._cos * speed, self._sin * speed).tolist())
+
+    def _enclosure(self, position: Point, at_rest: ObstaclesAtRest) -> str:
+        """Why no path leads out between obstacles at rest; "" if one does, or a heading is open.
+
+        Obstacles that move are left out: their ring opens again.
+        """
+        risk, speed = self.options.risk, self.params.speed_mps
+        costs = TrajectoryCost(position, at_rest.circles, risk, self.tick_s, speed)
+        return "" if 0 in self._closed_headings(costs) else at_rest.enclosure()
+
+    def _kept_off(self, move: Move, at_rest: ObstaclesAtRest) -> Move:
+        """The move, shortened so that it touches nothing at rest until the robot can stop."""
+        share = at_rest.allowed_share(move.velocity, STOPPING_TICKS * self.tick_s)
+        if share == 1.0:
+            return move
+        (vx, vy), note = move.velocity, f"{1e2 * share:.0f} % of it, as contact is near"
+        return replace(move, velocity=(share * vx, share * vy), reason=f"{move.reason}; {note}")
+
+    def surroundings(self, position: Point) -> Ranges:
+        """Range per sector to the circles of the last decision, inf where there are none."""
+        sensor = replace(self.sensor, sensing_range_m=self.options.reach_m)
+        circles = [(circle.center_m, circle.radius_m) for circle in self._perceived]
+        return sense_circles(position, circles, sensor)
+
     def forget(self) -> None:
         """Drop the last waypoint, the tracks and the remembered circles."""
         self._waypoint = None
+        self._perceived = ()
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
 
