@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of all planners: method, speed, goal step, swarm, speed limit, recovery."""
+"""Parameters of all planners: method, speed, goal step, swarm, speed limit, recovery, progress."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..core.planner_types import NANO, ROBOT_RADIUS_M
 from ..core.robot_base import Base
 from ..swarm.bat_swarm import BatParams
 from .gap_vector import GapHeading
+from .progress_checker import ProgressParams
 from .recovery import RecoveryParams
 from .speed_limit import SpeedLimitParams
 
@@ -88,6 +89,7 @@ class PlannerParams(Base):
     bat: BatParams = field(default_factory=BatParams)
     speed_limit: SpeedLimitParams = field(default_factory=SpeedLimitParams)
     recovery: RecoveryParams = field(default_factory=RecoveryParams)
+    progress: ProgressParams = field(default_factory=ProgressParams)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range, or a perception the method does not use."""

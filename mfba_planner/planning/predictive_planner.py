@@ -11,15 +11,17 @@ import numpy as np
 
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
-from ..core.planner_types import NANO, Bits, Circle, Observation
+from ..core.planner_types import NANO, Bits, Circle, Observation, Ranges
 from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
-from ..perception.sensory_vector import SensorParams
+from ..perception.scan_coverage import ScanCoverage
+from ..perception.sensory_vector import SensorParams, sense_circles
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
 from .mode_transitions import Event
+from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
 from .trajectory_cost import (
     Candidate,
@@ -28,12 +30,14 @@ from .trajectory_cost import (
     circles_from_sectors,
     predicted_circles,
 )
+from .turn_delay import TurnDelay
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a direction is needed
 HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
 _FREE_M = 1e-9
+_STILL_M = 1e-4
 _LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
 
 
@@ -55,6 +59,10 @@ class PredictiveParams:
         minimum=0.01,
         maximum=10.0,
     )
+    coverage_s: float = option(
+        1.0, "time for which an observed direction stays observed", unit="s", minimum=0.0,
+        maximum=60.0,
+    )  # fmt: skip
     memory: ObstacleMemoryParams = field(default_factory=ObstacleMemoryParams)
     tracking: TrackingParams = field(default_factory=TrackingParams)
     risk: RiskParams = field(default_factory=RiskParams)
@@ -88,6 +96,9 @@ class Predictive(BasePlanner):
 
     reads_sectors = False
     preset = staticmethod(preset)
+    _perceived: Sequence[Circle] = ()
+    _unobserved: np.ndarray | None = None  # headings the lidar has not covered; None: none
+    _coverage: ScanCoverage
 
     def __init__(
         self,
@@ -112,23 +123,45 @@ class Predictive(BasePlanner):
         super().__init__(params, sensor, seed)
 
     def move(self, obs: Observation, goal: Point) -> Move:
-        """Choose waypoint and speed; no search while the straight line is free."""
-        position, speed = obs.pose.position, self.params.speed_mps
-        straight = self.straight(position, goal, speed)
+        """Choose waypoint and speed, and never touch what stands before the robot can stop."""
+        position = obs.pose.position
         last_waypoint, self._waypoint = self._waypoint, None
-        circles = self._circles(obs)
-        if not circles:
-            return Move(velocity=straight, reason="no obstacle within SR")
-        tick_s = self.tick_s
+        self._perceived = circles = self._circles(obs)
+        self._unobserved = None if obs.scan is None else self._coverage.uncovered(obs.stamp_ns)
+        if not circles and self._is_observed((goal[0] - position[0], goal[1] - position[1])):
+            straight = self.straight(position, goal, self.params.speed_mps)
+            return Move(velocity=straight, reason="no obstacle in range")
+        at_rest = ObstaclesAtRest(position, circles)
+        misplaced = at_rest.misplaced()
+        if misplaced:
+            return Move(velocity=(0.0, 0.0), reason=misplaced, event=Event.NO_GAP)
+        return self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
+
+    def _choose(
+        self,
+        obs: Observation,
+        goal: Point,
+        last_waypoint: Point | None,
+        at_rest: ObstaclesAtRest,
+    ) -> Move:
+        """The cheapest waypoint and speed; no search while the straight line is free."""
+        position, circles = obs.pose.position, self._perceived
+        speed, tick_s = self.params.speed_mps, self.tick_s
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
-        costs = TrajectoryCost(position, circles, self.options.risk, tick_s, speed)
+        delay = self._turn_delay(obs)
+        costs = TrajectoryCost(position, circles, self.options.risk, tick_s, speed, delay)
         share = min(1.0, speed * tick_s / goal_distance)
         waypoint, t1 = (to_goal[0] * share, to_goal[1] * share), share * goal_distance / speed
-        least = costs.cost(waypoint, t1, to_goal, speed)
+        observed = self._is_observed(to_goal)
+        least = costs.cost(waypoint, t1, to_goal, speed) if observed else math.inf
         if least <= goal_distance + _FREE_M:
+            straight = self.straight(position, goal, speed)
             return Move(velocity=straight, reason="the straight way is free")
-        vs: Bits = tuple(costs.closed(self._cos * speed, self._sin * speed).tolist())
+        vs = self._closed_headings(costs)
+        enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
+        if enclosure:
+            return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
         candidates = self._waypoints(gaps, to_goal, goal_distance)
         if last_waypoint is not None:  # often still the best: then most others need no evaluation
@@ -136,10 +169,15 @@ class Predictive(BasePlanner):
             candidates.insert(
                 0, (-math.inf, q, max(distance((0.0, 0.0), q) / speed, tick_s), _LAST_WAYPOINT)
             )
+        if self._unobserved is not None:
+            candidates = [item for item in candidates if self._is_observed(item[1])]
         found = costs.cheapest(candidates, to_goal, speed, least)
         if found is not None:
             waypoint, t1, least = found
         swarm = self._refine(costs, waypoint, to_goal, least, obs.stamp_ns)
+        if not min(swarm.best_value, least) < math.inf:
+            reason = "no direction that the lidar has covered leads on"
+            return Move(velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=vs, vg=vs)
         if swarm.best_value < least:
             (qx, qy), least = swarm.best_x, swarm.best_value
             waypoint = (qx, qy)
@@ -165,9 +203,49 @@ class Predictive(BasePlanner):
             candidates=tuple((x + dx, y + dy) for dx, dy in swarm.candidates),
         )
 
+    def _closed_headings(self, costs: TrajectoryCost) -> Bits:
+        speed = self.params.speed_mps
+        closed = costs.closed(self._cos * speed, self._sin * speed)
+        if self._unobserved is not None:
+            closed |= self._unobserved
+        return tuple(closed.tolist())
+
+    def _is_observed(self, offset: Point) -> bool:
+        """Whether the lidar has covered the direction of an offset; standing still needs none."""
+        if self._unobserved is None or math.hypot(*offset) < _STILL_M:
+            return True
+        return not self._unobserved[self._gap(offset) - 1]
+
+    def _enclosure(self, position: Point, at_rest: ObstaclesAtRest) -> str:
+        """Why no path leads out between obstacles at rest; "" if one does, or a heading is open.
+
+        Obstacles that move are left out: their ring opens again.
+        """
+        risk, speed = self.options.risk, self.params.speed_mps
+        costs = TrajectoryCost(position, at_rest.circles, risk, self.tick_s, speed)
+        return "" if 0 in self._closed_headings(costs) else at_rest.enclosure()
+
+    def _kept_off(self, move: Move, at_rest: ObstaclesAtRest) -> Move:
+        """The move, shortened so that it touches nothing at rest until the robot can stop."""
+        share = at_rest.allowed_share(move.velocity, STOPPING_TICKS * self.tick_s)
+        if share == 1.0:
+            return move
+        (vx, vy), note = move.velocity, f"{1e2 * share:.0f} % of it, as contact is near"
+        return replace(move, velocity=(share * vx, share * vy), reason=f"{move.reason}; {note}")
+
+    def surroundings(self, position: Point) -> Ranges:
+        """Range per sector to the circles of the last decision, inf where there are none."""
+        sensor = replace(self.sensor, sensing_range_m=self.options.reach_m)
+        circles = [(circle.center_m, circle.radius_m) for circle in self._perceived]
+        return sense_circles(position, circles, sensor)
+
     def forget(self) -> None:
         """Drop the last waypoint, the tracks and the remembered circles."""
         self._waypoint = None
+        self._perceived = ()
+        self._last_yaw: tuple[int, float] | None = None
+        self._unobserved = None
+        self._coverage = ScanCoverage(self.options.headings, self.options.coverage_s)
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
 
@@ -180,8 +258,20 @@ class Predictive(BasePlanner):
             return predicted_circles(known, (obs.stamp_ns - stamp_ns) * NANO)
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
+            self._coverage.update(stamp_ns, obs.scan)
             return self._tracker.circles(obs.stamp_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
+
+    def _turn_delay(self, obs: Observation) -> TurnDelay | None:
+        """Of a differential drive at its present heading and rate of turn; None for others."""
+        if not self.params.turns:
+            return None
+        last, self._last_yaw = self._last_yaw, (obs.stamp_ns, obs.pose.yaw)
+        rate = 0.0
+        if last is not None and last[0] < obs.stamp_ns:
+            turned = math.remainder(obs.pose.yaw - last[1], 2.0 * math.pi)
+            rate = turned / ((obs.stamp_ns - last[0]) * NANO)
+        return TurnDelay(self.params, obs.pose.yaw, rate)
 
     def _nearest_free(self, closed: Bits, to_goal: Point) -> list[int]:
         """The free headings nearest to the goal's on both sides; every sixth if none is free."""
@@ -229,7 +319,10 @@ class Predictive(BasePlanner):
             for qx, qy in swarm.ask():
                 # At least one tick: the velocity is held that long and must not overshoot.
                 t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
-                values.append(costs.cost((qx, qy), t1, to_goal, speed, bound))
+                if self._is_observed((qx, qy)):
+                    values.append(costs.cost((qx, qy), t1, to_goal, speed, bound))
+                else:
+                    values.append(math.inf)
             swarm.tell(values)
             bound = min(bound, swarm.best_value)
         return swarm

@@ -89,6 +89,11 @@ def advance(state: Recovery, blocked: bool, now_ns: int, params: RecoveryParams)
     return _changed(state, following, now_ns, free_ns=now_ns)
 
 
+def wait_after(tries: int, now_ns: int) -> Recovery:
+    """Begin to wait, as for a gap, of a robot that has been free that many times in vain."""
+    return Recovery(phase=Phase.WAIT, since_ns=now_ns, attempt=tries)
+
+
 def _while_free(state: Recovery, blocked: bool, now_ns: int, params: RecoveryParams) -> Recovery:
     over = _passed(state.free_ns, now_ns, params.wait_s)
     if blocked:

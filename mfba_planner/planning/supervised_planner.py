@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wraps any planner with the optional speed limit near obstacles and the optional recovery."""
+"""Wraps any planner with progress checks, and optionally recovery and a speed limit."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, bearing, distance, towards
-from ..core.planner_types import NANO, Decision, Mode, Observation, PathPlanner
+from ..core.planner_types import NANO, Decision, Mode, Observation, PathPlanner, Ranges
 from .algorithm_1 import Algorithm1
 from .odometry_jump import is_odometry_jump
 from .planner_params import Method, PlannerParams
-from .recovery import Phase, Recovery, advance, most_room
+from .progress_checker import ProgressChecker
+from .recovery import Phase, Recovery, advance, most_room, wait_after
 from .speed_limit import allowed_speed_share
 
 TRAIL_STEP_M = 0.05  # least distance of two remembered positions
@@ -29,12 +30,23 @@ class Resettable(PathPlanner, Protocol):
         ...
 
 
+@runtime_checkable
+class HasSurroundings(Protocol):
+    """A planner that may decide without sectors."""
+
+    def surroundings(self, position: Point) -> Ranges:
+        """Range per sector to what its last decision was made on, inf where nothing is."""
+        ...
+
+
 class SupervisedPlanner:
     """Passes the decisions of a planner on, changed only by the options below.
 
-    With recovery.enabled, BLOCKED decisions go through the phases of planning.recovery. With
-    speed_limit.slow_within_m, velocities are reduced near obstacles. All depends only on the
-    observations, so a recording reproduces the decisions.
+    With recovery.enabled, BLOCKED decisions go through the phases of planning.recovery. So does
+    a robot that drives without progress (planning.progress_checker), also without
+    recovery.enabled, but then it does not back off. With speed_limit.slow_within_m, velocities
+    are reduced near obstacles. All depends only on the observations, so a recording reproduces
+    the decisions.
     """
 
     def __init__(self, inner: Resettable) -> None:
@@ -63,6 +75,8 @@ class SupervisedPlanner:
 
     def _forget(self) -> None:
         self._recovery = Recovery()
+        self._progress = ProgressChecker()
+        self._no_progress = ""  # the reason, until the planner tries again
         self._goal: Point | None = None
         self._earlier_position: Point | None = None  # before _last_position
         self._last_position: Point | None = None
@@ -73,34 +87,62 @@ class SupervisedPlanner:
         if obs.goal != self._goal or is_odometry_jump(decision.reason):
             self._forget()
             self._goal = obs.goal
-        if self.params.recovery.enabled:
-            decision = self._apply_recovery(decision)
-        return _apply_speed_limit(decision, self.params)
+        return self._apply_speed_limit(self._supervise(decision))
+
+    def _supervise(self, decision: Decision) -> Decision:
+        """The decision, changed if the robot makes no progress or recovers."""
+        if decision.mode is Mode.STOPPED:  # its inputs are not valid
+            self._progress.pause()
+            return decision
+        self._remember_position(decision.pose.position)
+        if decision.mode in _NOT_DRIVING:
+            self._recovery, self._no_progress = Recovery(), ""
+            self._progress = ProgressChecker()
+            return decision
+        self._check_progress(decision)
+        if self._no_progress or self.params.recovery.enabled:
+            return self._apply_recovery(decision)
+        self._recovery = Recovery()
+        return decision
+
+    def _check_progress(self, decision: Decision) -> None:
+        """Begin the recovery if the robot makes no progress although it drives."""
+        if self.phase is not Phase.FREE or decision.mode is Mode.BLOCKED:
+            self._progress.pause()
+            return
+        self._no_progress = self._progress.check(decision, self.params.progress)
+        if self._no_progress:
+            self._recovery = wait_after(self._progress.tries, decision.stamp_ns)
 
     def _apply_recovery(self, decision: Decision) -> Decision:
         """The decision, changed according to the phase of the recovery."""
-        if decision.mode is Mode.STOPPED:
-            return decision  # its inputs are not valid
-        self._remember_position(decision.pose.position)
-        if decision.mode in _NOT_DRIVING:
-            self._recovery = Recovery()
-            return decision
         params, now_ns = self.params.recovery, decision.stamp_ns
-        blocked = decision.mode is Mode.BLOCKED
+        cause = self._no_progress or decision.reason
+        blocked = bool(self._no_progress) or decision.mode is Mode.BLOCKED
         self._recovery = state = advance(self._recovery, blocked, now_ns, params)
         count = f"attempt {state.attempt} of {params.attempts}"
         if state.phase is Phase.WAIT:
-            waited_s = (now_ns - state.since_ns) * NANO
-            return replace(decision, reason=f"{decision.reason}; waiting for {waited_s:.1f} s")
+            reason = f"{cause}; waiting for {(now_ns - state.since_ns) * NANO:.1f} s"
+            return _stopped(decision, reason)
         if state.phase is Phase.BACK_OFF:
-            return self._back_off(decision, count)
+            if params.enabled:
+                return self._back_off(decision, count)
+            return _stopped(decision, f"{cause}; at rest, {count}")
         if state.phase is Phase.REPLAN:
-            self.inner.reset()
-            return _stopped(decision, f"replanning, {count}: {decision.reason}")
+            self._try_again()
+            return _stopped(decision, f"replanning, {count}: {cause}")
         if state.phase is Phase.GIVEN_UP:
-            reason = f"gave up after {state.attempt} attempts; send a goal to go on"
+            why = f", {self._no_progress}" if self._no_progress else ""
+            reason = f"gave up after {state.attempt} attempts{why}; send a goal to go on"
             return _stopped(decision, reason)
         return decision
+
+    def _try_again(self) -> None:
+        """Let the planner begin anew."""
+        self.inner.reset()
+        if self._no_progress:
+            self._progress.restart()
+            self._no_progress = ""
 
     def _remember_position(self, position: Point) -> None:
         if self._last_position is None or distance(position, self._last_position) > TRAIL_STEP_M:
@@ -110,7 +152,8 @@ class SupervisedPlanner:
         """A step to the side with most room, at most half of it; of equals, back."""
         position, tick_s = decision.pose.position, self.params.tick_ns * NANO
         back = bearing(position, self._earlier_position or position)
-        heading, room = most_room(decision.ranges_m, back)
+        surroundings = self._surroundings(decision)
+        heading, room = most_room(surroundings, back) if surroundings else (back, 0.0)
         length = min(self.params.recovery.back_off_mps * tick_s, 0.5 * room)
         if not length > 0.0:
             return _stopped(decision, f"no room to back off, {count}")
@@ -126,6 +169,28 @@ class SupervisedPlanner:
                 (waypoint[1] - position[1]) / tick_s,
             ),
             candidates=(),
+        )
+
+    def _surroundings(self, decision: Decision) -> Ranges:
+        """The sectors, or ranges like them from a planner that decides without sectors."""
+        if decision.ranges_m or not isinstance(self.inner, HasSurroundings):
+            return decision.ranges_m
+        return self.inner.surroundings(decision.pose.position)
+
+    def _apply_speed_limit(self, decision: Decision) -> Decision:
+        """The decision with waypoint and velocity scaled to the allowed speed."""
+        params = self.params.speed_limit
+        if params.slow_within_m == 0.0 or decision.velocity == (0.0, 0.0):
+            return decision
+        share = allowed_speed_share(self._surroundings(decision), params)
+        if share == 1.0:
+            return decision
+        (x, y), (wx, wy), (vx, vy) = decision.pose.position, decision.waypoint, decision.velocity
+        return replace(
+            decision,
+            reason=f"{decision.reason}; {100.0 * share:.0f} % speed so near",
+            waypoint=(x + share * (wx - x), y + share * (wy - y)),
+            velocity=(share * vx, share * vy),
         )
 
 
@@ -147,18 +212,4 @@ def _stopped(decision: Decision, reason: str) -> Decision:
         waypoint=decision.pose.position,
         velocity=(0.0, 0.0),
         candidates=(),
-    )
-
-
-def _apply_speed_limit(decision: Decision, params: PlannerParams) -> Decision:
-    """The decision with waypoint and velocity scaled to the allowed speed."""
-    share = allowed_speed_share(decision.ranges_m, params.speed_limit)
-    if share == 1.0 or decision.velocity == (0.0, 0.0):
-        return decision
-    (x, y), (wx, wy), (vx, vy) = decision.pose.position, decision.waypoint, decision.velocity
-    return replace(
-        decision,
-        reason=f"{decision.reason}; {100.0 * share:.0f} % speed so near",
-        waypoint=(x + share * (wx - x), y + share * (wy - y)),
-        velocity=(share * vx, share * vy),
     )
