@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
-from ..core.planner_types import NANO, Bits, Circle, Observation, Ranges
+from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
@@ -20,6 +20,8 @@ from ..perception.sensory_vector import SensorParams, sense_circles
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
+from .differential_drive import Speeds, apply_command, command
+from .drive_rollout import DriveRollout
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
@@ -30,12 +32,13 @@ from .trajectory_cost import (
     circles_from_sectors,
     predicted_circles,
 )
-from .turn_delay import TurnDelay
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a direction is needed
 HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
+# A differential drive cannot step aside when an obstacle beside it turns towards it.
+TURNING_MARGIN_M = 0.1
 _FREE_M = 1e-9
 _STILL_M = 1e-4
 _LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
@@ -97,6 +100,7 @@ class Predictive(BasePlanner):
     reads_sectors = False
     preset = staticmethod(preset)
     _perceived: Sequence[Circle] = ()
+    _speeds: Speeds = Speeds()
     _unobserved: np.ndarray | None = None  # headings the lidar has not covered; None: none
     _coverage: ScanCoverage
 
@@ -149,8 +153,11 @@ class Predictive(BasePlanner):
         speed, tick_s = self.params.speed_mps, self.tick_s
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
-        delay = self._turn_delay(obs)
-        costs = TrajectoryCost(position, circles, self.options.risk, tick_s, speed, delay)
+        drive = self._drive_rollout(obs)
+        risk = self.options.risk
+        if drive is not None:
+            risk = replace(risk, margin_m=risk.margin_m + TURNING_MARGIN_M)
+        costs = TrajectoryCost(position, circles, risk, tick_s, speed, drive)
         share = min(1.0, speed * tick_s / goal_distance)
         waypoint, t1 = (to_goal[0] * share, to_goal[1] * share), share * goal_distance / speed
         observed = self._is_observed(to_goal)
@@ -163,6 +170,8 @@ class Predictive(BasePlanner):
         if enclosure:
             return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
+        if drive is not None:  # where the bits, which know the turn but not the arc, are wrong
+            gaps = sorted({*gaps, *range(0, len(vs), len(vs) // HEADINGS_IF_CLOSED)})
         candidates = self._waypoints(gaps, to_goal, goal_distance)
         if last_waypoint is not None:  # often still the best: then most others need no evaluation
             q = (last_waypoint[0] - x, last_waypoint[1] - y)
@@ -239,11 +248,20 @@ class Predictive(BasePlanner):
         circles = [(circle.center_m, circle.radius_m) for circle in self._perceived]
         return sense_circles(position, circles, sensor)
 
+    def plan(self, obs: Observation) -> Decision:
+        """Decide, and for a differential drive keep the speeds that the decision leads to."""
+        decision = super().plan(obs)
+        if self.params.turns:
+            tick_ns = self.params.tick_ns
+            given = command(decision, self.params, tick_ns)
+            _, self._speeds = apply_command(obs.pose, self._speeds, given, self.params, tick_ns)
+        return decision
+
     def forget(self) -> None:
         """Drop the last waypoint, the tracks and the remembered circles."""
         self._waypoint = None
         self._perceived = ()
-        self._last_yaw: tuple[int, float] | None = None
+        self._speeds = Speeds()
         self._unobserved = None
         self._coverage = ScanCoverage(self.options.headings, self.options.coverage_s)
         self._memory = ObstacleMemory(self.options.memory)
@@ -262,16 +280,12 @@ class Predictive(BasePlanner):
             return self._tracker.circles(obs.stamp_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
-    def _turn_delay(self, obs: Observation) -> TurnDelay | None:
-        """Of a differential drive at its present heading and rate of turn; None for others."""
+    def _drive_rollout(self, obs: Observation) -> DriveRollout | None:
+        """The rollout of a differential drive from its present state; None for others."""
         if not self.params.turns:
             return None
-        last, self._last_yaw = self._last_yaw, (obs.stamp_ns, obs.pose.yaw)
-        rate = 0.0
-        if last is not None and last[0] < obs.stamp_ns:
-            turned = math.remainder(obs.pose.yaw - last[1], 2.0 * math.pi)
-            rate = turned / ((obs.stamp_ns - last[0]) * NANO)
-        return TurnDelay(self.params, obs.pose.yaw, rate)
+        speed = self.params.speed_mps
+        return DriveRollout(self.params, obs.pose.yaw, self._speeds, speed, self.tick_s)
 
     def _nearest_free(self, closed: Bits, to_goal: Point) -> list[int]:
         """The free headings nearest to the goal's on both sides; every sixth if none is free."""
