@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tracks' states on arrays: extended Kalman filters of circles at constant velocity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import small_matrices as sm
+
+Array = np.ndarray
+
+VX, VY, RADIUS = 2, 3, 4
+_Z = np.array([0, 1, RADIUS])  # what a scan measures
+_RADIUS_DRIFT = 0.02  # m/s^0.5; edges err alike in many scans, so old ones must not count for ever
+_TURNED = 9.0  # squared Mahalanobis length of a correction at which the velocity is unknown again
+_ACCELERATION_PER_SPEED = 0.15  # 1/s^0.5; what is fast changes its velocity by more
+_EYE = np.eye(3)
+
+
+class TrackBank:
+    """m tracks with states (x, y, vx, vy, r), each at its own time.
+
+    time_s is that of the state after the stamp of the last scan: beams of one scan may differ in
+    time. unseen_s and known_s: since the last and between first and last return. moving: whether
+    the track moves; at rest its velocity is given as 0.
+    """
+
+    _ARRAYS = (
+        "state",
+        "covariance",
+        "time_s",
+        "unseen_s",
+        "known_s",
+        "appeared_s",
+        "moving",
+        "scans",
+        "rms_m",
+        "missed",
+    )
+
+    def __init__(self) -> None:
+        """Start without tracks."""
+        self.state = np.empty((0, 5))
+        self.covariance = np.empty((0, 5, 5))
+        self.time_s = np.empty(0)
+        self.unseen_s = np.empty(0)
+        self.known_s = np.empty(0)
+        self.appeared_s = np.empty(0)  # since a return in space that had been seen free
+        self.moving = np.empty(0, dtype=bool)
+        self.scans = np.empty(0, dtype=np.int64)
+        self.rms_m = np.empty(0)
+        self.missed = np.empty(0, dtype=np.int64)  # scans in a row that saw through it
+
+    @property
+    def count(self) -> int:
+        """Number of tracks."""
+        return self.state.shape[0]
+
+    @property
+    def position_sd_m(self) -> Array:
+        """Standard deviation of the centre, mean of both axes; (m,)."""
+        P = self.covariance
+        sd: Array = np.sqrt(0.5 * (P[:, 0, 0] + P[:, 1, 1]))
+        return sd
+
+    @property
+    def speed_sd_mps(self) -> Array:
+        """Standard deviation of the velocity, mean of both axes; (m,)."""
+        P = self.covariance
+        sd: Array = np.sqrt(0.5 * (P[:, VX, VX] + P[:, VY, VY]))
+        return sd
+
+    def keep(self, kept: Array) -> None:
+        """Drop the tracks where kept (m,) is False."""
+        for name in self._ARRAYS:
+            setattr(self, name, getattr(self, name)[kept])
+
+    def pass_time(self, dt: float) -> None:
+        """The next scan's stamp is dt seconds later."""
+        self.time_s = self.time_s - dt
+        self.unseen_s = self.unseen_s + dt
+        self.appeared_s = self.appeared_s + dt
+
+    def predict(self, to_s: Array, acceleration_sd: float) -> Array:
+        """Predict to times to_s (m,) at constant velocity; the durations (m,)."""
+        dt = to_s - self.time_s
+        self.state[:, :2] += dt[:, None] * self.state[:, 2:4]
+        P, step = self.covariance, dt[:, None, None]
+        P[:, :2, :] += step * P[:, 2:4, :]
+        P[:, :, :2] += step * P[:, :, 2:4]
+        length = np.abs(dt)
+        v = self.state[:, 2:4]
+        speed = np.sqrt(v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1])
+        q = (acceleration_sd + _ACCELERATION_PER_SPEED * speed) ** 2 * length
+        for k in (0, 1):
+            P[:, k, k] += q * dt * dt / 3.0
+            P[:, k, k + 2] += 0.5 * q * dt
+            P[:, k + 2, k] += 0.5 * q * dt
+            P[:, k + 2, k + 2] += q
+        P[:, RADIUS, RADIUS] += _RADIUS_DRIFT * _RADIUS_DRIFT * length
+        self.time_s = to_s.copy()
+        return dt
+
+    def update(
+        self, index: Array, information: Array, vector: Array, dt: Array, speed_sd: float
+    ) -> None:
+        """Update the tracks of these indices by measured circles.
+
+        information (j, 3, 3) and vector (j, 3) = information z of (x, y, r), dt (j,) the time
+        since the last return. If the correction contradicts the prediction, the obstacle has
+        turned: its velocity is unknown again since then.
+        """
+        state, covariance = self.state[index], self.covariance[index]
+        new_state, new_covariance, surprise = _corrected(state, covariance, information, vector)
+        turned = np.flatnonzero(surprise > _TURNED)
+        if turned.size:
+            variance, step = speed_sd * speed_sd, dt[turned]
+            P = covariance[turned]
+            for k in (0, 1):
+                P[:, k, k] += variance * step * step
+                P[:, k, k + 2] += variance * step
+                P[:, k + 2, k] += variance * step
+                P[:, k + 2, k + 2] += variance
+            again = _corrected(state[turned], P, information[turned], vector[turned])
+            new_state[turned], new_covariance[turned] = again[0], again[1]
+        self.state[index], self.covariance[index] = new_state, new_covariance
+
+    def add(
+        self, z: Array, covariance: Array, time_s: Array, rms_m: Array, speed_sd: float
+    ) -> None:
+        """Add tracks at rest from measured circles (j, 3) and their covariances (j, 3, 3)."""
+        j = z.shape[0]
+        state = np.zeros((j, 5))
+        state[:, _Z] = z
+        P = np.zeros((j, 5, 5))
+        P[:, _Z[:, None], _Z[None, :]] = covariance
+        P[:, VX, VX] = P[:, VY, VY] = speed_sd * speed_sd
+        zero = np.zeros(j)
+        new: dict[str, Array] = {
+            "state": state,
+            "covariance": P,
+            "time_s": time_s,
+            "unseen_s": zero,
+            "known_s": zero,
+            "appeared_s": np.full(j, np.inf),
+            "moving": np.zeros(j, dtype=bool),
+            "scans": np.ones(j, dtype=np.int64),
+            "rms_m": rms_m,
+            "missed": np.zeros(j, dtype=np.int64),
+        }
+        for name in self._ARRAYS:
+            setattr(self, name, np.concatenate((getattr(self, name), new[name])))
+
+
+def _corrected(
+    state: Array, covariance: Array, information: Array, vector: Array
+) -> tuple[Array, Array, Array]:
+    """Posterior states and covariances, and the corrections' squared Mahalanobis lengths.
+
+    With the information L and l = L z of a measurement of the part z of the state,
+    x' = x + P_z (I + L P_zz)^-1 (l - L x_z) and P' = P - P_z (I + L P_zz)^-1 L P_z^T. L may be
+    singular: what the scan does not show stays as it was.
+    """
+    columns = covariance[:, :, _Z]
+    block = columns[:, _Z, :]
+    shared = sm.inverse(_EYE + sm.product(information, block))
+    innovation = vector - sm.applied(information, state[:, _Z])
+    y = sm.applied(shared, innovation)
+    shift = sm.applied(columns, y)
+    moved = sm.applied(block, y) * y
+    surprise: Array = moved[:, 0] + moved[:, 1] + moved[:, 2]
+    gain = sm.product(columns, sm.product(shared, information))
+    reduced = covariance - sm.product(gain, columns.transpose(0, 2, 1))
+    reduced = 0.5 * (reduced + reduced.transpose(0, 2, 1))
+    changed = state + shift
+    np.maximum(changed[:, RADIUS], 0.01, out=changed[:, RADIUS])
+    return changed, reduced, surprise
