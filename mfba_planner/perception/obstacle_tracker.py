@@ -34,6 +34,9 @@ _SEES_PAST_M = 0.15  # beams that end so much behind a circle have seen through 
 _MOST_MISSED = 2  # scans in a row that see through a track before it is dropped
 _NEW_S = 0.25  # a track is kept so long without a return, and as long again as it was seen
 _LOST_VARIANCE = 0.25  # m^2, of a centre too uncertain to keep
+_FEWEST_SCANS, _MOST_SCANS = 6, 20  # whose errors tell a common motion of all tracks
+_SETTLED = 2  # scans of a track that may be an anchor
+_ANCHORS = 3  # such tracks tell that there is no common motion
 _FRAGMENT_M = 0.05
 RADIUS_OF_FIT = 2
 
@@ -74,6 +77,7 @@ class Tracker:
         self._pose_error = PoseError()
         self._free = FreeSpace()
         self._walls: list[Point] = []
+        self._scans = 0
         self._range_variance = self.params.range_sd_m**2
 
     @property
@@ -127,7 +131,25 @@ class Tracker:
         found, off = self._segments(beams, sd)
         track = associate(found, off, origin, bank.state, sd, p.gate_m)
         self._use(beams, found, track, origin)
+        self._follow_odometry(dt, origin)
         self._free.add(beams, self._pose_error.error, self._pose_error.sd_rad)
+
+    def _follow_odometry(self, dt: float, origin: Array) -> None:
+        """Move the tracks towards the odometry, whose errors have the mean 0.
+
+        Nothing but that tells whether all obstacles turn around the robot. The gains are those
+        of a least-squares line through the errors of the last scans.
+        """
+        self._scans += 1
+        if dt <= 0.0:
+            return
+        n = min(max(self._scans, _FEWEST_SCANS), _MOST_SCANS)
+        gain, rate = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1))
+        bank = self._bank
+        anchors = int(np.count_nonzero(~bank.moving & (bank.scans >= _SETTLED)))
+        error = self._pose_error.error
+        change = tuple(0.0 if anchors >= _ANCHORS else rate / dt * value for value in error)
+        bank.turn_with(self._pose_error.follow(gain), (change[0], change[1], change[2]), origin)
 
     def circles(self, now_ns: int, robot_radius_m: float) -> tuple[Circle, ...]:
         """The tracked circles, predicted to now_ns and enlarged by the robot's radius.
@@ -246,9 +268,9 @@ class Tracker:
     def _correct(self, index: Array, group: Array, fitted: Fit, origin: Array) -> None:
         """Update tracks by their groups, less the error of the odometry."""
         bank, error = self._bank, self._pose_error
-        predicted = bank.state[index, :2]
         measured = fitted.z[group, :2]
-        covariance = bank.covariance[index][:, :2, :2] + fitted.covariance[group][:, :2, :2]
+        predicted, covariance = bank.expected(index)
+        covariance += fitted.covariance[group][:, :2, :2]
         left = error.estimate(measured, predicted, covariance, origin)
         if not index.size:
             return
@@ -264,13 +286,13 @@ class Tracker:
         nxy = left[0, 1] + px * left[1, 2] + py * left[0, 2] + px * py * left[2, 2]
         noise = sm.symmetric(nxx, nxy, zero, nyy, zero, zero)
         shared = sm.inverse(np.eye(3) + sm.product(information, noise))
-        dt = bank.unseen_s[index]
+        dt = bank.predicted_s[index]
         bank.update(
             index, sm.product(shared, information), sm.applied(shared, vector), dt,
             self.params.speed_sd_mps,
         )  # fmt: skip
         bank.known_s[index] += bank.unseen_s[index]
-        bank.unseen_s[index] = 0.0
+        bank.unseen_s[index] = bank.predicted_s[index] = 0.0
         bank.scans[index] += 1
         bank.rms_m[index] = fitted.rms_m[group]
         bank.missed[index] = 0

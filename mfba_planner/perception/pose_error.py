@@ -18,7 +18,11 @@ Array = np.ndarray
 
 _LEARNING = 0.1  # weight of one scan in the variances
 _LEAST_SD, _MOST_SD = 1e-3, 0.06  # m and rad
-_FIRST_SD = 5e-3
+_FIRST_SD = 0.015
+_MEDIAN = 1.386  # of a chi-squared variable of two degrees of freedom
+_SHRINKS = 0.7  # most change of a variance by one scan
+_PASSES = 3
+_ENOUGH = 3  # tracks that tell the two variances apart
 _OUTLIER = 9.0  # squared Mahalanobis distance
 
 
@@ -30,6 +34,12 @@ class PoseError:
         self.variance_m2 = _FIRST_SD**2
         self.variance_rad2 = _FIRST_SD**2
         self.error = (0.0, 0.0, 0.0)
+
+    def follow(self, share: float) -> tuple[float, float, float]:
+        """Take that share off the error, as the tracks move towards the odometry by it."""
+        x, y, turn = (share * value for value in self.error)
+        self.error = (self.error[0] - x, self.error[1] - y, self.error[2] - turn)
+        return x, y, turn
 
     @property
     def sd_m(self) -> float:
@@ -51,36 +61,94 @@ class PoseError:
     ) -> Array:
         """Estimate the error from centres (j, 2) and their covariances (j, 2, 2).
 
-        Returns the covariance (3, 3) that is left.
+        Outliers are left out. If fewer than half of the tracks agree, the error stays 0. Returns
+        the covariance (3, 3) that is left.
         """
         self.error = (0.0, 0.0, 0.0)
         vm, vr = self.variance_m2, self.variance_rad2
-        prior = np.diag([1.0 / vm, 1.0 / vm, 1.0 / vr])
+        unknown = np.diag([vm, vm, vr])
         if not measured.shape[0]:
-            return np.diag([vm, vm, vr])
-        e = measured - predicted
-        px, py = origin[1] - predicted[:, 1], predicted[:, 0] - origin[0]  # per rad
-        sxx, sxy, syy = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
-        txx, txy, tyy = sxx + vm + vr * px * px, sxy + vr * px * py, syy + vm + vr * py * py
-        ex, ey = e[:, 0], e[:, 1]
-        length = (tyy * ex * ex - 2.0 * txy * ex * ey + txx * ey * ey) / (txx * tyy - txy * txy)
-        fits = length < _OUTLIER
-        scale = fits / (sxx * syy - sxy * sxy)
-        ixx, ixy, iyy = scale * syy, -scale * sxy, scale * sxx
-        gx, gy = ixx * ex + ixy * ey, ixy * ex + iyy * ey
-        ixr, iyr = ixx * px + ixy * py, ixy * px + iyy * py
-        rows = [ixx, ixy, iyy, ixr, iyr, px * ixr + py * iyr, gx, gy, px * gx + py * gy]
-        xx, xy, yy, xr, yr, rr, bx, by, br = (math.fsum(row.tolist()) for row in rows)
-        information = np.array([[xx, xy, xr], [xy, yy, yr], [xr, yr, rr]]) + prior
-        left: Array = sm.inverse(information[None])[0]
-        error = sm.applied(left[None], np.array([[bx, by, br]]))[0]
-        self.error = (float(error[0]), float(error[1]), float(error[2]))
-        second = 0.5 * (error[0] ** 2 + error[1] ** 2 + left[0, 0] + left[1, 1])
-        self.variance_m2 = self._learnt(vm, float(second))
-        self.variance_rad2 = self._learnt(vr, float(error[2] ** 2 + left[2, 2]))
+            return unknown
+        equations = _Equations(measured, predicted, covariance, origin)
+        fits = equations.length(vm, vr) < _OUTLIER
+        left, error = equations.solution(vm, vr, fits)
+        near = equations.rest(error)
+        for _ in range(_PASSES):
+            if not (fits & (near > _OUTLIER)).any():
+                break
+            # Some contradict: weigh all by their distance from the solution.
+            left, error = equations.solution(vm, vr, fits / (1.0 + near / 3.0))
+            near = equations.rest(error)
+        agree = near <= _OUTLIER
+        count = int(np.count_nonzero(agree))
+        if 2 * count < agree.size:
+            return unknown
+        if count < agree.size:
+            left, error = equations.solution(vm, vr, agree)
+        ex, ey, turn = error
+        self.error = (ex, ey, turn)
+        # Lengths have the median 1.39 where the variances are right; the least squares tell
+        # which of the two is larger.
+        length = np.sort(equations.length(vm, vr)[agree])
+        factor = float(length[count // 2]) / _MEDIAN
+        factor = min(max(factor, _SHRINKS), 1.0 / _SHRINKS)
+        vm, vr = factor * vm, factor * vr
+        if count >= _ENOUGH:
+            second = 0.5 * (ex * ex + ey * ey + float(left[0, 0] + left[1, 1]))
+            vm += _LEARNING * (second - vm)
+            vr += _LEARNING * (turn * turn + float(left[2, 2]) - vr)
+        self.variance_m2, self.variance_rad2 = _limited(vm), _limited(vr)
         return left
 
-    @staticmethod
-    def _learnt(variance: float, sample: float) -> float:
-        learnt = variance + _LEARNING * (sample - variance)
-        return min(max(learnt, _LEAST_SD**2), _MOST_SD**2)
+
+def _limited(variance: float) -> float:
+    return min(max(variance, _LEAST_SD**2), _MOST_SD**2)
+
+
+class _Equations:
+    """The differences of j centres as linear functions of the pose's error."""
+
+    def __init__(
+        self, measured: Array, predicted: Array, covariance: Array, origin: Array
+    ) -> None:
+        self.ex, self.ey = (measured - predicted).T
+        self.px, self.py = origin[1] - predicted[:, 1], predicted[:, 0] - origin[0]  # m per rad
+        self.xx, self.xy, self.yy = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+        scale = 1.0 / (self.xx * self.yy - self.xy * self.xy)
+        ixx, ixy, iyy = scale * self.yy, -scale * self.xy, scale * self.xx
+        self.ixx, self.ixy, self.iyy = ixx, ixy, iyy
+        gx, gy = ixx * self.ex + ixy * self.ey, ixy * self.ex + iyy * self.ey
+        rx, ry = ixx * self.px + ixy * self.py, ixy * self.px + iyy * self.py
+        self.rows = np.array(
+            (ixx, ixy, rx, iyy, ry, self.px * rx + self.py * ry, gx, gy,
+             self.px * gx + self.py * gy)
+        )  # fmt: skip
+
+    def length(self, vm: float, vr: float) -> Array:
+        """Squared Mahalanobis lengths (j,) of the differences before the error is known."""
+        px, py, ex, ey = self.px, self.py, self.ex, self.ey
+        xx, yy = self.xx + vm + vr * px * px, self.yy + vm + vr * py * py
+        xy = self.xy + vr * px * py
+        length: Array = (yy * ex * ex - 2.0 * xy * ex * ey + xx * ey * ey) / (xx * yy - xy * xy)
+        return length
+
+    def rest(self, error: tuple[float, float, float]) -> Array:
+        """Squared Mahalanobis lengths (j,) of what an error (x, y, turn) does not explain."""
+        x, y, turn = error
+        ex, ey = self.ex - x - turn * self.px, self.ey - y - turn * self.py
+        rest: Array = self.ixx * ex * ex + 2.0 * self.ixy * ex * ey + self.iyy * ey * ey
+        return rest
+
+    def solution(
+        self, vm: float, vr: float, weight: Array
+    ) -> tuple[Array, tuple[float, float, float]]:
+        """Covariance (3, 3) and error by weighted least squares with the prior variances."""
+        # accumulate adds in order on every machine
+        total = np.add.accumulate(self.rows * weight, axis=1)[:, -1].tolist()
+        xx, xy, xr, yy, yr, rr, bx, by, br = total
+        information = np.array(
+            [[xx + 1.0 / vm, xy, xr], [xy, yy + 1.0 / vm, yr], [xr, yr, rr + 1.0 / vr]]
+        )
+        left: Array = sm.inverse(information[None])[0]
+        (a, b, c), (_, d, e), (_, _, f) = left.tolist()
+        return left, (a * bx + b * by + c * br, b * bx + d * by + e * br, c * bx + e * by + f * br)

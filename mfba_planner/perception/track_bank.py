@@ -14,6 +14,7 @@ _Z = np.array([0, 1, RADIUS])  # what a scan measures
 _RADIUS_DRIFT = 0.02  # m/s^0.5; edges err alike in many scans, so old ones must not count for ever
 _TURNED = 9.0  # squared Mahalanobis length of a correction at which the velocity is unknown again
 _ACCELERATION_PER_SPEED = 0.15  # 1/s^0.5; what is fast changes its velocity by more
+_CREEP_M = 0.005  # that something may move between two scans before it counts as moving
 _EYE = np.eye(3)
 
 
@@ -29,6 +30,7 @@ class TrackBank:
         "state",
         "covariance",
         "time_s",
+        "predicted_s",
         "unseen_s",
         "known_s",
         "appeared_s",
@@ -43,6 +45,7 @@ class TrackBank:
         self.state = np.empty((0, 5))
         self.covariance = np.empty((0, 5, 5))
         self.time_s = np.empty(0)
+        self.predicted_s = np.empty(0)  # since the last return
         self.unseen_s = np.empty(0)
         self.known_s = np.empty(0)
         self.appeared_s = np.empty(0)  # since a return in space that had been seen free
@@ -81,8 +84,8 @@ class TrackBank:
         self.unseen_s = self.unseen_s + dt
         self.appeared_s = self.appeared_s + dt
 
-    def predict(self, to_s: Array, acceleration_sd: float) -> Array:
-        """Predict to times to_s (m,) at constant velocity; the durations (m,)."""
+    def predict(self, to_s: Array, acceleration_sd: float) -> None:
+        """Predict to times to_s (m,) at constant velocity."""
         dt = to_s - self.time_s
         self.state[:, :2] += dt[:, None] * self.state[:, 2:4]
         P, step = self.covariance, dt[:, None, None]
@@ -99,7 +102,34 @@ class TrackBank:
             P[:, k + 2, k + 2] += q
         P[:, RADIUS, RADIUS] += _RADIUS_DRIFT * _RADIUS_DRIFT * length
         self.time_s = to_s.copy()
-        return dt
+        self.predicted_s = self.predicted_s + dt
+
+    def turn_with(
+        self, shift: tuple[float, float, float], rate: tuple[float, float, float], origin: Array
+    ) -> None:
+        """Move all tracks like a rigid body by (x, y, turn), and their velocities by a rate."""
+        dx, dy = self.state[:, 0] - origin[0], self.state[:, 1] - origin[1]
+        for k, (x, y, turn) in ((0, shift), (VX, rate)):
+            self.state[:, k] += x - turn * dy
+            self.state[:, k + 1] += y + turn * dx
+
+    def expected(self, index: Array) -> tuple[Array, Array]:
+        """Centres (j, 2) and covariances (j, 2, 2) of these tracks, at rest unless they move.
+
+        Most things stand: what they have in common is then the odometry's error, and not their
+        velocity.
+        """
+        moving = self.moving[index]
+        state, P = self.state[index], self.covariance[index]
+        dt = self.predicted_s[index]
+        center = state[:, :2] - np.where(moving, 0.0, dt)[:, None] * state[:, 2:4]
+        block = P[:, :2, :2].copy()
+        step = np.where(moving, 0.0, dt)[:, None, None]
+        cross, speed = P[:, :2, 2:4], P[:, 2:4, 2:4]
+        block -= step * (cross + cross.transpose(0, 2, 1)) - step * step * speed
+        block[:, 0, 0] += np.where(moving, 0.0, _CREEP_M * _CREEP_M)
+        block[:, 1, 1] += np.where(moving, 0.0, _CREEP_M * _CREEP_M)
+        return center, block
 
     def update(
         self, index: Array, information: Array, vector: Array, dt: Array, speed_sd: float
@@ -140,6 +170,7 @@ class TrackBank:
             "state": state,
             "covariance": P,
             "time_s": time_s,
+            "predicted_s": zero,
             "unseen_s": zero,
             "known_s": zero,
             "appeared_s": np.full(j, np.inf),
