@@ -18,7 +18,7 @@ Array = np.ndarray
 
 _LEARNING = 0.1  # weight of one scan in the variances
 _LEAST_SD, _MOST_SD = 1e-3, 0.06  # m and rad
-_FIRST_SD = 0.015
+_FIRST_SD = 0.02
 _MEDIAN = 1.386  # of a chi-squared variable of two degrees of freedom
 _SHRINKS = 0.7  # most change of a variance by one scan
 _PASSES = 3
