@@ -10,7 +10,6 @@ import numpy as np
 
 from ..core.geometry import Point, Pose2D
 from ..core.planner_types import NANO, Circle, Scan
-from . import small_matrices as sm
 from .circle_fit import Fit, Returns, fit, start_of
 from .free_space import FreeSpace
 from .pose_error import PoseError
@@ -167,8 +166,8 @@ class Tracker:
             shift_x, shift_y = self._pose_error.shift(
                 bank.state[:, 0], bank.state[:, 1], np.array(self._pose.position)
             )
-            x = bank.state[:, 0] + shift_x + velocity[:, 0] * ahead
-            y = bank.state[:, 1] + shift_y + velocity[:, 1] * ahead
+            x = bank.state[:, 0] + shift_x + bank.shift_m[:, 0] + velocity[:, 0] * ahead
+            y = bank.state[:, 1] + shift_y + bank.shift_m[:, 1] + velocity[:, 1] * ahead
             speed_sd = bank.speed_sd_mps
             enlargement = (
                 p.allowance_m
@@ -243,7 +242,7 @@ class Tracker:
             fitted = fit(outline.returns, outline.start, radius, variance, self._variance())
             wall = self._is_wall(fitted, outline)
             is_known = np.arange(groups) < known.size
-            round_known = np.flatnonzero(~wall & is_known)
+            round_known = (~wall & is_known).nonzero()[0]
             self._correct(known[round_known], round_known, fitted, origin)
             updated[known[round_known]] = True
             self._learn_noise(fitted, outline, ~wall)
@@ -276,21 +275,10 @@ class Tracker:
             return
         sx, sy = error.shift(measured[:, 0], measured[:, 1], origin)
         information = fitted.information[group]
-        zero = np.zeros(index.size)
-        shift = np.column_stack((sx, sy, zero))
-        vector = fitted.vector[group] - sm.applied(information, shift)
-        # The rest of that error, as noise of each centre: L' = (I + L N)^-1 L.
-        px, py = origin[1] - measured[:, 1], measured[:, 0] - origin[0]
-        nxx = left[0, 0] + 2.0 * px * left[0, 2] + px * px * left[2, 2]
-        nyy = left[1, 1] + 2.0 * py * left[1, 2] + py * py * left[2, 2]
-        nxy = left[0, 1] + px * left[1, 2] + py * left[0, 2] + px * py * left[2, 2]
-        noise = sm.symmetric(nxx, nxy, zero, nyy, zero, zero)
-        shared = sm.inverse(np.eye(3) + sm.product(information, noise))
-        dt = bank.predicted_s[index]
-        bank.update(
-            index, sm.product(shared, information), sm.applied(shared, vector), dt,
-            self.params.speed_sd_mps,
-        )  # fmt: skip
+        vector = fitted.vector[group]
+        vector -= information[:, :, 0] * sx[:, None] + information[:, :, 1] * sy[:, None]
+        noise = error.noise(measured, left, origin)
+        bank.update(index, information, vector, noise, self.params.speed_sd_mps)
         bank.known_s[index] += bank.unseen_s[index]
         bank.unseen_s[index] = bank.predicted_s[index] = 0.0
         bank.scans[index] += 1

@@ -22,7 +22,7 @@ _FIRST_SD = 0.02
 _MEDIAN = 1.386  # of a chi-squared variable of two degrees of freedom
 _SHRINKS = 0.7  # most change of a variance by one scan
 _PASSES = 3
-_ENOUGH = 3  # tracks that tell the two variances apart
+_ENOUGH = 3  # tracks that tell an error of the odometry from motion
 _OUTLIER = 9.0  # squared Mahalanobis distance
 
 
@@ -56,18 +56,30 @@ class PoseError:
         ex, ey, turn = self.error
         return ex - turn * (y - origin[1]), ey + turn * (x - origin[0])
 
+    @staticmethod
+    def noise(measured: Array, left: Array, origin: Array) -> Array:
+        """Covariances (j, 3, 3) of (x, y, r) at centres (j, 2) by what is left of the error."""
+        px, py = origin[1] - measured[:, 1], measured[:, 0] - origin[0]
+        (xx, xy, xr), (_, yy, yr), (_, _, rr) = left.tolist()
+        noise = np.zeros((measured.shape[0], 3, 3))
+        noise[:, 0, 0] = xx + px * (2.0 * xr + rr * px)
+        noise[:, 1, 1] = yy + py * (2.0 * yr + rr * py)
+        noise[:, 0, 1] = noise[:, 1, 0] = xy + px * yr + py * (xr + rr * px)
+        return noise
+
     def estimate(
         self, measured: Array, predicted: Array, covariance: Array, origin: Array
     ) -> Array:
         """Estimate the error from centres (j, 2) and their covariances (j, 2, 2).
 
-        Outliers are left out. If fewer than half of the tracks agree, the error stays 0. Returns
-        the covariance (3, 3) that is left.
+        Outliers are left out. If fewer than three or fewer than half of the tracks agree, the
+        error stays 0: one or two that move look like an odometry that errs. Returns the
+        covariance (3, 3) that is left.
         """
         self.error = (0.0, 0.0, 0.0)
         vm, vr = self.variance_m2, self.variance_rad2
         unknown = np.diag([vm, vm, vr])
-        if not measured.shape[0]:
+        if measured.shape[0] < _ENOUGH:
             return unknown
         equations = _Equations(measured, predicted, covariance, origin)
         fits = equations.length(vm, vr) < _OUTLIER
@@ -81,7 +93,7 @@ class PoseError:
             near = equations.rest(error)
         agree = near <= _OUTLIER
         count = int(np.count_nonzero(agree))
-        if 2 * count < agree.size:
+        if count < _ENOUGH or 2 * count < agree.size:
             return unknown
         if count < agree.size:
             left, error = equations.solution(vm, vr, agree)
@@ -93,10 +105,9 @@ class PoseError:
         factor = float(length[count // 2]) / _MEDIAN
         factor = min(max(factor, _SHRINKS), 1.0 / _SHRINKS)
         vm, vr = factor * vm, factor * vr
-        if count >= _ENOUGH:
-            second = 0.5 * (ex * ex + ey * ey + float(left[0, 0] + left[1, 1]))
-            vm += _LEARNING * (second - vm)
-            vr += _LEARNING * (turn * turn + float(left[2, 2]) - vr)
+        second = 0.5 * (ex * ex + ey * ey + float(left[0, 0] + left[1, 1]))
+        vm += _LEARNING * (second - vm)
+        vr += _LEARNING * (turn * turn + float(left[2, 2]) - vr)
         self.variance_m2, self.variance_rad2 = _limited(vm), _limited(vr)
         return left
 
@@ -111,7 +122,7 @@ class _Equations:
     def __init__(
         self, measured: Array, predicted: Array, covariance: Array, origin: Array
     ) -> None:
-        self.ex, self.ey = (measured - predicted).T
+        self.ex, self.ey = measured[:, 0] - predicted[:, 0], measured[:, 1] - predicted[:, 1]
         self.px, self.py = origin[1] - predicted[:, 1], predicted[:, 0] - origin[0]  # m per rad
         self.xx, self.xy, self.yy = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
         scale = 1.0 / (self.xx * self.yy - self.xy * self.xy)

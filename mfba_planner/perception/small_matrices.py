@@ -42,9 +42,3 @@ def inverse(a: Array) -> Array:
     out -= flat[:, _S] * flat[:, _T]
     out /= (flat[:, 0] * out[:, 0] + flat[:, 1] * out[:, 3] + flat[:, 2] * out[:, 6])[:, None]
     return out.reshape(-1, 3, 3)
-
-
-def symmetric(xx: Array, xy: Array, xr: Array, yy: Array, yr: Array, rr: Array) -> Array:
-    """(m, 3, 3) from the upper triangles' columns, each (m,)."""
-    rows = np.stack((xx, xy, xr, xy, yy, yr, xr, yr, rr), axis=1)
-    return rows.reshape(-1, 3, 3)

@@ -16,6 +16,12 @@ _TURNED = 9.0  # squared Mahalanobis length of a correction at which the velocit
 _ACCELERATION_PER_SPEED = 0.15  # 1/s^0.5; what is fast changes its velocity by more
 _CREEP_M = 0.005  # that something may move between two scans before it counts as moving
 _EYE = np.eye(3)
+# White-noise acceleration of spectral density q during t: q t (A t^2 + B t + C) of the covariance.
+_Q_POSITION, _Q_CROSS, _Q_VELOCITY = np.zeros((3, 5, 5))
+for _k in (0, 1):
+    _Q_POSITION[_k, _k] = 1.0 / 3.0
+    _Q_CROSS[_k, _k + 2] = _Q_CROSS[_k + 2, _k] = 0.5
+    _Q_VELOCITY[_k + 2, _k + 2] = 1.0
 
 
 class TrackBank:
@@ -38,6 +44,7 @@ class TrackBank:
         "scans",
         "rms_m",
         "missed",
+        "shift_m",
     )
 
     def __init__(self) -> None:
@@ -53,6 +60,7 @@ class TrackBank:
         self.scans = np.empty(0, dtype=np.int64)
         self.rms_m = np.empty(0)
         self.missed = np.empty(0, dtype=np.int64)  # scans in a row that saw through it
+        self.shift_m = np.empty((0, 2))  # of the centre by the odometry's error, as far as known
 
     @property
     def count(self) -> int:
@@ -82,24 +90,26 @@ class TrackBank:
         """The next scan's stamp is dt seconds later."""
         self.time_s = self.time_s - dt
         self.unseen_s = self.unseen_s + dt
+        self.shift_m[:] = 0.0
         self.appeared_s = self.appeared_s + dt
 
     def predict(self, to_s: Array, acceleration_sd: float) -> None:
         """Predict to times to_s (m,) at constant velocity."""
         dt = to_s - self.time_s
-        self.state[:, :2] += dt[:, None] * self.state[:, 2:4]
+        v = self.state[:, 2:4]
+        speed = np.sqrt(v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1])
+        self.state[:, :2] += dt[:, None] * v
         P, step = self.covariance, dt[:, None, None]
         P[:, :2, :] += step * P[:, 2:4, :]
         P[:, :, :2] += step * P[:, :, 2:4]
         length = np.abs(dt)
-        v = self.state[:, 2:4]
-        speed = np.sqrt(v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1])
         q = (acceleration_sd + _ACCELERATION_PER_SPEED * speed) ** 2 * length
-        for k in (0, 1):
-            P[:, k, k] += q * dt * dt / 3.0
-            P[:, k, k + 2] += 0.5 * q * dt
-            P[:, k + 2, k] += 0.5 * q * dt
-            P[:, k + 2, k + 2] += q
+        noise = step * _Q_POSITION
+        noise += _Q_CROSS
+        noise *= step
+        noise += _Q_VELOCITY
+        noise *= q[:, None, None]
+        P += noise
         P[:, RADIUS, RADIUS] += _RADIUS_DRIFT * _RADIUS_DRIFT * length
         self.time_s = to_s.copy()
         self.predicted_s = self.predicted_s + dt
@@ -132,28 +142,32 @@ class TrackBank:
         return center, block
 
     def update(
-        self, index: Array, information: Array, vector: Array, dt: Array, speed_sd: float
+        self, index: Array, information: Array, vector: Array, noise: Array, speed_sd: float
     ) -> None:
         """Update the tracks of these indices by measured circles.
 
-        information (j, 3, 3) and vector (j, 3) = information z of (x, y, r), dt (j,) the time
-        since the last return. If the correction contradicts the prediction, the obstacle has
-        turned: its velocity is unknown again since then.
+        information (j, 3, 3) and vector (j, 3) = information z of (x, y, r); noise (j, 3, 3) is
+        the covariance of what else errs. If the correction contradicts the prediction, the
+        obstacle has turned: its velocity is unknown again since the last return.
         """
         state, covariance = self.state[index], self.covariance[index]
-        new_state, new_covariance, surprise = _corrected(state, covariance, information, vector)
-        turned = np.flatnonzero(surprise > _TURNED)
+        new_state, new_covariance, shift, surprise = _corrected(
+            state, covariance, information, vector, noise
+        )
+        turned = (surprise > _TURNED).nonzero()[0]
         if turned.size:
-            variance, step = speed_sd * speed_sd, dt[turned]
+            variance, step = speed_sd * speed_sd, self.predicted_s[index[turned]]
             P = covariance[turned]
             for k in (0, 1):
                 P[:, k, k] += variance * step * step
                 P[:, k, k + 2] += variance * step
                 P[:, k + 2, k] += variance * step
                 P[:, k + 2, k + 2] += variance
-            again = _corrected(state[turned], P, information[turned], vector[turned])
-            new_state[turned], new_covariance[turned] = again[0], again[1]
+            new_state[turned], new_covariance[turned], shift[turned], _ = _corrected(
+                state[turned], P, information[turned], vector[turned], noise[turned]
+            )
         self.state[index], self.covariance[index] = new_state, new_covariance
+        self.shift_m[index] = shift
 
     def add(
         self, z: Array, covariance: Array, time_s: Array, rms_m: Array, speed_sd: float
@@ -178,31 +192,36 @@ class TrackBank:
             "scans": np.ones(j, dtype=np.int64),
             "rms_m": rms_m,
             "missed": np.zeros(j, dtype=np.int64),
+            "shift_m": np.zeros((j, 2)),
         }
         for name in self._ARRAYS:
             setattr(self, name, np.concatenate((getattr(self, name), new[name])))
 
 
 def _corrected(
-    state: Array, covariance: Array, information: Array, vector: Array
-) -> tuple[Array, Array, Array]:
-    """Posterior states and covariances, and the corrections' squared Mahalanobis lengths.
+    state: Array, covariance: Array, information: Array, vector: Array, noise: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Posterior states and covariances, errors of the centres, and the corrections' lengths.
 
-    With the information L and l = L z of a measurement of the part z of the state,
-    x' = x + P_z (I + L P_zz)^-1 (l - L x_z) and P' = P - P_z (I + L P_zz)^-1 L P_z^T. L may be
-    singular: what the scan does not show stays as it was.
+    With the information L and l = L z of a measurement of the part z of the state, and further
+    noise N of it, x' = x + P_z S (l - L x_z) and P' = P - P_z S L P_z^T where
+    S = (I + L (P_zz + N))^-1. L may be singular: what the scan does not show stays as it was.
+    Of the difference, N S (l - L x_z) is that error. The lengths are squared Mahalanobis ones.
     """
     columns = covariance[:, :, _Z]
     block = columns[:, _Z, :]
-    shared = sm.inverse(_EYE + sm.product(information, block))
+    total = sm.product(information, block + noise)
+    total += _EYE
+    shared = sm.inverse(total)
     innovation = vector - sm.applied(information, state[:, _Z])
     y = sm.applied(shared, innovation)
-    shift = sm.applied(columns, y)
-    moved = sm.applied(block, y) * y
+    changed = state + sm.applied(columns, y)
+    np.maximum(changed[:, RADIUS], 0.01, out=changed[:, RADIUS])
+    moved = sm.applied(block, y)
+    moved *= y
     surprise: Array = moved[:, 0] + moved[:, 1] + moved[:, 2]
     gain = sm.product(columns, sm.product(shared, information))
     reduced = covariance - sm.product(gain, columns.transpose(0, 2, 1))
-    reduced = 0.5 * (reduced + reduced.transpose(0, 2, 1))
-    changed = state + shift
-    np.maximum(changed[:, RADIUS], 0.01, out=changed[:, RADIUS])
-    return changed, reduced, surprise
+    reduced += reduced.transpose(0, 2, 1).copy()
+    reduced *= 0.5
+    return changed, reduced, sm.applied(noise, y)[:, :2], surprise
