@@ -77,6 +77,7 @@ class Tracker:
         self._free = FreeSpace()
         self._walls: list[Point] = []
         self._scans = 0
+        self._clean = {}
         self._range_variance = self.params.range_sd_m**2
 
     @property
@@ -218,7 +219,7 @@ class Tracker:
         y = beams.origin_y[taken] + r * beams.sin[taken]
         label, off = expected_labels(x, y, self._bank.state, np.minimum(sd, 0.2))
         noise = math.sqrt(self._range_variance)
-        join, hump = self.params.join_m + 3.0 * noise, self.params.hump_m + 3.0 * noise
+        join, hump = self.params.join_m + 3.0 * noise, self.params.hump_m + 2.5 * noise
         return segments(beams, taken, x, y, label, join, hump), off
 
     def _use(self, beams: Beams, found: Segments, track: Array, origin: Array) -> None:
@@ -313,6 +314,7 @@ class Tracker:
         begins = ~moving & (significance > _MOVES) & fast
         noise = math.sqrt(self._range_variance)
         clean = outline.whole[group] & (fitted.rms_m[group] < 0.02 + 2.0 * noise)
+        self._clean = dict(zip(index.tolist(), zip(outline.whole[group].tolist(),significance.tolist())))
         unclear = np.flatnonzero(begins & ~clean)
         if unclear.size:
             self._look_for_free_space(index[unclear], group[unclear], outline)

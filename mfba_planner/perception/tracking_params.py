@@ -26,7 +26,7 @@ class TrackingParams:
         maximum=100.0,
     )  # fmt: skip
     range_sd_m: float = option(
-        0.01, "least standard deviation of a range", unit="m", minimum=1e-4, maximum=10.0
+        0.005, "least standard deviation of a range", unit="m", minimum=1e-4, maximum=10.0
     )
     acceleration_sd: float = option(
         0.05,
@@ -47,7 +47,7 @@ class TrackingParams:
         maximum=10.0,
     )
     hump_m: float = option(
-        0.05, "height of a hump of the ranges that cuts a segment", unit="m", minimum=1e-3,
+        0.02, "height of a hump of the ranges that cuts a segment", unit="m", minimum=1e-3,
         maximum=10.0,
     )  # fmt: skip
     widest_m: float = option(
