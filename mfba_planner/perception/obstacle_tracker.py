@@ -33,8 +33,11 @@ _SEES_PAST_M = 0.15  # beams that end so much behind a circle have seen through 
 _MOST_MISSED = 2  # scans in a row that see through a track before it is dropped
 _NEW_S = 0.25  # a track is kept so long without a return, and as long again as it was seen
 _LOST_VARIANCE = 0.25  # m^2, of a centre too uncertain to keep
-_FEWEST_SCANS, _MOST_SCANS = 6, 20  # whose errors tell a common motion of all tracks
+_FAR_M, _DRIFT_MPS = 5.0, 0.02  # apparent speed of what stands so far away
+_FEWEST_SCANS, _MOST_SCANS = 6, 30  # whose errors tell a common motion of all tracks
 _SETTLED = 2  # scans of a track that may be an anchor
+_ROUND_SCANS, _ROUND_SD_M = 5, 0.03  # from which a track's circle is known
+_KNOWN = 3  # scans after which a track's velocity is known
 _ANCHORS = 3  # such tracks tell that there is no common motion
 _FRAGMENT_M = 0.05
 RADIUS_OF_FIT = 2
@@ -143,13 +146,16 @@ class Tracker:
         self._scans += 1
         if dt <= 0.0:
             return
-        n = min(max(self._scans, _FEWEST_SCANS), _MOST_SCANS)
-        gain, rate = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1))
-        bank = self._bank
+        bank, error = self._bank, self._pose_error
         anchors = int(np.count_nonzero(~bank.moving & (bank.scans >= _SETTLED)))
-        error = self._pose_error.error
-        change = tuple(0.0 if anchors >= _ANCHORS else rate / dt * value for value in error)
-        bank.turn_with(self._pose_error.follow(gain), (change[0], change[1], change[2]), origin)
+        # After n scans the rate of turn is known to 3.5 sd / (dt n^1.5).
+        noise = 3.5 * max(error.sd_m / _FAR_M, error.sd_rad) * _FAR_M / (dt * _DRIFT_MPS)
+        n = int(min(max(noise ** (2.0 / 3.0), _FEWEST_SCANS), _MOST_SCANS))
+        if anchors < _ANCHORS:
+            n = max(_FEWEST_SCANS, min(n, self._scans))
+        gain, rate = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1) * dt)
+        x, y, turn = error.error
+        bank.turn_with(error.follow(gain), (rate * x, rate * y, rate * turn), origin)
 
     def circles(self, now_ns: int, robot_radius_m: float) -> tuple[Circle, ...]:
         """The tracked circles, predicted to now_ns and enlarged by the robot's radius.
@@ -220,7 +226,10 @@ class Tracker:
         label, off = expected_labels(x, y, self._bank.state, np.minimum(sd, 0.2))
         noise = math.sqrt(self._range_variance)
         join, hump = self.params.join_m + 3.0 * noise, self.params.hump_m + 2.5 * noise
-        return segments(beams, taken, x, y, label, join, hump), off
+        bank = self._bank
+        radius_sd = np.sqrt(bank.covariance[:, RADIUS, RADIUS])
+        round_ = (bank.scans >= _ROUND_SCANS) & (radius_sd < _ROUND_SD_M)
+        return segments(beams, taken, x, y, label, round_, join, hump), off
 
     def _use(self, beams: Beams, found: Segments, track: Array, origin: Array) -> None:
         """Fit the groups, and update, start and drop tracks by them."""
@@ -271,7 +280,8 @@ class Tracker:
         measured = fitted.z[group, :2]
         predicted, covariance = bank.expected(index)
         covariance += fitted.covariance[group][:, :2, :2]
-        left = error.estimate(measured, predicted, covariance, origin)
+        settled = bank.scans[index] >= _KNOWN
+        left = error.estimate(measured, predicted, covariance, settled, origin)
         if not index.size:
             return
         sx, sy = error.shift(measured[:, 0], measured[:, 1], origin)

@@ -22,6 +22,7 @@ _FIRST_SD = 0.02
 _MEDIAN = 1.386  # of a chi-squared variable of two degrees of freedom
 _SHRINKS = 0.7  # most change of a variance by one scan
 _PASSES = 3
+_MEAN_SHARE = 0.15
 _ENOUGH = 3  # tracks that tell an error of the odometry from motion
 _OUTLIER = 9.0  # squared Mahalanobis distance
 
@@ -34,6 +35,7 @@ class PoseError:
         self.variance_m2 = _FIRST_SD**2
         self.variance_rad2 = _FIRST_SD**2
         self.error = (0.0, 0.0, 0.0)
+        self._mean = (0.0, 0.0, 0.0)  # of the last errors
 
     def follow(self, share: float) -> tuple[float, float, float]:
         """Take that share off the error, as the tracks move towards the odometry by it."""
@@ -68,20 +70,31 @@ class PoseError:
         return noise
 
     def estimate(
-        self, measured: Array, predicted: Array, covariance: Array, origin: Array
+        self, measured: Array, predicted: Array, covariance: Array, settled: Array, origin: Array
     ) -> Array:
         """Estimate the error from centres (j, 2) and their covariances (j, 2, 2).
 
         Outliers are left out. If fewer than three or fewer than half of the tracks agree, the
-        error stays 0: one or two that move look like an odometry that errs. Returns the
-        covariance (3, 3) that is left.
+        error stays 0: one or two that move look like an odometry that errs. The variances are
+        learnt from settled tracks (j,) only. Returns the covariance (3, 3) that is left.
         """
         self.error = (0.0, 0.0, 0.0)
-        vm, vr = self.variance_m2, self.variance_rad2
-        unknown = np.diag([vm, vm, vr])
-        if measured.shape[0] < _ENOUGH:
-            return unknown
+        left = np.diag([self.variance_m2, self.variance_m2, self.variance_rad2])
+        if not measured.shape[0]:
+            return left
         equations = _Equations(measured, predicted, covariance, origin)
+        agree = settled
+        if measured.shape[0] >= _ENOUGH:
+            found = self._solve(equations)
+            if found is not None:
+                left, agree = found
+                agree = agree & settled
+        self._learn(equations, agree, left)
+        return left
+
+    def _solve(self, equations: _Equations) -> tuple[Array, Array] | None:
+        """Set the error; what is left of its covariance, and which tracks agree (j,)."""
+        vm, vr = self.variance_m2, self.variance_rad2
         fits = equations.length(vm, vr) < _OUTLIER
         left, error = equations.solution(vm, vr, fits)
         near = equations.rest(error)
@@ -94,22 +107,34 @@ class PoseError:
         agree = near <= _OUTLIER
         count = int(np.count_nonzero(agree))
         if count < _ENOUGH or 2 * count < agree.size:
-            return unknown
+            return None
         if count < agree.size:
             left, error = equations.solution(vm, vr, agree)
-        ex, ey, turn = error
-        self.error = (ex, ey, turn)
-        # Lengths have the median 1.39 where the variances are right; the least squares tell
-        # which of the two is larger.
-        length = np.sort(equations.length(vm, vr)[agree])
+        self.error = error
+        return left, agree
+
+    def _learn(self, equations: _Equations, tracks: Array, left: Array) -> None:
+        """Learn the variances: their size from the lengths, their ratio from the error.
+
+        Squared Mahalanobis lengths have the median 1.39 where the variances are right. The mean
+        of the last errors is left out: an odometry that drifts does not jump.
+        """
+        count = int(np.count_nonzero(tracks))
+        if not count:
+            return
+        vm, vr = self.variance_m2, self.variance_rad2
+        length = np.sort(equations.length(vm, vr, self._mean)[tracks])
         factor = float(length[count // 2]) / _MEDIAN
         factor = min(max(factor, _SHRINKS), 1.0 / _SHRINKS)
         vm, vr = factor * vm, factor * vr
-        second = 0.5 * (ex * ex + ey * ey + float(left[0, 0] + left[1, 1]))
-        vm += _LEARNING * (second - vm)
-        vr += _LEARNING * (turn * turn + float(left[2, 2]) - vr)
+        if self.error != (0.0, 0.0, 0.0):
+            ex, ey, turn = (e - m for e, m in zip(self.error, self._mean))
+            second = 0.5 * (ex * ex + ey * ey + float(left[0, 0] + left[1, 1]))
+            vm += _LEARNING * (second - vm)
+            vr += _LEARNING * (turn * turn + float(left[2, 2]) - vr)
         self.variance_m2, self.variance_rad2 = _limited(vm), _limited(vr)
-        return left
+        mx, my, mt = (m + _MEAN_SHARE * (e - m) for e, m in zip(self.error, self._mean))
+        self._mean = (mx, my, mt)
 
 
 def _limited(variance: float) -> float:
@@ -135,9 +160,12 @@ class _Equations:
              self.px * gx + self.py * gy)
         )  # fmt: skip
 
-    def length(self, vm: float, vr: float) -> Array:
+    def length(
+        self, vm: float, vr: float, mean: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> Array:
         """Squared Mahalanobis lengths (j,) of the differences before the error is known."""
-        px, py, ex, ey = self.px, self.py, self.ex, self.ey
+        px, py = self.px, self.py
+        ex, ey = self.ex - mean[0] - mean[2] * px, self.ey - mean[1] - mean[2] * py
         xx, yy = self.xx + vm + vr * px * px, self.yy + vm + vr * py * py
         xy = self.xy + vr * px * py
         length: Array = (yy * ex * ex - 2.0 * xy * ex * ey + xx * ey * ey) / (xx * yy - xy * xy)

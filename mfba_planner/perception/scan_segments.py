@@ -52,13 +52,21 @@ def no_segments() -> Segments:
 
 
 def segments(
-    beams: Beams, taken: Array, x: Array, y: Array, label: Array, join_m: float, hump_m: float
+    beams: Beams,
+    taken: Array,
+    x: Array,
+    y: Array,
+    label: Array,
+    known: Array,
+    join_m: float,
+    hump_m: float,
 ) -> Segments:
     """Cut the returns of a scan.
 
     taken (k,) are the indices of beams with a return, from taken_from_a_gap(), and x, y where
     they are. label (k,) is the number of the obstacle at which a return is expected, or -1:
-    where it changes from one obstacle to another there is a cut.
+    where it changes from one obstacle to another there is a cut, and where it changes to none
+    from one whose outline is known (m,): something else begins there.
     """
     if not taken.size:
         return no_segments()
@@ -72,8 +80,10 @@ def segments(
     cut = dx * dx + dy * dy > limit * limit
     cut |= (taken[1:] - taken[:-1]) % beams.range_m.size != 1
     cut |= missing > _MOST_MISSING
-    if label.size:
-        cut |= (label[1:] != label[:-1]) & (label[1:] >= 0) & (label[:-1] >= 0)
+    if known.size:
+        one, other = label[1:], label[:-1]
+        surely = known[np.maximum(one, other)]  # of the obstacle, if the other is none
+        cut |= (one != other) & ((np.minimum(one, other) >= 0) | surely)
     _cut_at_humps(r, cut, hump_m)
     last = np.concatenate((np.flatnonzero(cut), [r.size - 1]))
     first = np.concatenate(([0], last[:-1] + 1))
