@@ -13,15 +13,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import statistics
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner_types import Scan
 from mfba_planner.perception.obstacle_tracker import Tracker
 from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.simulation.robot_model import Lidar
@@ -191,7 +187,9 @@ def percentile(values: list[float], share: float) -> float:
 
 def table(seeds: int, only: str) -> None:
     """Print a line for each row."""
-    print("| scenes | discs seen | missed | position | velocity | radius | cover | delay | v at rest |")
+    print(
+        "| scenes | seen | missed | position | velocity | radius | cover | delay | false motion |"
+    )
     print("|---|---|---|---|---|---|---|---|---|")
     for name, row in ROWS.items():
         if only not in name:

@@ -85,9 +85,8 @@ class BeamReader:
         if step < 0.0:
             angle_min += step * (count - 1)
             number = count - 1 - number
-            x, y, c, s, reach, time_s, number = (
-                values[::-1] for values in (x, y, c, s, reach, time_s, number)
-            )
+            x, y, c, s = x[::-1], y[::-1], c[::-1], s[::-1]
+            reach, time_s, number = reach[::-1], time_s[::-1], number[::-1]
         spacing = abs(step) or 2.0 * math.pi
         return Beams(
             origin_x=x,

@@ -27,7 +27,7 @@ def expected_labels(x: Array, y: Array, state: Array, tolerance_m: Array) -> tup
 
 
 def associate(
-    found: Segments, off: Array, origin: Array, state: Array, sd_m: Array, gate_m: float
+    found: Segments, off: Array, origin: Array, state: Array, sd_m: Array, gate_m: Array
 ) -> Array:
     """Track of each segment (n,), or -1. Each track gets at most one segment at first.
 
