@@ -3,7 +3,7 @@
 
 Run: python bench/tracking.py [--seeds N] [--only TEXT]. Each row is a set of scenes of 3 s: a
 robot at 0.8 m/s, a lidar of 10 m, a scan every 0.1 s, ten discs within 1 to 6 m that keep their
-velocities and do not overlap. The first 0.5 s of every disc in sight count only for the delay.
+velocities and do not overlap. The first 0.5 s of every disc in view count only for the delay.
 Position and radius are compared relative to the pose that the tracker was given. The circles'
 enlargement for uncertainty is part of `cover`: how far a disc sticks out of its circle, which
 is not above 0 while the circle covers it.
@@ -26,7 +26,7 @@ from mfba_planner.simulation.simulated_lidar import cast_rays, scan_at
 TICK_S = 0.1
 TICK_NS = 100_000_000
 TICKS = 30
-SETTLED = 5  # scans in sight after which errors count
+SETTLED = 5  # scans in view after which errors count
 ROBOT_MPS = 0.8
 REACH_M = 10.0
 
@@ -68,15 +68,15 @@ ROWS: dict[str, Row] = {
 
 @dataclass
 class Errors:
-    """Errors of all discs in sight; lengths in m, speeds in m/s."""
+    """Errors of all discs in view; lengths in m, speeds in m/s."""
 
     position: list[float]
     velocity: list[float]
     radius: list[float]
     cover: list[float]
     delay: list[int]  # scans until the velocity is within 0.3 m/s and a fifth
-    seen: int = 0
-    missed: int = 0  # discs in sight without a circle
+    visible: int = 0
+    missed: int = 0  # discs in view without a circle
     false_motion: int = 0  # circles of discs at rest with a velocity
     resting: int = 0
 
@@ -98,7 +98,7 @@ def discs(row: Row, rng: np.random.Generator) -> np.ndarray:
     return np.array(found)
 
 
-def in_sight(discs_now: np.ndarray, pose: Pose2D, beams: int) -> np.ndarray:
+def visible_returns(discs_now: np.ndarray, pose: Pose2D, beams: int) -> np.ndarray:
     """Returns that each disc gives from the pose."""
     ranges = [
         cast_rays(pose.position, [tuple(d[[0, 1, 4]])], beams, REACH_M, pose.yaw)
@@ -133,8 +133,8 @@ def run_scene(row: Row, seed: int, errors: Errors) -> None:
         given = Pose2D(pose.x + dx, pose.y + dy, pose.yaw + turn)
         tracker.update((k + 1) * TICK_NS, given, aligned(scan, given.yaw))
         circles = tracker.circles((k + 1) * TICK_NS, 0.0)
-        sight = in_sight(now, pose, row.beams)
-        compare(now, pose, given, circles, sight, scans, known, errors)
+        returns = visible_returns(now, pose, row.beams)
+        compare(now, pose, given, circles, returns, scans, known, errors)
 
 
 def compare(
@@ -142,15 +142,15 @@ def compare(
     pose: Pose2D,
     given: Pose2D,
     circles: tuple,
-    sight: np.ndarray,
+    returns: np.ndarray,
     scans: np.ndarray,
     known: np.ndarray,
     errors: Errors,
 ) -> None:
-    """Compare the circles with the discs in sight."""
+    """Compare the circles with the discs in view."""
     c, s = math.cos(given.yaw - pose.yaw), math.sin(given.yaw - pose.yaw)
     for k, (x, y, vx, vy, r) in enumerate(now.tolist()):
-        if sight[k] < 1:
+        if returns[k] < 1:
             scans[k] = max(scans[k] - 1, 0)
             continue
         scans[k] += 1
@@ -160,7 +160,7 @@ def compare(
         found = nearest is not None and math.dist(nearest.center_m, at) < r + 0.25
         late = scans[k] > SETTLED
         if late:
-            errors.seen += 1
+            errors.visible += 1
             errors.missed += not found
         if not found or nearest is None:
             continue
@@ -199,7 +199,7 @@ def table(seeds: int, only: str) -> None:
             run_scene(row, seed, e)
         rest = f"{100.0 * e.false_motion / e.resting:.2f} %" if e.resting else ""
         print(
-            f"| {name} | {e.seen} | {100.0 * e.missed / max(e.seen, 1):.2f} % "
+            f"| {name} | {e.visible} | {100.0 * e.missed / max(e.visible, 1):.2f} % "
             f"| {1e2 * percentile(e.position, 0.5):.1f}, {1e2 * percentile(e.position, 0.95):.1f} "
             f"| {percentile(e.velocity, 0.5):.2f}, {percentile(e.velocity, 0.95):.2f} "
             f"| {1e2 * percentile(e.radius, 0.5):+.1f}, "

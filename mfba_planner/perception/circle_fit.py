@@ -151,7 +151,7 @@ def start_of(
     half = np.sqrt(np.maximum(0.5 * (1.0 - along), 0.0))
     wide = (across <= 0.0) & (along < 0.5)  # more than half a turn: the robot is within its hull
     half = np.where(wide, 1.0, np.minimum(half, 0.95))
-    seen = nearest_m * half / (1.0 - np.minimum(half, 0.95))
-    r = np.where(sure & ~wide, np.clip(seen, LEAST_RADIUS_M, 3.0), radius_m)
+    shown = nearest_m * half / (1.0 - np.minimum(half, 0.95))
+    r = np.where(sure & ~wide, np.clip(shown, LEAST_RADIUS_M, 3.0), radius_m)
     reach = nearest_m + r
     return np.column_stack((origin + middle * reach[:, None], r))

@@ -258,7 +258,7 @@ class Tracker:
             new = new[~fragments(new, fitted, outline, wall, noise)]
             self._start(new, fitted, outline, origin)
             self._walls = thinned(found, wall[group[found.segment]])
-        drop_lost(bank, beams, origin, updated, p)
+        drop_lost(bank, beams, origin, updated, self._pose_sd(origin, bank.state), p)
 
     def _is_wall(self, fitted: Fit, outline: Outline) -> Array:
         """Groups that are no circles: too wide, or far from round; (g,)."""
