@@ -19,13 +19,17 @@ Ranges = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scan:
-    """A planar laser scan: beam k points along angle_min_rad + k * angle_increment_rad."""
+    """A planar laser scan: beam k points along angle_min_rad + k * angle_increment_rad.
+
+    It was measured k * time_increment_s after the stamp; 0: all beams at once.
+    """
 
     ranges_m: np.ndarray
     angle_min_rad: float
     angle_increment_rad: float
     range_min_m: float
     range_max_m: float
+    time_increment_s: float = 0.0
 
 
 class Mode(Enum):
@@ -41,11 +45,15 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Circle:
-    """An obstacle enlarged by the robot's radius, with its velocity, in the odom frame."""
+    """An obstacle enlarged by the robot's radius, with its velocity, in the odom frame.
+
+    velocity_sd_mps is the velocity's standard deviation per axis; 0 where it is known exactly.
+    """
 
     center_m: Point
     radius_m: float
     velocity_mps: Point = (0.0, 0.0)
+    velocity_sd_mps: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,6 +21,7 @@ from ..perception.sensory_vector import blind
 from ..planning.differential_drive import command
 
 SECOND_NS = 1_000_000_000
+LONGEST_SCAN_S = 10.0  # from first to last beam
 
 T = TypeVar("T")
 
@@ -127,15 +128,23 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
 def laser_scan(message: Any, frame: str = "") -> Scan:
     """sensor_msgs/LaserScan to a Scan; FrameError for another frame.
 
+    InputError for a time_increment that is no time between two beams.
     perception.scan_to_sectors.sense_scan checks the ranges.
     """
     require_frame(message, frame, "scan", "scan_frame")
+    increment_s = float(message.time_increment)
+    if not 0.0 <= increment_s * max(len(message.ranges), 1) <= LONGEST_SCAN_S:
+        raise InputError(
+            f"scan of {len(message.ranges)} beams with time_increment={increment_s:g} s: not "
+            f"from 0 to {LONGEST_SCAN_S:g} s in all; check the lidar driver"
+        )
     return Scan(
         ranges_m=np.asarray(message.ranges, dtype=np.float64),
         angle_min_rad=message.angle_min,
         angle_increment_rad=message.angle_increment,
         range_min_m=message.range_min,
         range_max_m=message.range_max,
+        time_increment_s=increment_s,
     )
 
 
