@@ -202,9 +202,12 @@ class Predictive(BasePlanner):
 
         Obstacles that move are left out: their ring opens again.
         """
-        risk, speed = self.options.risk, self.params.speed_mps
-        costs = TrajectoryCost(position, at_rest.circles, risk, self.tick_s, speed)
-        return "" if 0 in self._closed_headings(costs) else at_rest.enclosure()
+        if len(at_rest.circles) < len(self._perceived):
+            risk, speed = self.options.risk, self.params.speed_mps
+            costs = TrajectoryCost(position, at_rest.circles, risk, self.tick_s, speed)
+            if 0 in self._closed_headings(costs):
+                return ""
+        return at_rest.enclosure()
 
     def _kept_off(self, move: Move, at_rest: ObstaclesAtRest) -> Move:
         """The move, shortened so that it touches nothing at rest until the robot can stop."""
