@@ -22,6 +22,7 @@ from .base_planner import BasePlanner, Move
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
+from .sector_changes import SectorChanges
 from .trajectory_cost import (
     Candidate,
     RiskParams,
@@ -144,6 +145,8 @@ class Predictive(BasePlanner):
         """The cheapest waypoint and speed; no search while the straight line is free."""
         position, circles = obs.pose.position, self._perceived
         speed, tick_s = self.params.speed_mps, self.tick_s
+        only_sectors = obs.circles is None and obs.scan is None
+        moving = only_sectors and self._changes.moving(obs.stamp_ns, position, obs.ranges_m)
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
         costs = TrajectoryCost(position, circles, self.options.risk, tick_s, speed)
@@ -154,7 +157,7 @@ class Predictive(BasePlanner):
             straight = self.straight(position, goal, speed)
             return Move(velocity=straight, reason="the straight way is free")
         vs = self._closed_headings(costs)
-        enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
+        enclosure = "" if 0 in vs or moving else self._enclosure(position, at_rest)
         if enclosure:
             return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
@@ -227,6 +230,7 @@ class Predictive(BasePlanner):
         """Drop the last waypoint, the tracks and the remembered circles."""
         self._waypoint = None
         self._perceived = ()
+        self._changes = SectorChanges()
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
 
