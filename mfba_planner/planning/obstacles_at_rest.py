@@ -85,28 +85,42 @@ class ObstaclesAtRest:
         d = np.sqrt(x * x + y * y)
         edge = d - r
         r = np.minimum(r, d * (1.0 - _ROUNDING))
-        dx, dy, reach = x[:, None] - x, y[:, None] - y, r[:, None] + r
-        joined = dx * dx + dy * dy < reach * reach
-        angles = np.arctan2(y, x)
-        turn = angles[None, :] - angles[:, None]  # from the circle of the row to the column's
-        crossed = np.where(turn > math.pi, -1, np.where(turn < -math.pi, 1, 0))
+        joined, crossed = _overlaps(x, y, r), _crossings(x, y)
         if not _winds(joined, crossed):
             return ""
-        touching = int((edge < _TOUCHING_M).sum())
-        reason = f"enclosed by {n} obstacles at rest, the nearest {max(edge.min(), 0.0):.2f} m off"
-        if touching:
-            reason = (
-                f"enclosed by {n} obstacles at rest, {touching} of them inside the robot's radius "
-                f"by up to {max(-edge.min(), 0.0):.2f} m; {_REMEDY}"
-            )
-        return reason
+        touching, nearest_m = int((edge < _TOUCHING_M).sum()), round(float(edge.min()), 2) + 0.0
+        reason = f"enclosed by {n} obstacles at rest, the nearest {nearest_m:.2f} m off"
+        return f"{reason}, {touching} inside the robot's radius; {_REMEDY}" if touching else reason
+
+
+def _overlaps(x: np.ndarray, y: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Which circles overlap; (n, n)."""
+    across, along, reach = x[:, None] - x, y[:, None] - y, r[:, None] + r
+    across *= across
+    along *= along
+    across += along
+    reach *= reach
+    overlaps: np.ndarray = across < reach
+    return overlaps
+
+
+def _crossings(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Turns around the origin to add on the step from centre i to j, 1, 0 or -1; (n, n).
+
+    Turns are counted where a step crosses the negative x axis.
+    """
+    above, below = np.flatnonzero(y >= 0.0), np.flatnonzero(y < 0.0)
+    ccw = np.outer(x[above], y[below]) > np.outer(y[above], x[below])
+    crossings = np.zeros((len(x), len(x)), dtype=np.int8)
+    crossings[np.ix_(above, below)] = ccw
+    crossings[np.ix_(below, above)] = -ccw.T.astype(np.int8)
+    return crossings
 
 
 def _winds(joined: np.ndarray, crossed: np.ndarray) -> bool:
     """Whether a closed chain of joined circles winds around the origin.
 
-    crossed[i, j] is the number of turns to add on the step from i to j. Along a chain that does
-    not wind, the turns of a circle do not depend on the path to it.
+    Along a chain that does not wind, the turns of a circle do not depend on the path to it.
     """
     n = len(joined)
     turns = np.zeros(n, dtype=int)

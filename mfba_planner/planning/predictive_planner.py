@@ -25,6 +25,7 @@ from .drive_rollout import DriveRollout
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
+from .sector_changes import SectorChanges
 from .trajectory_cost import (
     Candidate,
     RiskParams,
@@ -151,6 +152,8 @@ class Predictive(BasePlanner):
         """The cheapest waypoint and speed; no search while the straight line is free."""
         position, circles = obs.pose.position, self._perceived
         speed, tick_s = self.params.speed_mps, self.tick_s
+        only_sectors = obs.circles is None and obs.scan is None
+        moving = only_sectors and self._changes.moving(obs.stamp_ns, position, obs.ranges_m)
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
         drive = self._drive_rollout(obs)
@@ -166,7 +169,7 @@ class Predictive(BasePlanner):
             straight = self.straight(position, goal, speed)
             return Move(velocity=straight, reason="the straight way is free")
         vs = self._closed_headings(costs)
-        enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
+        enclosure = "" if 0 in vs or moving else self._enclosure(position, at_rest)
         if enclosure:
             return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
@@ -230,9 +233,12 @@ class Predictive(BasePlanner):
 
         Obstacles that move are left out: their ring opens again.
         """
-        risk, speed = self.options.risk, self.params.speed_mps
-        costs = TrajectoryCost(position, at_rest.circles, risk, self.tick_s, speed)
-        return "" if 0 in self._closed_headings(costs) else at_rest.enclosure()
+        if len(at_rest.circles) < len(self._perceived):
+            risk, speed = self.options.risk, self.params.speed_mps
+            costs = TrajectoryCost(position, at_rest.circles, risk, self.tick_s, speed)
+            if 0 in self._closed_headings(costs):
+                return ""
+        return at_rest.enclosure()
 
     def _kept_off(self, move: Move, at_rest: ObstaclesAtRest) -> Move:
         """The move, shortened so that it touches nothing at rest until the robot can stop."""
@@ -264,6 +270,7 @@ class Predictive(BasePlanner):
         self._speeds = Speeds()
         self._unobserved = None
         self._coverage = ScanCoverage(self.options.headings, self.options.coverage_s)
+        self._changes = SectorChanges()
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
 

@@ -16,7 +16,7 @@ class ProgressParams:
     """When a robot that drives counts as making no progress; on by default."""
 
     time_allowance_s: float = option(
-        30.0,
+        40.0,
         "driving time without progress after which the robot stops and replans; 0: no limit",
         unit="s",
         minimum=0.0,

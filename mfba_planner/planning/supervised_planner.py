@@ -77,6 +77,7 @@ class SupervisedPlanner:
         self._recovery = Recovery()
         self._progress = ProgressChecker()
         self._no_progress = ""  # the reason, until the planner tries again
+        self._cause = ""  # of the present recovery
         self._goal: Point | None = None
         self._earlier_position: Point | None = None  # before _last_position
         self._last_position: Point | None = None
@@ -119,6 +120,8 @@ class SupervisedPlanner:
         params, now_ns = self.params.recovery, decision.stamp_ns
         cause = self._no_progress or decision.reason
         blocked = bool(self._no_progress) or decision.mode is Mode.BLOCKED
+        if blocked and self.phase is not Phase.GIVEN_UP:
+            self._cause = cause
         self._recovery = state = advance(self._recovery, blocked, now_ns, params)
         count = f"attempt {state.attempt} of {params.attempts}"
         if state.phase is Phase.WAIT:
@@ -132,7 +135,9 @@ class SupervisedPlanner:
             self._try_again()
             return _stopped(decision, f"replanning, {count}: {cause}")
         if state.phase is Phase.GIVEN_UP:
-            why = f", {self._no_progress}" if self._no_progress else ""
+            # That every gap is closed was always left out, and recordings are compared.
+            gaps = self.params.method is Method.PAPER and not self._no_progress
+            why = "" if gaps else f", {self._cause}"
             reason = f"gave up after {state.attempt} attempts{why}; send a goal to go on"
             return _stopped(decision, reason)
         return decision

@@ -23,8 +23,18 @@ from .fleet_topics import NO_NAMESPACE
 
 T = TypeVar("T")
 
-# Options that older bags lack; their defaults are the behaviour of that time.
-NEWER_OPTIONS = ("method", "jump_m", "perception", "robot_radius_m", "speed_limit.", "recovery.")
+# Options that older bags lack; their defaults are the behaviour of that time, ...
+NEWER_OPTIONS = (
+    "method",
+    "jump_m",
+    "perception",
+    "robot_radius_m",
+    "speed_limit.",
+    "recovery.",
+    "progress.",
+)
+# ... but for this one, which was off.
+BEHAVIOUR_THEN = {"progress.time_allowance_s": 0.0}
 
 
 class Setup(NamedTuple):
@@ -110,10 +120,14 @@ def read_setup(reader: BagReader) -> Setup:
 
 def _node_options(defaults: T, values: dict[str, Any]) -> T:
     """The options of one dataclass, from all parameters of a node."""
-    names = [
-        name for name in flatten(defaults) if name in values or not name.startswith(NEWER_OPTIONS)
-    ]
-    return override(defaults, {name: values[name] for name in names})
+    names = flatten(defaults)
+    then = {name: value for name, value in BEHAVIOUR_THEN.items() if name in names}
+    recorded = {
+        name: values[name]
+        for name in names
+        if name in values or not name.startswith(NEWER_OPTIONS)
+    }
+    return override(defaults, then | recorded)
 
 
 def _outcome(

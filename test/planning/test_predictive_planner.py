@@ -147,19 +147,6 @@ def test_an_obstacle_that_comes_head_on_is_passed(name: str, aside_m: float) -> 
     assert result.length_m < 8.0 * (1.1 if name == "scan-12" else 1.06)
 
 
-def test_enclosed_by_obstacles_at_rest_it_touches_none() -> None:
-    ring = [
-        Circle(center_m=(POSE.x + 0.75 * math.cos(k), POSE.y + 0.75 * math.sin(k)), radius_m=0.6)
-        for k in np.arange(0.0, 2.0 * math.pi, math.pi / 6.0)
-    ]
-    decision = planner().plan(observation(*ring))
-    assert all(decision.vs)
-    assert decision.reason.startswith("every heading closes; the least risk")
-    dt = PARAMS.tick_ns * 1e-9
-    x, y = (POSE.x + decision.velocity[0] * dt, POSE.y + decision.velocity[1] * dt)
-    assert min(distance((x, y), c.center_m) for c in ring) > 0.6
-
-
 def test_enclosed_by_moving_obstacles_it_moves_to_the_latest_contact() -> None:
     left = Circle(center_m=(POSE.x - 0.7, POSE.y), radius_m=0.6, velocity_mps=(0.3, 0.0))
     right = Circle(center_m=(POSE.x + 0.9, POSE.y), radius_m=0.6, velocity_mps=(-0.3, 0.0))

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether obstacles move, from sectors alone: their ranges change while the robot rests."""
+
+from __future__ import annotations
+
+import math
+
+from ..core.geometry import Point, distance
+from ..core.planner_types import NANO, Ranges
+
+_REST_M = 0.01  # a robot that has moved less has rested
+_CHANGE_M = 0.05  # of a range; less is the noise of a lidar
+_KEPT_S = 2.0  # time for which obstacles count as moving then
+
+
+class SectorChanges:
+    """Compares the sectors with those when the robot came to rest."""
+
+    def __init__(self) -> None:
+        """Start without sectors."""
+        self._at_rest: tuple[Point, Ranges] | None = None
+        self._moving_until_ns = 0
+
+    def moving(self, stamp_ns: int, position: Point, ranges_m: Ranges) -> bool:
+        """Take the sectors of a tick; whether obstacles moved in the last seconds."""
+        rest = self._at_rest
+        if rest is None or distance(position, rest[0]) > _REST_M or _differ(rest[1], ranges_m):
+            if rest is not None and distance(position, rest[0]) <= _REST_M:
+                self._moving_until_ns = stamp_ns + round(_KEPT_S / NANO)
+            self._at_rest = position, ranges_m
+        return stamp_ns < self._moving_until_ns
+
+
+def _differ(before: Ranges, now: Ranges) -> bool:
+    """Whether a range has changed; a sector at the edge of the sensing range says nothing."""
+    if len(before) != len(now):
+        return True
+    return any(_CHANGE_M < abs(a - b) < math.inf for a, b in zip(before, now))
