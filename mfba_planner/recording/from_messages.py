@@ -125,15 +125,41 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
 
 
 def laser_scan(message: Any, frame: str = "") -> Scan:
-    """sensor_msgs/LaserScan to a Scan; FrameError for another frame.
+    """sensor_msgs/LaserScan to a Scan; beams that turn clockwise are put in reverse sequence.
 
-    perception.scan_to_sectors.sense_scan checks the ranges.
+    Raises FrameError for another frame, and InputError where the fields contradict each other.
+    perception.scan_to_sectors.sense_scan checks the ranges. As some drivers leave angle_max at
+    0 or one increment too far, it is only compared roughly, and not where both limits are 0.
     """
     require_frame(message, frame, "scan", "scan_frame")
+    count, increment = len(message.ranges), message.angle_increment
+    first, last = message.angle_min, message.angle_max
+    if not count:
+        raise InputError("scan holds 0 ranges; check the lidar driver")
+    _finite("scan angles", (first, last, increment))
+    if not message.range_max > message.range_min >= 0.0:
+        raise InputError(
+            f"scan has range_min={message.range_min:g}, range_max={message.range_max:g}: not "
+            "0 <= range_min < range_max; check the lidar driver"
+        )
+    if count > 1 and increment == 0.0:
+        raise InputError(
+            f"scan of {count} beams has angle_increment=0: all in one direction; "
+            "check the lidar driver"
+        )
+    spanned = count if count == 1 or first == last == 0.0 else (last - first) / increment + 1.0
+    if abs(spanned - count) > max(2.0, 0.02 * count):
+        raise InputError(
+            f"scan holds {count} ranges, but angle_min={first:g}, angle_max={last:g} and "
+            f"angle_increment={increment:g} make {spanned:.0f}; check the lidar driver"
+        )
+    ranges = np.asarray(message.ranges, dtype=np.float64)
+    if increment < 0.0:
+        first, increment, ranges = first + (count - 1) * increment, -increment, ranges[::-1]
     return Scan(
-        ranges_m=np.asarray(message.ranges, dtype=np.float64),
-        angle_min_rad=message.angle_min,
-        angle_increment_rad=message.angle_increment,
+        ranges_m=ranges,
+        angle_min_rad=first,
+        angle_increment_rad=increment,
         range_min_m=message.range_min,
         range_max_m=message.range_max,
     )

@@ -16,7 +16,7 @@ from ...planning.planner_params import PlannerParams
 from ...recording.from_messages import laser_scan, robot_pose, sector_ranges, stamp_ns
 from ..interface import topics
 from ..node_settings import PlannerSettings
-from ..runtime.base_node import GraphNode
+from ..runtime.input_monitor import PAIRED, InputMonitor
 from ..runtime.lockstep_inputs import Inputs, LockstepInputs
 from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.stale_inputs import NewestInputs
@@ -32,15 +32,15 @@ class InputSubscriptions:
 
     def __init__(
         self,
-        node: GraphNode,
         settings: PlannerSettings,
         params: PlannerParams,
         refused_inputs: RefusedInputs,
+        monitor: InputMonitor,
         diagnostics: PlannerDiagnostics,
         on_inputs: Callable[[Inputs], None],
     ) -> None:
         """params.tracks_scan is read once: whether scan is subscribed to."""
-        self._node, self._settings = node, settings
+        self._settings, self._monitor = settings, monitor
         self._tracks_scan = params.tracks_scan
         self._refused_inputs, self._diagnostics = refused_inputs, diagnostics
         self._on_inputs = on_inputs
@@ -53,18 +53,21 @@ class InputSubscriptions:
         self._pairs: LockstepInputs | NewestInputs = (
             LockstepInputs() if lockstep else NewestInputs()
         )
-        self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True)
+        limit = None if lockstep else PAIRED
+        self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True, limit=limit)
+        self._monitor.reset()
 
     def subscribe(self) -> None:
         """Subscribe to odom and sectors, and to scan where it is needed."""
-        lockstep = self._settings.lockstep
-        self._node.subscribe(topics.ODOM, self._on_odom, foreign_writers=not lockstep)
-        self._node.subscribe(topics.SECTORS, self._on_sectors)
+        frame = self._settings.odom_frame
+        self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
+        self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
         if self._tracks_scan:
-            self._node.subscribe(topics.SCAN, self._on_scan)
+            self._monitor.subscribe(topics.SCAN, self._on_scan, depth=PAIRED)
 
     def stale(self, timeout_s: float) -> Inputs | None:
         """In real time the newest inputs if one is older than timeout_s."""
+        self._monitor.timeout_s = timeout_s
         return self._pairs.stale(time.monotonic(), timeout_s)
 
     def add_scan(self, observation: Observation, scan: Scan | None) -> Observation:
@@ -75,37 +78,56 @@ class InputSubscriptions:
         return replace(observation, scan=aligned(scan, yaw))
 
     def _on_odom(self, message: Any) -> None:
-        self._receive("odom", message, robot_pose, self._pairs.add_odom)
+        fault = self._check("odom", message)
+        if fault is not None:
+            self._receive("odom", message, robot_pose, self._pairs.add_odom, fault)
 
     def _on_sectors(self, message: Any) -> None:
+        fault = self._check("sectors", message)
+        if fault is None:
+            return
         if self._tracks_scan:
-            self._pair_scan(message, self._scan_pairs.add_a)
+            self._pair_scan(message, fault, self._scan_pairs.add_a)
         else:
-            self._receive_sectors(message)
+            self._receive_sectors(message, fault)
 
     def _on_scan(self, message: Any) -> None:
-        self._pair_scan(message, self._scan_pairs.add_b)
+        fault = self._check("scan", message)
+        if fault is not None:
+            self._pair_scan(message, fault, self._scan_pairs.add_b)
 
-    def _pair_scan(self, message: Any, add: Any) -> None:
+    def _check(self, name: str, message: Any) -> str | None:
+        """Why a message is refused, "" if it is not; None: it must not even be paired."""
+        verdict = self._monitor.check(name, message)
+        if verdict.is_ordered:
+            return verdict.fault
+        self._pairs.refuse(name, verdict.fault)
+        self._diagnostics.set_fault(name, verdict.fault)
+        return None
+
+    def _pair_scan(self, message: Any, fault: str, add: Any) -> None:
         try:
-            pair = add(stamp_ns(message.header.stamp), message)
+            pair = add(stamp_ns(message.header.stamp), (message, fault))
         except InputError as error:
             self._refused_inputs.add(error, "scan")
             return
         if pair is not None:
-            sectors, scan = pair
-            self._receive_sectors(sectors, laser_scan(scan))
+            (sectors, fault), (scan, scan_fault) = pair
+            converted, conversion_fault = self._convert("scan", scan, laser_scan, "")
+            fault = fault or scan_fault or conversion_fault
+            self._receive_sectors(sectors, fault, None if fault else converted)
 
-    def _receive_sectors(self, message: Any, scan: Scan | None = None) -> None:
+    def _receive_sectors(self, message: Any, fault: str, scan: Scan | None = None) -> None:
         self.range_max_m = message.range_max
-        self._receive(
-            "sectors", message, sector_ranges, partial(self._pairs.add_sectors, scan=scan)
-        )
+        add = partial(self._pairs.add_sectors, scan=scan)
+        self._receive("sectors", message, sector_ranges, add, fault)
 
-    def _receive(self, name: str, message: Any, convert: Any, add: Any) -> None:
+    def _receive(self, name: str, message: Any, convert: Any, add: Any, fault: str) -> None:
         """Convert one message and pair it; a complete pair goes to on_inputs."""
         stamp, now_s = stamp_ns(message.header.stamp), time.monotonic()
-        value, fault = self._convert(name, message, convert)
+        value: Any = fault  # refused already
+        if not fault:
+            value, fault = self._convert(name, message, convert, self._settings.odom_frame)
         try:
             inputs = add(stamp, value, now_s)
         except InputError as error:
@@ -115,10 +137,10 @@ class InputSubscriptions:
         if inputs is not None:
             self._on_inputs(inputs)
 
-    def _convert(self, name: str, message: Any, convert: Any) -> tuple[Any, str]:
+    def _convert(self, name: str, message: Any, convert: Any, frame: str) -> tuple[Any, str]:
         """The value and "", or the error text twice: as the value and as the fault."""
         try:
-            return convert(message, self._settings.odom_frame), ""
+            return convert(message, frame), ""
         except InputError as error:
             self._refused_inputs.add(error, name)
             return str(error), str(error)

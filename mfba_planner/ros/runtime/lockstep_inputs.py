@@ -45,6 +45,9 @@ class LockstepInputs:
         """Add sectors and their scan; StampError for a stamp older than the last pair's."""
         return _inputs(stamp_ns, self._pairs.add_b(stamp_ns, (ranges_m, scan)))
 
+    def refuse(self, _name: str, _fault: str) -> None:
+        """Nothing: in lockstep no stamp is refused before it is paired."""
+
     def stale(self, _now_s: float, _timeout_s: float) -> Inputs | None:
         """None: in lockstep time does not pass without a message."""
         return None

@@ -48,6 +48,16 @@ class NewestInputs:
         self._scan = scan
         return self._newest(now_s - self._odom_s if self._odom_ns >= 0 else 0.0)
 
+    def refuse(self, name: str, fault: str) -> None:
+        """A message of odom or sectors is refused, and its stamp has no place among the others.
+
+        Its reason takes the place of what is known; no decision follows, unless one is due.
+        """
+        if name == "odom":
+            self._pose = fault
+        else:
+            self._ranges, self._scan = fault, None
+
     def stale(self, now_s: float, timeout_s: float) -> Inputs | None:
         """The newest inputs if one is older than timeout_s; None before any sectors."""
         oldest_s = min(self._sectors_s, self._odom_s if self._odom_ns >= 0 else self._sectors_s)
