@@ -103,7 +103,7 @@ class VirtualSensorSettings:
     odom_frame: str = option("odom", "frame the sectors are aligned with")
     input_timeout_s: float = option(
         1.0,
-        "age at which /diagnostics calls odometry and scan stale",
+        "age at which odometry and scan are stale, since their arrival or by their stamps",
         unit="s",
         minimum=0.001,
         maximum=3600.0,

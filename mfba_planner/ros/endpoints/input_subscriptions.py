@@ -101,9 +101,12 @@ class InputSubscriptions:
         verdict = self._monitor.check(name, message)
         if verdict.is_ordered:
             return verdict.fault
-        self._pairs.refuse(name, verdict.fault)
-        self._diagnostics.set_fault(name, verdict.fault)
+        self._refuse(name, verdict.fault)
         return None
+
+    def _refuse(self, name: str, fault: str) -> None:
+        self._pairs.refuse(name, fault)
+        self._diagnostics.set_fault(name, fault)
 
     def _pair_scan(self, message: Any, fault: str, add: Any) -> None:
         try:
@@ -132,6 +135,8 @@ class InputSubscriptions:
             inputs = add(stamp, value, now_s)
         except InputError as error:
             self._refused_inputs.add(error, name)
+            if fault:  # late, and older than one that was not
+                self._refuse(name, fault)
             return
         self._diagnostics.input_received(name, stamp, now_s, fault)
         if inputs is not None:
