@@ -136,7 +136,7 @@ def laser_scan(message: Any, frame: str = "") -> Scan:
     first, last = message.angle_min, message.angle_max
     if not count:
         raise InputError("scan holds 0 ranges; check the lidar driver")
-    _finite("scan angles", (first, last, increment))
+    _finite("scan angle_min, angle_max or angle_increment", (first, last, increment))
     if not message.range_max > message.range_min >= 0.0:
         raise InputError(
             f"scan has range_min={message.range_min:g}, range_max={message.range_max:g}: not "

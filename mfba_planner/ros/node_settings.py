@@ -17,6 +17,7 @@ from ..simulation.robot_model import Base, Robot
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
 _WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause (false) starts it"
 _DIAGNOSTICS = "period of /diagnostics"
+_SCAN_FRAME = "frame that scans must be in, that of scan_yaw; empty: any"
 _HARDWARE = "hardware_id of /diagnostics, to tell robots apart"
 
 
@@ -98,7 +99,7 @@ class VirtualSensorSettings:
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )
-    scan_frame: str = option("", "frame that scans must be in, that of scan_yaw; empty: any")
+    scan_frame: str = option("", _SCAN_FRAME)
     lockstep: bool = option(False, "pair odom with scan by stamp; false: newest odom")
     odom_frame: str = option("odom", "frame the sectors are aligned with")
     input_timeout_s: float = option(
@@ -132,6 +133,7 @@ class PlannerSettings(Base):
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )
+    scan_frame: str = option("", _SCAN_FRAME)
     diagnostics_period_s: float = option(1.0, _DIAGNOSTICS, unit="s", minimum=0.01, maximum=3600.0)
     hardware_id: str = option("none", _HARDWARE)
     autostart: bool = option(

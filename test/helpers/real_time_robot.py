@@ -19,6 +19,7 @@ from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 
 TIMEOUT_S = 5.0  # long, so that a busy machine does not look like a fault
+TRACKING = {"method": "predictive", "scan_radius_m": 0.3}  # a planner that reads scans itself
 BEAMS = 90
 FREE = (math.inf,) * BEAMS
 WALL = (0.7,) * BEAMS  # on all sides
@@ -41,7 +42,7 @@ def scan_of(stamp_ns: int, ranges: Any = FREE, frame: str = "base_scan", **chang
 class RealTimeRobot:
     """Two nodes with a goal 10 m ahead; stamps are the wall clock's plus an offset."""
 
-    def __init__(self, graph: Graph, sensor: Any = (), **both: Any) -> None:
+    def __init__(self, graph: Graph, sensor: Any = (), planner: Any = (), **both: Any) -> None:
         self.graph = graph
         self.odom, self.scan = graph.writer(topics.ODOM), graph.writer(topics.SCAN)
         self.sectors = graph.collect(topics.SECTORS)
@@ -51,7 +52,7 @@ class RealTimeRobot:
         self._goal.publish(goal(10.0, 0.0))
         both = {"input_timeout_s": TIMEOUT_S, "diagnostics_period_s": 0.05, **both}
         self.sensor = graph.start(VirtualSensor, {"source": "scan", **both, **dict(sensor)})
-        self.planner = graph.start(PlannerNode, both)
+        self.planner = graph.start(PlannerNode, {**both, **dict(planner)})
         graph.until(lambda: self.planner.goals.goal_queue.goal is not None)
 
     def send_odom(self, stamp_ns: int, writer: Publisher | None = None, x: float = 0.0) -> None:

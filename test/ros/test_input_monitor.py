@@ -15,6 +15,7 @@ from real_time_robot import (
     FREE,
     STOPS,
     TIMEOUT_S,
+    TRACKING,
     WALL,
     RealTimeRobot,
     scan_of,
@@ -284,7 +285,47 @@ def test_two_publishers_of_odometry_stop_the_robot(graph: Graph) -> None:
     graph.until(lambda: robot.drive() == DRIVES, timeout_s=10.0 + HELD_S)
 
 
-BAD_SCANS = {
+def test_a_planner_that_reads_scans_itself_refuses_the_same(graph: Graph) -> None:
+    robot = RealTimeRobot(graph, planner=TRACKING)
+    assert robot.drive() == DRIVES
+    assert robot.send_scan(scan_of(stamp(HOURS_S))) == ""
+    assert robot.inputs("planner").message.startswith("refused: scan stamp is 3.0 h ahead of")
+    assert robot.drive() == DRIVES
+    assert robot.inputs("planner").level == OK
+    robot.send_odom(stamp())
+    assert robot.send_scan(scan_of(stamp(), angle_increment=0.0)) == STOPS
+    assert robot.drive() == DRIVES
+    assert robot.send_scan(scan_of(stamp(), frame="rear")) == STOPS
+    assert "scan changes its frame" in robot.inputs("planner").message
+
+
+def test_a_planner_that_reads_scans_itself_uses_the_one_in_scan_frame(graph: Graph) -> None:
+    frame = {"scan_frame": "base_scan"}
+    robot = RealTimeRobot(graph, frame, {**TRACKING, **frame})
+    other = graph.writer(topics.SCAN)
+    assert robot.drive() == DRIVES
+    for _ in range(3):
+        assert robot.send_scan(scan_of(stamp(), WALL, "rear"), other) == ""
+        assert robot.drive() == DRIVES
+
+
+def test_a_slow_planner_that_reads_scans_itself_decides_on_the_newest(graph: Graph) -> None:
+    robot = RealTimeRobot(graph, planner=TRACKING)
+    assert robot.drive() == DRIVES
+    graph.executor.remove_node(robot.planner)
+    count = len(robot.decisions)
+    for _ in range(3 * PAIRED):
+        robot.drive()
+    graph.executor.add_node(robot.planner)
+    graph.until(lambda: len(robot.decisions) > count)
+    graph.settle()
+    newest = stamp_ns(robot.sectors[-1].header.stamp)
+    assert [stamp_ns(m.header.stamp) for m in robot.decisions[count:]] == [newest]
+    assert robot.drive() == DRIVES
+    assert int(robot.value("planner", "sectors: dropped")) == 3 * PAIRED - 1
+
+
+BAD_SCANS: dict[str, tuple[dict[str, Any], str]] = {
     "increment 0": ({"angle_increment": 0.0}, "scan of 90 beams has angle_increment=0: all in"),
     "count against angles": (
         {"angle_max": 0.0},
@@ -298,7 +339,10 @@ BAD_SCANS = {
     ),
     "limits": ({"range_min": 12.0}, "scan has range_min=12, range_max=10: not 0 <= range_min"),
     "no range": ({"ranges": []}, "scan holds 0 ranges; check the lidar driver"),
-    "angle": ({"angle_min": math.nan}, "scan angles holds nan; send finite numbers"),
+    "angle": (
+        {"angle_min": math.nan},
+        "scan angle_min, angle_max or angle_increment holds nan; send finite numbers",
+    ),
 }
 
 
@@ -321,7 +365,7 @@ def test_beams_that_turn_clockwise_are_seen_where_they_are(graph: Graph) -> None
     robot = RealTimeRobot(graph)
     ranges = [math.inf] * BEAMS
     ranges[BEAMS // 8] = 0.7  # 45 degrees clockwise of the first beam
-    clockwise = {"angle_min": 0.0, "angle_increment": -2.0 * math.pi / BEAMS}
+    clockwise: dict[str, Any] = {"angle_min": 0.0, "angle_increment": -2.0 * math.pi / BEAMS}
     clockwise["angle_max"] = clockwise["angle_increment"] * (BEAMS - 1)
     robot.send_odom(stamp())
     robot.send_scan(scan_of(stamp(), ranges, **clockwise))

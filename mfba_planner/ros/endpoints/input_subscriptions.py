@@ -63,7 +63,8 @@ class InputSubscriptions:
         self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
         self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
         if self._tracks_scan:
-            self._monitor.subscribe(topics.SCAN, self._on_scan, depth=PAIRED)
+            frame = self._settings.scan_frame
+            self._monitor.subscribe(topics.SCAN, self._on_scan, depth=PAIRED, frame=frame)
 
     def stale(self, timeout_s: float) -> Inputs | None:
         """In real time the newest inputs if one is older than timeout_s."""
@@ -94,6 +95,7 @@ class InputSubscriptions:
     def _on_scan(self, message: Any) -> None:
         fault = self._check("scan", message)
         if fault is not None:
+            self._diagnostics.set_fault("scan", fault)
             self._pair_scan(message, fault, self._scan_pairs.add_b)
 
     def _check(self, name: str, message: Any) -> str | None:
@@ -116,7 +118,9 @@ class InputSubscriptions:
             return
         if pair is not None:
             (sectors, fault), (scan, scan_fault) = pair
-            converted, conversion_fault = self._convert("scan", scan, laser_scan, "")
+            converted, conversion_fault = self._convert(
+                "scan", scan, laser_scan, self._settings.scan_frame
+            )
             fault = fault or scan_fault or conversion_fault
             self._receive_sectors(sectors, fault, None if fault else converted)
 

@@ -15,6 +15,8 @@ ODOM = "odom"  # the other inputs are compared with it, and it with any of them
 _YEAR_S = 365.25 * 86400.0
 SAME_CLOCK_S = 3600.0  # stamps nearer than this to the node's clock are meant to be of that clock
 
+OVERLOAD_S = 60.0  # no overloaded machine delays a message by more
+
 
 class StampVerdict(NamedTuple):
     """Why a stamp is refused, "" if it is not.
@@ -92,7 +94,7 @@ class StampCheck:
 
     def _against_others(self, name: str, own: _Received, limit_s: float) -> StampVerdict | None:
         """One that agrees with no other input; which may be the one at fault, if it is behind."""
-        limit_ns, now_s = limit_s / NANO, own.arrived_s
+        limit_ns, now_s = round(limit_s / NANO), own.arrived_s
         others = {
             other: each
             for other, each in self._inputs.items()
@@ -129,10 +131,13 @@ def _against_clock(name: str, latency_s: float, limit_s: float) -> StampVerdict 
     if abs(latency_s) <= limit_s:
         return None
     late = latency_s > 0.0
-    cause = "synchronise the clocks, or relieve the machine" if late else "synchronise the clocks"
+    if abs(latency_s) > OVERLOAD_S:
+        more = ", or in simulation and replay set use_sim_time"
+    else:
+        more = ", or relieve the machine" if late else ""
     return StampVerdict(
         f"{name} stamp is {_difference(latency_s)} the node's clock "
-        f"(input_timeout_s={limit_s:g}); {cause}",
+        f"(input_timeout_s={limit_s:g}); synchronise the clocks{more}",
         is_ordered=late,
     )
 
