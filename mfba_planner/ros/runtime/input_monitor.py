@@ -87,8 +87,9 @@ class InputMonitor:
         )
 
         def deliver(message: Any, info: Mapping[str, Any]) -> None:
-            number, given = info["publication_sequence_number"], message.header.frame_id
-            if reception.received(number, given, time.monotonic(), self.timeout_s):
+            number, sent_ns = info["publication_sequence_number"], info["source_timestamp"]
+            given, now_s = message.header.frame_id, time.monotonic()
+            if reception.received(number, sent_ns, given, now_s, self.timeout_s):
                 callback(message)
 
         self._node.subscribe_with_info(topic, deliver, depth)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 REMEMBERED_S = 2.0  # without a message for so long, a publisher's sequence is forgotten
+OVERTAKEN = 3  # messages by which two subscriptions to one topic may be apart
 HELD_S = 1.0  # how long a change of frame, or a second publisher, is a fault
 
 
@@ -42,6 +43,7 @@ class Reception:
         self.dropped = 0  # lost, or replaced by a newer one before the node took it
         self.ignored = 0  # from another publisher, in another frame than the wanted one
         self._sequences: list[_Sequence] = []
+        self._sent_ns = 0
         self._frame: str | None = None
         self._wanted_s: float | None = None
         self._fault = ""
@@ -51,8 +53,15 @@ class Reception:
         """Why no message of this topic may be used at present, "" if there is no reason."""
         return self._fault if now_s < self._until_s else ""
 
-    def received(self, sequence: int, frame: str, now_s: float, limit_s: float) -> bool:
-        """A message was taken; False if another publisher's must be used in its place."""
+    def received(
+        self, sequence: int | None, sent_ns: int, frame: str, now_s: float, limit_s: float
+    ) -> bool:
+        """A message was taken; False if it must not be used as a newer or better one is there.
+
+        Without sequence numbers (None: not all middleware has them) only frames are compared.
+        """
+        if sequence is not None and self._is_straggler(sequence, sent_ns):
+            return False
         if self._wanted and frame != self._wanted:
             if self._is_from_another(now_s, limit_s):
                 self.ignored += 1
@@ -62,13 +71,22 @@ class Reception:
         elif self._frame not in (None, frame):
             self._hold(f"{self._name} changes its frame from {self._frame!r} to {frame!r}", now_s)
         self._frame = frame
-        if self._competes(sequence, now_s) and len(names := self._publishers()) > 1:
+        competes = sequence is not None and self._competes(sequence, now_s)
+        if competes and len(names := self._publishers()) > 1:
             self._hold(
                 f"{self._name} has {len(names)} publishers that send in turn "
                 f"({', '.join(sorted(names))})",
                 now_s,
             )
         return True
+
+    def _is_straggler(self, number: int, sent_ns: int) -> bool:
+        """Whether one of two subscriptions delivers what the other one has overtaken."""
+        if sent_ns >= self._sent_ns:
+            self._sent_ns = sent_ns
+            return False
+        # Publishers on computers with different clocks send "earlier" ones too, but not these.
+        return any(0 < s.last - number <= OVERTAKEN for s in self._sequences)
 
     def _is_from_another(self, now_s: float, limit_s: float) -> bool:
         """Whether the wanted frame is received too, from one of several publishers."""
