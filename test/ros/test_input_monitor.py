@@ -85,12 +85,12 @@ def test_a_lidar_with_a_clock_in_the_future_is_refused_beside_punctual_odometry(
     graph: Graph, ahead_s: float
 ) -> None:
     robot = RealTimeRobot(graph, input_timeout_s=1.0)
-    assert robot.drive() == DRIVES
+    graph.until(lambda: robot.drive() == DRIVES)
     graph.until(lambda: bool(robot.drive(scan_s=ahead_s) == STOPS))
     sensed = robot.inputs("virtual_sensor")
     assert (sensed.level, sensed.message[:22]) == (ERROR, "refused: scan stamp is")
     assert "ahead of the node's clock (input_timeout_s=1); synchronise the c" in sensed.message
-    assert robot.drive() == DRIVES, "the clock was set right"
+    graph.until(lambda: robot.drive() == DRIVES)  # the clock was set right
 
 
 @pytest.mark.parametrize("ahead_s", [LATE_S, HOURS_S, 3e8])
@@ -317,10 +317,15 @@ def test_a_slow_planner_that_reads_scans_itself_decides_on_the_newest(graph: Gra
     for _ in range(3 * PAIRED):
         robot.drive()
     graph.executor.add_node(robot.planner)
-    graph.until(lambda: len(robot.decisions) > count)
+
+    def driving() -> list[int]:
+        """Stamps of the decisions; on a busy machine, inputs may be stale before."""
+        new = [m for m in robot.decisions[count:] if mode(m) is Mode.PATH_GENERATION]
+        return [stamp_ns(message.header.stamp) for message in new]
+
+    graph.until(lambda: bool(driving()))
     graph.settle()
-    newest = stamp_ns(robot.sectors[-1].header.stamp)
-    assert [stamp_ns(m.header.stamp) for m in robot.decisions[count:]] == [newest]
+    assert driving() == [stamp_ns(robot.sectors[-1].header.stamp)]
     assert robot.drive() == DRIVES
     assert int(robot.value("planner", "sectors: dropped")) == 3 * PAIRED - 1
 
