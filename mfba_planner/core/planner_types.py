@@ -62,7 +62,8 @@ class Observation:
 
     The paper's planner reads only the sectors (ranges_m). Other planners may use circles (within
     SR) or scan (obstacle surfaces, in a frame aligned with odom). If these are older than the
-    pose, sensed is their stamp and the pose at that stamp. refused is the reason for refusing
+    pose, sensed is their stamp and the pose at that stamp. pose_stamp_ns is the stamp of the pose
+    if it is later than stamp_ns, which identifies the tick. refused is the reason for refusing
     the inputs, "" if they are valid.
     """
 
@@ -75,6 +76,12 @@ class Observation:
     circles: tuple[Circle, ...] | None = None
     scan: Scan | None = None
     sensed: tuple[int, Pose2D] | None = None
+    pose_stamp_ns: int | None = None
+
+    @property
+    def pose_ns(self) -> int:
+        """The stamp of the pose: the moment for which a planner decides."""
+        return self.stamp_ns if self.pose_stamp_ns is None else self.pose_stamp_ns
 
 
 RefusalReason = str  # the reason why an input was refused, in place of the input

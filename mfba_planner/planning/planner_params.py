@@ -74,7 +74,7 @@ class PlannerParams(Base):
     )
     input_timeout_s: float = option(
         1.0,
-        "age at which odometry, sectors or scan are stale",
+        "age at which odometry, sectors or scan are stale, since their arrival or by their stamps",
         unit="s",
         minimum=0.001,
         maximum=3600.0,

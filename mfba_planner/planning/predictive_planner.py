@@ -275,16 +275,16 @@ class Predictive(BasePlanner):
         self._tracker = Tracker(self.options.tracking)
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
-        """Circles at obs.stamp_ns: given and remembered, tracked, or one for each set sector."""
+        """Circles at obs.pose_ns: given and remembered, tracked, or one for each set sector."""
         stamp_ns, pose = obs.sensed or (obs.stamp_ns, obs.pose)
         if obs.circles is not None:
             reach_m = self.sensor.sensing_range_m
             known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
-            return predicted_circles(known, (obs.stamp_ns - stamp_ns) * NANO)
+            return predicted_circles(known, (obs.pose_ns - stamp_ns) * NANO)
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
             self._coverage.update(stamp_ns, obs.scan)
-            return self._tracker.circles(obs.stamp_ns, self.params.robot_radius_m)
+            return self._tracker.circles(obs.pose_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
     def _drive_rollout(self, obs: Observation) -> DriveRollout | None:

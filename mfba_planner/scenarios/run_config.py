@@ -98,6 +98,9 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     timeout_s = min(config.planner.input_timeout_s / min(config.speed_factor, 1.0), 3600.0)
     # Lockstep is rarely watched, and markers cost more than the decisions.
     common = {"lockstep": lockstep, "wait_for": ",".join(peers)}
+    # In real time, inputs are dated by the world's clock. Faster, a delay of the machine would be
+    # many times as long by that clock, so arrival times count; in lockstep nothing reads a clock.
+    dated = {"use_sim_time": True} if not lockstep and config.speed_factor <= 1.0 else {}
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
     robot = config.scenario.robot
     radii = [obstacle.radius_m for obstacle in config.scenario.obstacles]
@@ -112,6 +115,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             "seed": config.seed,
         },
         "virtual_sensor": common
+        | dated
         | flatten(config.sensor)
         | {
             "robot_radius_m": config.scenario.robot_radius_m,
@@ -119,6 +123,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             **({"source": "scan", "scan_yaw": robot.lidar.yaw_rad} if robot.lidar.beams else {}),
         },
         "planner": viewed
+        | dated
         | flatten(config.scenario.planner_params(config.planner))
         | {"seed": config.seed, "scan_yaw": robot.lidar.yaw_rad}
         | ({} if lockstep else {"input_timeout_s": timeout_s}),

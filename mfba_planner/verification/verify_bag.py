@@ -26,6 +26,7 @@ from ..recording.from_messages import (
     laser_scan,
     obstacle_centers,
     robot_pose,
+    scan_timing,
     sector_ranges,
     value_or_refusal,
     velocity,
@@ -182,8 +183,15 @@ def _with_scan(setup: Setup, tick: Tick, recorded: Decision, obs: Observation) -
     """The observation with the scan, where the recorded decision was made on one."""
     if recorded.perception != "scan" or obs.refused or SCAN not in tick.messages:
         return obs
-    yaw = obs.pose.yaw + setup.scenario.robot.lidar.yaw_rad
-    return replace(obs, scan=aligned(laser_scan(tick.messages[SCAN]), yaw))
+    pose_stamp_ns, scan_pose = scan_timing(tick.messages[DECISION])
+    scan = laser_scan(tick.messages[SCAN], no_return=setup.scan_no_return)
+    yaw = (scan_pose or obs.pose).yaw + setup.scenario.robot.lidar.yaw_rad
+    return replace(
+        obs,
+        scan=aligned(scan, yaw),
+        sensed=(obs.stamp_ns, scan_pose) if scan_pose else None,
+        pose_stamp_ns=pose_stamp_ns,
+    )
 
 
 def _contradictions(setup: Setup, tick: Tick, decision: Decision) -> list[str]:
@@ -226,7 +234,8 @@ def _sectors_match_sensor(setup: Setup, tick: Tick, decision: Decision) -> bool:
     try:
         pose = robot_pose(tick.messages[ODOM])
         if lidar.beams:
-            scan, yaw = laser_scan(tick.messages[SCAN], setup.scan_frame), pose.yaw + lidar.yaw_rad
+            scan = laser_scan(tick.messages[SCAN], setup.scan_frame, setup.scan_no_return)
+            yaw = pose.yaw + lidar.yaw_rad
             return (
                 sense_scan(scan, yaw, scenario.robot_radius_m, setup.sensor) == decision.ranges_m
             )
