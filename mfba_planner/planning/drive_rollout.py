@@ -12,6 +12,7 @@ from .differential_drive import Speeds, brake
 from .turn_delay import TurnDelay
 
 FINE_STEPS, COARSE_TICKS = 6, 2  # steps of one tick, then steps of two
+LONGEST = 2.0  # horizons, waiting and turning included
 REACHED_M = 0.1  # at a waypoint the planner decides anew
 
 
@@ -41,7 +42,9 @@ class DriveRollout:
     def stretches(
         self, waypoint: Point, wait_s: float, share: float, goal: Point, horizon_s: float
     ) -> list[Stretch]:
-        """The path of the next horizon_s, from (0, 0); waypoint and goal are relative, in m.
+        """The path of the next horizon_s of driving, from (0, 0); waypoint and goal relative, m.
+
+        Waiting and turning do not count, as they must not move a contact out of the horizon.
 
         The base drives to the waypoint and then to the goal; with wait_s it drives towards the
         goal instead, for that time at the given share of the speed, and then at full speed.
@@ -55,7 +58,7 @@ class DriveRollout:
         (qx, qy), (gx, gy) = goal if wait_s else waypoint, goal
         found: list[Stretch] = []
         held = tick_s * tick_s
-        while t < horizon_s:
+        while driven < horizon_s and t < LONGEST * horizon_s:
             h = tick_s if len(found) < FINE_STEPS else COARSE_TICKS * tick_s
             dx, dy = qx - x, qy - y
             if dx * dx + dy * dy < REACHED_M * REACHED_M:
