@@ -48,7 +48,7 @@ class PlannerNode(ManagedNode):
         self._reset()
         self.on_time_set_back(self._on_time_set_back)
         period_s = watch_period_s(params.input_timeout_s, lockstep=s.lockstep)
-        self.create_wall_timer(period_s, self._on_timer)
+        self._timer = self.create_wall_timer(period_s, self._on_timer)
         self.enter_life_cycle(s.autostart)
         self.advertise_ready(names(s.wait_for))
 
@@ -91,6 +91,8 @@ class PlannerNode(ManagedNode):
         if changed.method is not self.path_planner.params.method:
             self.path_planner = make_planner(changed, seed=self.settings.seed)
         self.path_planner.params = changed
+        period_s = watch_period_s(changed.input_timeout_s, lockstep=self.settings.lockstep)
+        self._timer.timer_period_ns = round(period_s / NANO)
 
     def _is_finished(self) -> bool:
         arrived = self._last is not None and self._last.mode is Mode.ARRIVED

@@ -157,6 +157,10 @@ class GraphNode(Node):
         response.success = not response.message
         return response
 
+    def count_callers(self) -> int:
+        """How many clients this node's services have."""
+        return sum(self.count_clients(service.service_name) for service in self.services)
+
     def drain(self, executor: Executor) -> None:
         """Receive what was sent already; called once after a signal, before close."""
 
