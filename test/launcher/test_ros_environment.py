@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run is heard by nobody outside, whatever the environment says."""
+"""A run is received by nobody outside, whatever the environment says."""
 
 import os
 import socket
@@ -103,7 +103,7 @@ def test_a_listener_in_the_users_domain_hears_nothing_of_a_run(
 ) -> None:
     """It would hear every command: both are told to use the same discovery server."""
     server, client, port = profiles(tmp_path)
-    heard, more_env = tmp_path / "heard.txt", {}
+    received, more_env = tmp_path / "received.txt", {}
     if setting == "file":
         name = PROFILE_FILES[0]
         (tmp_path / name).write_text(client.read_text())
@@ -116,15 +116,15 @@ def test_a_listener_in_the_users_domain_hears_nothing_of_a_run(
     words = ("empty", "--driver", driver, "--planner", "paper", "--no-picture")
     users_domain, lock = claim_domain()
     other_domain, other_lock = claim_domain()
-    with lock, other_lock, process(LISTENER, heard, users_domain, server):
-        wait_until(lambda: "listening" in heard.read_text())
+    with lock, other_lock, process(LISTENER, received, users_domain, server):
+        wait_until(lambda: "listening" in received.read_text())
         done = complete("launcher", *words, cwd=tmp_path, **more_env)
         assert (done.process.returncode, done.stderr) == (0, "")
         assert f"ignored, since a run is private: {name}\n" in done.stdout
         # The listener does hear whoever is told so, in any domain.
         with process(TALKER, tmp_path / "none.txt", other_domain, client):
-            wait_until(lambda: "9.0" in heard.read_text())
-        assert set(heard.read_text().split()) == {"listening", "9.0"}
+            wait_until(lambda: "9.0" in received.read_text())
+        assert set(received.read_text().split()) == {"listening", "9.0"}
 
 
 @pytest.mark.parametrize("name", IGNORED_VARIABLES)
