@@ -88,7 +88,7 @@ def _run_in_process(run: Run) -> None:
     from .in_process_driver import run_in_process
     from .ros_domain import private_domain
 
-    with private_domain() as domain:
+    with private_domain(run.console.print_line) as domain:
         run.wall_s = run_in_process(
             run.request.config,
             run.directory.bag,

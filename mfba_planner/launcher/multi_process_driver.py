@@ -42,7 +42,7 @@ def run_multi_process(run: Run) -> None:
     # The recorder starts first, so that it misses no message.
     parameters = {RECORDER: recorder_parameters(config, bag, parameters)} | parameters
     with (
-        private_domain() as domain,
+        private_domain(run.console.print_line) as domain,
         GraphMonitor(domain, config.scenario.robot_names or (NO_NAMESPACE,)) as monitor,
         NodeProcesses(run.console.print_node_line, run.stop.is_urgent) as node_processes,
     ):

@@ -6,19 +6,18 @@ from __future__ import annotations
 import itertools
 import os
 import socket
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..core.errors import GraphError
+from .ros_environment import ignored_settings, private_environment, require_isolating_middleware
 
 # Domains above 101 map to ports that Linux gives to any program. Each process starts its search
 # at another id and goes round, so that a domain is not reused at once.
 DOMAINS = range(1, 102)
 FIRST_PORT, PORTS = 7400, 250  # first port of domain 0, ports per domain: RTPS port mapping
-# Variables that let other domains or hosts take part: participants of one discovery server
-# find each other whatever their domains, and static peers are asked wherever they are.
-DISCOVERY_VARIABLES = ("ROS_DISCOVERY_SERVER", "ROS_SUPER_CLIENT", "ROS_STATIC_PEERS")
 _next_domains = itertools.islice(itertools.cycle(DOMAINS), os.getpid() % len(DOMAINS), None)
 
 
@@ -67,22 +66,23 @@ def require_network(address: str = "127.0.0.1") -> None:
             ) from None
 
 
+def _print_note(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
 @contextmanager
-def private_domain() -> Iterator[int]:
+def private_domain(note: Callable[[str], None] = _print_note) -> Iterator[int]:
     """Claim a domain, and set it for this process and its children; discovery is local only.
 
-    Variables that would undo this are removed meanwhile: a simulated run must not command a robot.
+    Settings that could undo this are not in force meanwhile, and are named to note() in one
+    line: a simulated run must not command a robot. Raises GraphError for middleware that cannot
+    be isolated.
     """
+    require_isolating_middleware()
     require_network()
+    if ignored := ignored_settings():
+        note(f"ignored, since a run is private: {', '.join(ignored)}")
     domain, lock = claim_domain()
     variables = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    previous = {name: os.environ.pop(name, None) for name in (*variables, *DISCOVERY_VARIABLES)}
-    os.environ.update(variables)
-    with lock:
-        try:
-            yield domain
-        finally:
-            for name, value in previous.items():
-                os.environ.pop(name, None)
-                if value is not None:
-                    os.environ[name] = value
+    with lock, private_environment(variables):
+        yield domain

@@ -61,7 +61,8 @@ class DriveRollout:
         while driven < horizon_s and t < LONGEST * horizon_s:
             h = tick_s if len(found) < FINE_STEPS else COARSE_TICKS * tick_s
             dx, dy = qx - x, qy - y
-            if dx * dx + dy * dy < REACHED_M * REACHED_M:
+            reached_m = max(REACHED_M, abs(v) * h)  # a longer step could pass it
+            if dx * dx + dy * dy < reached_m * reached_m:
                 qx, qy = gx, gy
                 dx, dy = qx - x, qy - y
                 if dx * dx + dy * dy < 1e-6:

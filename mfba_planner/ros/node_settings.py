@@ -72,6 +72,8 @@ class WorldSimSettings:
     view_period_s: float = option(
         0.2, "period of markers and trail, simulated time", unit="s", minimum=0.0, maximum=3600.0
     )
+    diagnostics_period_s: float = option(1.0, _DIAGNOSTICS, unit="s", minimum=0.01, maximum=3600.0)
+    hardware_id: str = option("none", _HARDWARE)
     wait_for: str = option("", _WORLD_WAITS_FOR)
 
     def __post_init__(self) -> None:

@@ -26,7 +26,6 @@ from mfba_planner.launcher import node_processes
 from mfba_planner.launcher.console import RunConsole
 from mfba_planner.launcher.node_processes import NodeProcess, NodeProcesses, parameters_yaml
 from mfba_planner.launcher.ros_domain import (
-    DISCOVERY_VARIABLES,
     DOMAINS,
     claim_domain,
     private_domain,
@@ -208,16 +207,6 @@ def test_domains_are_held_once_and_given_back(monkeypatch: pytest.MonkeyPatch) -
         assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
     assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
     assert "ROS_DOMAIN_ID" not in os.environ
-
-
-@pytest.mark.parametrize("name", DISCOVERY_VARIABLES)
-def test_what_would_open_a_private_domain_is_removed_meanwhile(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(name, "127.0.0.1:11811")
-    with private_domain():
-        assert name not in os.environ
-    assert os.environ[name] == "127.0.0.1:11811"
 
 
 def test_domain_is_free_again_after_kill_9() -> None:

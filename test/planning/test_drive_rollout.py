@@ -41,7 +41,7 @@ def drive(base: Base, yaw: float, waypoint: Point, goal: Point, ticks: int) -> l
     return poses
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     st.floats(-math.pi, math.pi), st.floats(0.3, 2.5), st.floats(-math.pi, math.pi), st.booleans()
 )
@@ -55,14 +55,15 @@ def test_the_rollout_is_the_path_of_the_simulated_base(
     waypoint, goal = (length_m * math.cos(heading), length_m * math.sin(heading)), (9.0, 0.0)
     rollout = DriveRollout(base, yaw, Speeds(), SPEED, TICK_S)
     found = rollout.stretches(waypoint, 0.0, 1.0, goal, 3.0)
+    found = [stretch for stretch in found if stretch.t_s < 3.0]
     poses = drive(base, yaw, waypoint, goal, 30)
     if math.dist(poses[-1].position, waypoint) < 2.0 * REACHED_M + 1.5 * SPEED:
         found = [stretch for stretch in found if stretch.t_s < 0.9]  # then it may turn around
     for stretch in found:
         real = poses[round(stretch.t_s / TICK_S)]
         reached = distance((stretch.x, stretch.y), waypoint) < 3.0 * REACHED_M
-        # At the waypoint a step of two ticks may be one too many.
-        allowed_m = 0.2 if reached or stretch.driven_s * SPEED > length_m else 0.04
+        # It may turn off one step of two ticks before the waypoint.
+        allowed_m = 0.25 if reached or stretch.driven_s * SPEED > length_m else 0.04
         assert math.dist(real.position, (stretch.x, stretch.y)) < allowed_m
 
 
@@ -88,7 +89,7 @@ def test_a_rollout_that_waits_turns_to_the_goal_but_does_not_move() -> None:
     assert (after.vx, after.vy) == pytest.approx((SPEED, 0.0), abs=0.02), "it has turned meanwhile"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.floats(-math.pi, math.pi))
 def test_the_turn_delay_is_what_the_simulated_base_loses(heading: float) -> None:
     base = replace(BASE, reverse=False, max_accel_mps2=50.0)

@@ -89,7 +89,7 @@ def test_a_refused_route_changes_nothing_and_is_reported(
     assert values["goal"] == "10.0,5.0"
     assert values["refused_inputs"] == "1"
     graph.until(lambda: bool(received))
-    inputs, driving = received[-1].status
+    inputs, driving, _ = received[-1].status
     assert {item.key: item.value for item in inputs.values}[f"refused {kind}"] == "1"
     last = {item.key: item.value for item in driving.values}["last refused"]
     assert last.startswith(reason)

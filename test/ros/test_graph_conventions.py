@@ -32,7 +32,7 @@ TABLE = [
     (
         "/diagnostics",
         "diagnostic_msgs/msg/DiagnosticArray",
-        ["planner", "virtual_sensor"],
+        ["planner", "virtual_sensor", "world_sim"],
         [],
         False,
     ),

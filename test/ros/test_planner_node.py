@@ -326,6 +326,19 @@ def test_real_time_stops_when_only_odom_is_old(graph: Graph) -> None:
     assert stamp_ns(harness.decisions[-1].header.stamp) > 1
 
 
+def test_a_timeout_set_at_run_time_is_watched_as_often_as_it_needs(graph: Graph) -> None:
+    harness = PlannerHarness(graph, {**REAL_TIME, "input_timeout_s": 60.0})
+    harness.odom.publish(odom(1))
+    harness.sectors.publish(sectors(1))
+    graph.until(lambda: bool(harness.decisions))
+    assert not graph.set_parameter("planner", "input_timeout_s", 0.04)
+    graph.until(lambda: mode(harness.decisions[-1]) is Mode.STOPPED)
+    count = len(harness.decisions)
+    graph.until(lambda: len(harness.decisions) > count + 20, timeout_s=4.0)
+    assert not graph.set_parameter("planner", "input_timeout_s", 60.0)
+    assert harness.node._timer.timer_period_ns == 250_000_000
+
+
 def test_before_any_sectors_it_publishes_no_command(graph: Graph) -> None:
     harness = PlannerHarness(graph, {**REAL_TIME, "input_timeout_s": 0.01})
     harness.decide_all(odom(1))

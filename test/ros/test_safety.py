@@ -163,7 +163,7 @@ def test_before_any_input_it_reports_what_it_waits_for(graph: Graph) -> None:
     received = graph.collect(topics.DIAGNOSTICS)
     graph.start(PlannerNode, {"hardware_id": "rosie"})
     graph.until(lambda: bool(received))
-    inputs, driving = received[0].status
+    inputs, driving, _ = received[0].status
     assert (inputs.level, inputs.message) == (STALE, "no odom yet; no sectors yet")
     assert (driving.level, driving.message) == (OK, "nothing decided yet")
     assert {inputs.hardware_id, driving.hardware_id} == {"rosie"}

@@ -349,8 +349,7 @@ def test_run_on_goes_on(graph: Graph) -> None:
 def test_real_time_ticks_on_a_wall_timer_with_the_newest_twist(graph: Graph) -> None:
     parameters = {"scenario": scenario(), "speed_factor": 20.0, "tick_ns": 10**9}
     driver = Driver(graph, parameters)
-    (timer,) = driver.world.timers
-    assert timer.timer_period_ns == 50_000_000
+    assert 50_000_000 in [timer.timer_period_ns for timer in driver.world.timers]
     graph.until(lambda: len(driver.odom) == 2)
     started = time.monotonic()
     driver.cmd_vel.publish(twist(9.0))

@@ -152,7 +152,7 @@ WAYPOINTS = Topic(name="waypoints", type=Path, readers=(PLANNER,), qos=VIEW_QOS)
 DIAGNOSTICS = Topic(
     name="/diagnostics",
     type=DiagnosticArray,
-    writers=(VIRTUAL_SENSOR, PLANNER),
+    writers=(WORLD_SIM, VIRTUAL_SENSOR, PLANNER),
     qos=VIEW_QOS,
 )
 MARKERS = Topic(name="markers", type=MarkerArray, writers=(WORLD_SIM, PLANNER), qos=VIEW_QOS)

@@ -25,11 +25,7 @@ from ..runtime.stale_inputs import watch_period_s
 
 
 class PlannerNode(ManagedNode):
-    """Any path planner as a node.
-
-    One tick: InputSubscriptions converts and pairs odom and sectors, then _on_inputs -> _perceive
-    -> _plan -> _publish.
-    """
+    """Any path planner as a node; one tick: _on_inputs -> _perceive -> _plan -> _publish."""
 
     def __init__(self, **kwargs: Any) -> None:
         """Raise ConfigError for a parameter that cannot be accepted."""
@@ -48,8 +44,7 @@ class PlannerNode(ManagedNode):
             self, s, params, refused, monitor, self._diagnostics, self._on_inputs
         )
         self._reset()
-        period_s = watch_period_s(params.input_timeout_s, lockstep=s.lockstep)
-        self.create_wall_timer(period_s, self._on_timer)
+        self._timer = self.create_wall_timer(self._watch_period_s(), self._on_timer)
         self.enter_life_cycle(s.autostart)
         self.advertise_ready(names(s.wait_for))
 
@@ -94,6 +89,11 @@ class PlannerNode(ManagedNode):
             self.path_planner = make_planner(changed, seed=self.settings.seed)
         self.path_planner.params = changed
         self._inputs.set_reads_scan(changed)
+        self._timer.timer_period_ns = round(self._watch_period_s() / NANO)
+
+    def _watch_period_s(self) -> float:
+        timeout_s = self.path_planner.params.input_timeout_s
+        return watch_period_s(timeout_s, lockstep=self.settings.lockstep)
 
     def _is_finished(self) -> bool:
         arrived = self._last is not None and self._last.mode is Mode.ARRIVED

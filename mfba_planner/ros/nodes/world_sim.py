@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""world_sim: publishes the world tick by tick, in lockstep with cmd_vel or on a wall timer.
-
-The robots of a fleet have their topics in their namespaces; all share one tick.
-"""
+"""world_sim: publishes the world tick by tick, in lockstep with cmd_vel or on a wall timer."""
 
 from __future__ import annotations
 
@@ -18,6 +15,7 @@ from ...recording.from_messages import pose2d
 from ...simulation.episode import stamp_of
 from ..endpoints.declare_scenario_parameter import declare_scenario
 from ..endpoints.simulated_fleet_interface import FleetInterface
+from ..endpoints.world_diagnostics import WorldDiagnostics
 from ..interface import parameters, topics
 from ..node_settings import WorldSimSettings, names
 from ..runtime.base_node import GraphNode
@@ -27,7 +25,7 @@ from ..runtime.tick_control import TickControl
 
 
 class WorldSim(GraphNode):
-    """The simulated world of one scenario.
+    """The simulated world of one scenario; the robots of a fleet share one tick.
 
     One tick: _publish_tick, then in lockstep _take_commands -> _advance, in real time _on_timer
     -> _advance.
@@ -48,6 +46,7 @@ class WorldSim(GraphNode):
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
         self.create_service(Trigger, "~/reset", self._on_reset)
+        WorldDiagnostics(self, s, lambda: self.stamp_ns)
         self.advertise_ready(names(s.wait_for))
         period_s, on_timer = s.tick_ns * NANO / s.speed_factor, self._on_timer
         if s.lockstep:

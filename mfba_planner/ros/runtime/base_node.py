@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 
 from ..interface import parameters
 from ..interface.topics import Topic, expected_readers, reading_qos, with_depth
+from .connection_check import type_mismatch
 from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
 
 SPIN_S = 0.1  # longest time until a signal is noticed
@@ -39,8 +40,7 @@ class GraphNode(Node):
     def advertise(self, topic: Topic, message_type: Any = None) -> Publisher:
         """Create the publisher of a topic of topics.py.
 
-        Without rclpy's QoS events: the executor would wait for each of them at every spin, and
-        a subscription with the wrong QoS is warned on its own side.
+        Without rclpy's QoS events: the executor would wait for each of them at every spin.
         """
         publisher = self.create_publisher(
             message_type or topic.type,
@@ -83,10 +83,10 @@ class GraphNode(Node):
 
         With one profile, or with info, a callback of two arguments gets rclpy's MessageInfo too.
         """
-        several = len(profiles) > 1
-        # With several, a publisher that does not fit one profile fits another: no warning then.
-        events = SubscriptionEventCallbacks(use_default_callbacks=not several)
-        call: Any = _without_duplicates(callback, info=info) if several else callback
+        # Without rclpy's QoS events, as in advertise(); connection_check.py names what does not
+        # fit, and not a publisher that fits another of the profiles.
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        call: Any = _without_duplicates(callback, info=info) if len(profiles) > 1 else callback
         for qos in profiles:
             self._subscribed.append(
                 self.create_subscription(message_type, name, call, qos, event_callbacks=events)
@@ -140,7 +140,7 @@ class GraphNode(Node):
         )
 
     def advertise_ready(self, peers: set[str]) -> None:
-        """Advertise ~/ready: true once every peer's subscription to our topics is matched.
+        """Advertise ~/ready: true once missing() is empty for these peers.
 
         Called last in a constructor: parameters that were given but not declared are logged.
         """
@@ -149,7 +149,10 @@ class GraphNode(Node):
         self.create_service(Trigger, "~/ready", self._on_ready)
 
     def missing(self) -> str:
-        """What is missing before a first message would reach all peers; empty: nothing."""
+        """What is missing before a first message would reach all peers; empty: nothing.
+
+        Also a node, any, whose message type differs on an input or on an output for our nodes.
+        """
         for topic, publisher in self._advertised:
             expected = expected_readers(topic, self._peers - {self.get_name()})
             if not expected:
@@ -159,12 +162,18 @@ class GraphNode(Node):
             absent = expected.difference(found)
             if absent or publisher.get_subscription_count() < len(found):
                 return f"{topic.name} waits for {', '.join(sorted(absent or expected))}"
-        return ""
+        outputs = [made.topic_name for topic, made in self._advertised if topic.readers]
+        inputs = [subscription.topic_name for subscription in self._subscribed]
+        return type_mismatch(self, [*outputs, *inputs])
 
     def _on_ready(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.message = self.missing()
         response.success = not response.message
         return response
+
+    def count_callers(self) -> int:
+        """How many clients this node's services have."""
+        return sum(self.count_clients(service.service_name) for service in self.services)
 
     def drain(self, executor: Executor) -> None:
         """Receive what was sent already; called once after a signal, before close."""

@@ -9,6 +9,7 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from .base_node import GraphNode
+from .response_sender import send_until_discovered
 
 
 class ManagedNode(GraphNode, LifecycleNodeMixin):
@@ -24,6 +25,9 @@ class ManagedNode(GraphNode, LifecycleNodeMixin):
         services = kwargs.get("start_parameter_services", True)
         LifecycleNodeMixin.__init__(self, enable_communication_interface=services)
         self._transition_error: Exception | None = None
+        if services:
+            # Only the last response: the others must not delay the node.
+            send_until_discovered(self._service_change_state, lambda: self.finished)
 
     @property
     def state(self) -> str:
@@ -77,7 +81,10 @@ class ManagedNode(GraphNode, LifecycleNodeMixin):
         return self._run(self.clean_up)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """From any state: deactivate and clean up where needed; the process ends with it."""
+        """From any state: deactivate and clean up where needed; the process ends with it.
+
+        spin_node.wait_for_callers first lets the response arrive.
+        """
         if state.label == "active":
             self._run(self.deactivate)
         self.finished = True

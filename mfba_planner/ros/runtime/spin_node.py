@@ -4,13 +4,17 @@
 from __future__ import annotations
 
 import signal
+import time
 from collections.abc import Callable
 
 import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from .base_node import GraphNode
+from .base_node import SPIN_S, GraphNode
+
+# Longest time that a node stays after its end by a service call, for callers that stay too.
+CALLERS_TIMEOUT_S = 2.0
 
 
 class StopFlag:
@@ -31,6 +35,23 @@ def make_executor(context: rclpy.Context | None = None) -> Executor:
     return SingleThreadedExecutor(context=context)
 
 
+def wait_for_callers(
+    node: GraphNode,
+    executor: Executor,
+    is_stopped: Callable[[], bool],
+    timeout_s: float = CALLERS_TIMEOUT_S,
+) -> None:
+    """Spin until no client of the node's services is left, so that each has its response.
+
+    rclpy returns as soon as the middleware has the response. A client that does not run at that
+    moment gets it later, or asks for it again; a writer that is destroyed meanwhile takes the
+    response with it. No call tells whether it has arrived, but a caller that has it goes away.
+    """
+    deadline = time.monotonic() + timeout_s
+    while node.count_callers() and not is_stopped() and time.monotonic() < deadline:
+        executor.spin_once(timeout_sec=SPIN_S / 5)
+
+
 def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
     """Run one node until a signal or its own end; return 0. Its MfbaErrors pass through."""
     stop = StopFlag()
@@ -42,6 +63,8 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
         executor.add_node(node)
         while not stop.is_set and not node.finished:
             node.spin_once(executor)
+        if node.finished:
+            wait_for_callers(node, executor, lambda: stop.is_set)
         node.drain(executor)
         return 0
     finally:
