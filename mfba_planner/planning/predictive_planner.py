@@ -145,8 +145,6 @@ class Predictive(BasePlanner):
         """The cheapest waypoint and speed; no search while the straight line is free."""
         position, circles = obs.pose.position, self._perceived
         speed, tick_s = self.params.speed_mps, self.tick_s
-        only_sectors = obs.circles is None and obs.scan is None
-        moving = only_sectors and self._changes.moving(obs.stamp_ns, position, obs.ranges_m)
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
         costs = TrajectoryCost(position, circles, self.options.risk, tick_s, speed)
@@ -157,7 +155,9 @@ class Predictive(BasePlanner):
             straight = self.straight(position, goal, speed)
             return Move(velocity=straight, reason="the straight way is free")
         vs = self._closed_headings(costs)
-        enclosure = "" if 0 in vs or moving else self._enclosure(position, at_rest)
+        enclosure = self._changes.at_rest(
+            obs, "" if 0 in vs else self._enclosure(position, at_rest)
+        )
         if enclosure:
             return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
