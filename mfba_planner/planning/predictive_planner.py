@@ -127,13 +127,17 @@ class Predictive(BasePlanner):
         last_waypoint, self._waypoint = self._waypoint, None
         self._perceived = circles = self._circles(obs)
         if not circles:
+            self._changes.not_enclosed()
             straight = self.straight(position, goal, self.params.speed_mps)
             return Move(velocity=straight, reason="no obstacle within SR")
         at_rest = ObstaclesAtRest(position, circles)
         misplaced = at_rest.misplaced()
         if misplaced:
             return Move(velocity=(0.0, 0.0), reason=misplaced, event=Event.NO_GAP)
-        return self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
+        move = self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
+        if not all(move.vs or (0,)):
+            self._changes.not_enclosed()
+        return move
 
     def _choose(
         self,
@@ -155,10 +159,8 @@ class Predictive(BasePlanner):
             straight = self.straight(position, goal, speed)
             return Move(velocity=straight, reason="the straight way is free")
         vs = self._closed_headings(costs)
-        enclosure = self._changes.at_rest(
-            obs, "" if 0 in vs else self._enclosure(position, at_rest)
-        )
-        if enclosure:
+        enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
+        if enclosure and self._changes.at_rest(obs):
             return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
         candidates = self._waypoints(gaps, to_goal, goal_distance)

@@ -21,18 +21,20 @@ class SectorChanges:
         self._at_rest: tuple[Point, Ranges] | None = None
         self._moving_until_ns = 0
 
-    def at_rest(self, obs: Observation, enclosure: str) -> str:
-        """The enclosure found in a tick, "" if it moves or there is none.
+    def not_enclosed(self) -> None:
+        """The robot is not enclosed in this tick."""
+        self._at_rest = None
+
+    def at_rest(self, obs: Observation) -> bool:
+        """Whether what encloses the robot in a tick is at rest.
 
         With circles or a scan it is known what moves. Where a sector reads 0, there is no room
         to evade.
         """
-        if not enclosure:
-            self._at_rest = None
-        elif obs.circles is None and obs.scan is None:
-            moving = self._moving(obs.stamp_ns, obs.pose.position, obs.ranges_m)
-            return "" if moving and min(obs.ranges_m) > 0.0 else enclosure
-        return enclosure
+        if obs.circles is not None or obs.scan is not None:
+            return True
+        moving = self._moving(obs.stamp_ns, obs.pose.position, obs.ranges_m)
+        return not moving or min(obs.ranges_m) == 0.0
 
     def _moving(self, stamp_ns: int, position: Point, ranges_m: Ranges) -> bool:
         """Take the sectors of a tick; whether obstacles moved in the last seconds."""

@@ -24,7 +24,7 @@ def observation(at_s: float, where: Point, ranges: Ranges) -> Observation:
 
 def moving(*ticks: tuple[float, Point, Ranges]) -> list[bool]:
     changes = SectorChanges()
-    return [not changes.at_rest(observation(*tick), "enclosed") for tick in ticks]
+    return [not changes.at_rest(observation(*tick)) for tick in ticks]
 
 
 @pytest.mark.parametrize("noise_m", [0.0, 0.02, 0.045])
@@ -56,9 +56,9 @@ def test_a_sector_at_the_edge_of_the_sensing_range_says_nothing() -> None:
 def test_a_ring_that_appears_is_at_rest_until_it_changes() -> None:
     """As when a door is opened and closed again in front of a robot that stands."""
     changes = SectorChanges()
-    assert changes.at_rest(observation(1.0, HERE, RING), "enclosed") == "enclosed"
-    assert changes.at_rest(observation(1.1, HERE, (math.inf,) * 12), "") == ""
-    assert changes.at_rest(observation(1.2, HERE, (0.2,) * 12), "enclosed") == "enclosed"
+    assert changes.at_rest(observation(1.0, HERE, RING))
+    changes.not_enclosed()
+    assert changes.at_rest(observation(1.2, HERE, (0.2,) * 12))
 
 
 def test_without_room_to_evade_it_stays_enclosed() -> None:
@@ -69,4 +69,4 @@ def test_where_circles_are_known_sectors_say_nothing() -> None:
     changes = SectorChanges()
     for tick, ranges in enumerate((RING, (0.2,) * 12)):
         known = replace(observation(tick, HERE, ranges), circles=())
-        assert changes.at_rest(known, "enclosed") == "enclosed"
+        assert changes.at_rest(known)
