@@ -65,7 +65,7 @@ def test_without_room_to_evade_it_stays_enclosed() -> None:
     assert moving((1.0, HERE, RING), (1.1, HERE, (0.0, *RING[1:]))) == [False, False]
 
 
-def test_where_circles_are_known_sectors_say_nothing() -> None:
+def test_where_circles_are_known_sectors_do_not_count() -> None:
     changes = SectorChanges()
     for tick, ranges in enumerate((RING, (0.2,) * 12)):
         known = replace(observation(tick, HERE, ranges), circles=())
