@@ -108,7 +108,7 @@ CONFIGURATIONS: dict[str, Configuration] = {
     ),
     "predictive, known, wide berth": Configuration(planner=preset(), make=_wide, observe=_known),
     "predictive, lidar, tracked": Configuration(
-        planner=replace(preset(), scan_radius_m=0.35),
+        planner=preset(),
         robot=LIDAR,
         make=_predictive,
         observe=lambda: observe_scan,

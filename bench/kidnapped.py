@@ -18,6 +18,7 @@ import numpy as np
 
 from mfba_planner.core.geometry import distance
 from mfba_planner.core.planner_types import NANO
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.ros_domain import claim_domain
 from mfba_planner.perception.sensory_vector import SensorParams
@@ -29,7 +30,7 @@ from mfba_planner.scenarios.run_config import Driver, RunConfig
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode, Outcome
-from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
+from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.run_episode import simulate
 from mfba_planner.simulation.scenario import Kidnapping, Scenario
 
@@ -40,7 +41,7 @@ ROWS: dict[str, tuple[Robot, PlannerParams]] = {
     "paper, omnidirectional": (Robot(), PlannerParams()),
     "paper with a persistent swarm": (Robot(), PlannerParams(swarm=Swarm.PERSISTENT)),
     "predictive, omnidirectional": (Robot(), AHEAD),
-    "predictive, differential, 360 beams": (TURNING, replace(AHEAD, scan_radius_m=0.42)),
+    "predictive, differential, 360 beams": (TURNING, AHEAD),
 }
 
 

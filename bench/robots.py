@@ -13,22 +13,23 @@ import argparse
 from dataclasses import replace
 
 from mfba_planner.core.planner_types import NANO
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.evaluation.statistics import share_interval
 from mfba_planner.evaluation.suites.named_suites import suite
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.planner_params import Method, PlannerParams
+from mfba_planner.planning.differential_drive import SUBTICK_NS, Speeds, apply_command, command
+from mfba_planner.planning.planner_params import Method, PerceptionInput, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.contact import step_clearances
-from mfba_planner.simulation.differential_drive import SUBTICK_NS, Speeds, apply_command, command
 from mfba_planner.simulation.episode import Episode, Outcome
-from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.robot_model import Lidar, Noise, Robot
 from mfba_planner.simulation.run_episode import simulate
 from mfba_planner.simulation.scenario import Scenario
 
 CASES = ("case1", "case2")
-SECTORS = replace(preset(), method=Method.PREDICTIVE)
-TRACKING = replace(SECTORS, scan_radius_m=0.42)  # the preset
+TRACKING = replace(preset(), method=Method.PREDICTIVE)
+SECTORS = replace(TRACKING, perception=PerceptionInput.SECTORS)
 TURNING = Robot(drive=Drive.DIFFERENTIAL, lidar=Lidar(beams=360))
 
 

@@ -23,7 +23,7 @@ from typing import Any
 from reference_text import PARAMETERS_TEXT, SERVICES, SERVICES_TEXT, TOPICS_TEXT, YAML_HEAD
 
 from mfba_planner import cli
-from mfba_planner.core.option_specs import override, walk
+from mfba_planner.core.option_specs import walk
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_factory import DEFAULT_METHOD
 from mfba_planner.planning.planner_params import PlannerParams
@@ -37,13 +37,14 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES_FOLDER = ROOT / "docs/reference"
 YAML = ROOT / "config/planner.yaml"
 # Values in config/planner.yaml that differ from the defaults: for a robot with a lidar.
+ROBOT_NODES = ("virtual_sensor", "planner")
 ROBOT: dict[str, dict[str, Any]] = {
-    "virtual_sensor": {"source": "scan", "input_timeout_s": 0.25},
+    "*": {"input_timeout_s": 0.25},  # of both nodes
+    "virtual_sensor": {"source": "scan"},
     "planner": {
         "speed_mps": 0.5,
         "step_length_m": 0.05,  # one decision per 0.1 s
         "goal_tolerance_m": 0.1,
-        "input_timeout_s": 0.25,
         "method": DEFAULT_METHOD.value,
         "bat.iterations": preset().bat.iterations,
         "recovery.enabled": True,
@@ -120,24 +121,29 @@ def parameters_page() -> str:
 
 def planner_yaml() -> str:
     """config/planner.yaml: all parameters; those with their default value are commented out."""
-    lines = [YAML_HEAD.rstrip()]
-    for node, changed in ROBOT.items():
-        lines += ["", f"/**/{node}:", "  ros__parameters:"]
-        for defaults in NODES[node]:
-            for name, value, item in walk(override(defaults, _known(defaults, changed))):
-                spec, shown = item.metadata["spec"], getattr(value, "value", value)
-                choices = [str(m.value) for m in type(value)] if isinstance(value, Enum) else []
-                allowed = " | ".join(choices) or _range(spec)
-                about = [spec.doc, *(f"[{x}]" for x in (spec.unit, allowed) if x)]
-                mark = "" if name in changed else "# "
-                lines.append(f"    # {' '.join(about)}")
-                lines.append(f"    {mark}{name}: {json.dumps(shown)}")
+    options = {
+        node: {item[0]: item for defaults in NODES[node] for item in walk(defaults)}
+        for node in ROBOT_NODES
+    }
+    first, second = options.values()
+    both = {name: item for name, item in first.items() if name in second}
+    lines = [YAML_HEAD.rstrip(), "", "/**:", "  ros__parameters:", *_lines(both, ROBOT["*"])]
+    for node, declared in options.items():
+        own = {name: item for name, item in declared.items() if name not in both}
+        lines += ["", f"/**/{node}:", "  ros__parameters:", *_lines(own, ROBOT[node])]
     return "\n".join(lines) + "\n"
 
 
-def _known(defaults: Any, changed: dict[str, Any]) -> dict[str, Any]:
-    names = [name for name, _, _ in walk(defaults)]
-    return {name: value for name, value in changed.items() if name in names}
+def _lines(options: dict[str, Any], changed: dict[str, Any]) -> Iterable[str]:
+    """The lines of a YAML section; values that are not changed are commented out."""
+    for name, value, item in options.values():
+        spec, shown = item.metadata["spec"], getattr(value, "value", value)
+        choices = [str(m.value) for m in type(value)] if isinstance(value, Enum) else []
+        allowed = " | ".join(choices) or _range(spec)
+        about = [spec.doc, *(f"[{x}]" for x in (spec.unit, allowed) if x)]
+        yield f"    # {' '.join(about)}"
+        mark = "" if name in changed else "# "
+        yield f"    {mark}{name}: {json.dumps(changed.get(name, shown))}"
 
 
 def _range(spec: Any) -> str:

@@ -19,13 +19,17 @@ Ranges = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scan:
-    """A planar laser scan: beam k points along angle_min_rad + k * angle_increment_rad."""
+    """A planar laser scan: beam k points along angle_min_rad + k * angle_increment_rad.
+
+    It was measured k * time_increment_s after the stamp; 0: all beams at once.
+    """
 
     ranges_m: np.ndarray
     angle_min_rad: float
     angle_increment_rad: float
     range_min_m: float
     range_max_m: float
+    time_increment_s: float = 0.0
 
 
 class Mode(Enum):
@@ -41,11 +45,15 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Circle:
-    """An obstacle enlarged by the robot's radius, with its velocity, in the odom frame."""
+    """An obstacle enlarged by the robot's radius, with its velocity, in the odom frame.
+
+    velocity_sd_mps is the velocity's standard deviation per axis; 0 where it is known exactly.
+    """
 
     center_m: Point
     radius_m: float
     velocity_mps: Point = (0.0, 0.0)
+    velocity_sd_mps: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +62,8 @@ class Observation:
 
     The paper's planner reads only the sectors (ranges_m). Other planners may use circles (within
     SR) or scan (obstacle surfaces, in a frame aligned with odom). If these are older than the
-    pose, sensed is their stamp and the pose at that stamp. refused is the reason for refusing
+    pose, sensed is their stamp and the pose at that stamp. pose_stamp_ns is the stamp of the pose
+    if it is later than stamp_ns, which identifies the tick. refused is the reason for refusing
     the inputs, "" if they are valid.
     """
 
@@ -67,6 +76,12 @@ class Observation:
     circles: tuple[Circle, ...] | None = None
     scan: Scan | None = None
     sensed: tuple[int, Pose2D] | None = None
+    pose_stamp_ns: int | None = None
+
+    @property
+    def pose_ns(self) -> int:
+        """The stamp of the pose: the moment for which a planner decides."""
+        return self.stamp_ns if self.pose_stamp_ns is None else self.pose_stamp_ns
 
 
 RefusalReason = str  # the reason why an input was refused, in place of the input
@@ -98,7 +113,11 @@ def observe(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """One decision and its reason; gap counts from 1, 0 means none; lengths in metres."""
+    """One decision and its reason; gap counts from 1, 0 means none; lengths in metres.
+
+    perception is what obstacles were perceived by: sectors, scan or circles; "" for none or, in
+    an old recording, unknown. The decision digest leaves it out.
+    """
 
     stamp_ns: int
     mode: Mode
@@ -112,6 +131,7 @@ class Decision:
     waypoint: Point
     velocity: Point
     candidates: tuple[Point, ...] = ()
+    perception: str = ""
 
 
 class PathPlanner(Protocol):

@@ -67,7 +67,7 @@ def robot_nodes(given: Mapping[str, str]) -> list[NodeStart]:
                 "enable_stamped_cmd_vel": ENABLED[given["stamped"]],
             },
             files=files,
-            remaps=remaps("odom", "cmd_vel", "goal_pose", "waypoints"),
+            remaps=remaps("scan", "odom", "cmd_vel", "goal_pose", "waypoints"),
         ),
     ]
 

@@ -16,7 +16,7 @@ from ..paper import readings_of_paper
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD, params_for_method
 from ..planning.planner_params import Method
-from ..scenarios.run_config import NODES, Driver, RunConfig
+from ..scenarios.run_config import NODES, Driver, RunConfig, with_perception
 from ..scenarios.scenario_files import load_scenario
 from ..swarm.bat_swarm import Algorithm
 from .set_option import add_set_argument, with_robot_settings, with_settings
@@ -147,8 +147,9 @@ def read_config(parsed: argparse.Namespace, **more: Any) -> RunConfig:
     scenario = load_scenario(parsed.scenario)
     robot, others = with_robot_settings(scenario.robot, parsed.settings)
     planner, sensor = with_settings(planner, SensorParams(), others)
+    scenario, planner = with_perception(replace(scenario, robot=robot), planner)
     return RunConfig(
-        scenario=replace(scenario, robot=robot),
+        scenario=scenario,
         planner=planner,
         sensor=sensor,
         seed=parsed.seed,

@@ -8,10 +8,16 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..core.errors import ConfigError
-from ..core.option_specs import did_you_mean, override, walk
+from ..core.option_specs import did_you_mean, flatten, override, walk
+from ..core.robot_base import Base
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..simulation.robot_model import Robot
+
+# Options of a planner that the scenario sets.
+OF_ROBOT = {"robot_radius_m": "set robot_radius_m in the scenario file"} | {
+    name: f"give robot.{name}" for name in flatten(Base())
+}
 
 
 def add_set_argument(parser: argparse.ArgumentParser) -> None:
@@ -55,13 +61,19 @@ def option_rows() -> Iterable[tuple[str, Any, Any]]:
         ("robot", Robot()),
     ):
         for name, value, item in walk(defaults):
-            yield f"{group}.{name}", value, item.metadata["spec"]
+            if group != "planner" or name not in OF_ROBOT:
+                yield f"{group}.{name}", value, item.metadata["spec"]
 
 
 def _setting(text: str) -> tuple[str, Any]:
     name, found, value = text.partition("=")
     if not found:
         raise ConfigError(f"--set {text}: no value; give NAME=VALUE")
+    group, _, of_robot = name.partition(".")
+    if group == "planner" and of_robot in OF_ROBOT:
+        raise ConfigError(
+            f"--set {name}: the planner's robot is the scenario's; {OF_ROBOT[of_robot]}"
+        )
     known = [row[0] for row in option_rows()]
     if name not in known:
         raise ConfigError(f"--set {name}: unknown option; {did_you_mean(name, known)}")

@@ -18,6 +18,7 @@ from ..scenarios.run_config import (
     RunConfig,
     graph_parameters,
     recorder_parameters,
+    with_perception,
 )
 from ..scenarios.scenario_files import load_scenario
 from ..swarm.bat_swarm import Algorithm
@@ -72,9 +73,13 @@ def launch_parameters(given: Mapping[str, str]) -> Parameters:
         _MFBA,
         readings_of_paper.DEFAULT_METHOD,
     )
+    scenario, planner = with_perception(
+        load_scenario(given["scenario"]),
+        params_for_method(given["planner"] or None, planner, algorithm_1=algorithm_1),
+    )
     config = RunConfig(
-        scenario=load_scenario(given["scenario"]),
-        planner=params_for_method(given["planner"] or None, planner, algorithm_1=algorithm_1),
+        scenario=scenario,
+        planner=planner,
         seed=_number("seed", given["seed"], int),
         real_time=given["real_time"] == "true",
         speed_factor=_number("speed_factor", given["speed_factor"], float),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle tracker: moving circles from laser scans, one extended Kalman filter each."""
+"""Obstacle tracker: circles of any size, at rest or moving, and walls, from laser scans."""
 
 from __future__ import annotations
 
@@ -9,302 +9,319 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.geometry import Point, Pose2D
-from ..core.option_specs import check, option
 from ..core.planner_types import NANO, Circle, Scan
+from .circle_fit import Fit, fit
+from .free_space import FreeSpace
+from .group_outline import Outline, outline_of, thinned
+from .pose_error import PoseError
+from .scan_beams import BeamReader, Beams
+from .scan_segments import Segments, segments, taken_from_a_gap
+from .track_association import NONE, associate, expected_labels
+from .track_bank import RADIUS, TrackBank
+from .track_lifecycle import drop_lost, fragments, judge_motion
+from .tracking_params import TrackingParams
+
+__all__ = ["Track", "Tracker", "TrackingParams"]
 
 Array = np.ndarray
 
-_MAX_HITS = 6  # returns of a scan that update a track, evenly spaced
-_MAX_MISSES = 2  # beams through a circle without a return that update its track
 _MAX_ENLARGEMENT_M = 0.15  # for the uncertainty of a circle
+_MOST_SPEED_SD = 0.5  # m/s, of it
+_FAR_M, _DRIFT_MPS = 5.0, 0.02  # apparent speed of what stands so far away
+_FEWEST_SCANS, _MOST_SCANS = 6, 30  # whose errors tell a common motion of all tracks
+_SETTLED = 2  # scans of a track that may be an anchor
+_ROUND_SCANS, _ROUND_SD_M = 5, 0.03  # from which a track's circle is known
+_TURN_SHARE = 0.8  # of a step, by which an obstacle that turns back is found elsewhere
+_KNOWN = 3  # scans after which a track's velocity is known
+_ANCHORS = 3  # such tracks tell that there is no common motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrackingParams:
-    """Prior of a new obstacle, noise of the sensor, and limits of the association."""
-
-    radius_m: float = option(0.3, "expected radius", unit="m", minimum=0.01, maximum=10.0)
-    radius_sd_m: float = option(
-        0.03, "standard deviation of the radius", unit="m", minimum=1e-6, maximum=10.0
-    )
-    speed_sd_mps: float = option(
-        0.2, "standard deviation of a new obstacle's velocity, per axis", unit="m/s", minimum=1e-3,
-        maximum=100.0,
-    )  # fmt: skip
-    position_sd_m: float = option(
-        0.1,
-        "standard deviation of a new obstacle's centre",
-        unit="m",
-        minimum=1e-3,
-        maximum=10.0,
-    )
-    range_sd_m: float = option(
-        0.01, "standard deviation of a range", unit="m", minimum=1e-4, maximum=10.0
-    )
-    turning_mps2: float = option(
-        0.05, "white-noise acceleration", unit="m/s^2", minimum=0.0, maximum=100.0
-    )
-    gate_m: float = option(
-        0.25, "largest distance of a return from its circle", unit="m", minimum=0.01, maximum=10.0
-    )
-    join_m: float = option(
-        0.35,
-        "largest distance of neighbouring returns of one obstacle",
-        unit="m",
-        minimum=0.01,
-        maximum=10.0,
-    )
-    widest_m: float = option(
-        1.3,
-        "width above which a group of returns is no circle",
-        unit="m",
-        minimum=0.01,
-        maximum=100.0,
-    )
-    position_sd_factor: float = option(
-        0.5,
-        "standard deviations of the centre by which a circle is enlarged",
-        minimum=0.0,
-        maximum=10.0,
-    )
-    speed_sd_factor_s: float = option(
-        0.1, "time for which the velocity's standard deviation enlarges it", unit="s", minimum=0.0,
-        maximum=10.0,
-    )  # fmt: skip
-    allowance_m: float = option(
-        0.01, "enlargement of every tracked circle", unit="m", minimum=0.0, maximum=1.0
-    )
-    forget_s: float = option(
-        2.0, "time without a return after which a track is dropped", unit="s", minimum=0.0,
-        maximum=100.0,
-    )  # fmt: skip
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range."""
-        check(self)
-
-
 class Track:
-    """One obstacle: state x, y, vx, vy, r and its covariance, at the tracker's time.
+    """One tracked obstacle at the time of the last scan; at rest its velocity is 0."""
 
-    Plain floats and scalar measurements, one after the other: the matrices are small, and the
-    result is the same bit by bit on every machine.
-    """
-
-    __slots__ = ("covariance", "observed_ns", "state")
-
-    def __init__(self, state: list[float], deviations: list[float], observed_ns: int) -> None:
-        """Start from independent standard deviations of the five states."""
-        self.state = state
-        self.covariance = [
-            [deviation * deviation if i == j else 0.0 for j in range(5)]
-            for i, deviation in enumerate(deviations)
-        ]
-        self.observed_ns = observed_ns
-
-    def predict(self, dt: float, acceleration: float) -> None:
-        """Predict by dt seconds: constant velocity with white-noise acceleration."""
-        x, P = self.state, self.covariance
-        x[0] += x[2] * dt
-        x[1] += x[3] * dt
-        for k in (0, 1):
-            for j in range(5):
-                P[k][j] += dt * P[k + 2][j]
-            for j in range(5):
-                P[j][k] += dt * P[j][k + 2]
-        q = acceleration * acceleration * dt
-        for k in (0, 1):
-            P[k][k] += q * dt * dt / 3.0
-            P[k + 2][k + 2] += q
-
-    def deviations(self) -> tuple[float, float]:
-        """Standard deviations of centre (m) and velocity (m/s), mean of both axes."""
-        P = self.covariance
-        return math.sqrt(0.5 * (P[0][0] + P[1][1])), math.sqrt(0.5 * (P[2][2] + P[3][3]))
-
-    def update_scalar(
-        self, hx: float, hy: float, hr: float, residual: float, variance: float
-    ) -> float:
-        """Update by a scalar with gradient (hx, hy, 0, 0, hr); its normalized innovation^2."""
-        P = self.covariance
-        spread = [row[0] * hx + row[1] * hy + row[4] * hr for row in P]
-        total = spread[0] * hx + spread[1] * hy + spread[4] * hr + variance
-        share = residual / total
-        self.state = [x + s * share for x, s in zip(self.state, spread)]
-        self.covariance = [
-            [p - si * sj / total for p, sj in zip(row, spread)] for row, si in zip(P, spread)
-        ]
-        return residual * share
-
-    def update_hit(self, px: float, py: float, variance: float) -> float:
-        """Update by a return, a point p on the circle: |p - c| - r = 0."""
-        x, y, _, _, r = self.state
-        dx, dy = px - x, py - y
-        distance_m = math.sqrt(dx * dx + dy * dy) or 1e-9
-        return self.update_scalar(dx / distance_m, dy / distance_m, 1.0, distance_m - r, variance)
-
-    def update_miss(self, ox: float, oy: float, ux: float, uy: float, variance: float) -> float:
-        """Update by a beam from o along the unit vector u that missed: |u x (c - o)| - r >= 0."""
-        x, y, _, _, r = self.state
-        across = ux * (y - oy) - uy * (x - ox)
-        inside = r - abs(across)
-        if inside <= 0.0:
-            return 0.0
-        side = -1.0 if across < 0.0 else 1.0
-        return self.update_scalar(-side * uy, side * ux, -1.0, inside, variance)
+    center_m: Point
+    radius_m: float
+    velocity_mps: Point
+    position_sd_m: float
+    velocity_sd_mps: float
+    moving: bool
+    unseen_s: float
 
 
 class Tracker:
-    """Tracks moving circles; returns of shapes too wide for a circle become points at rest.
+    """Tracks circles of unknown size; surfaces that are no circles become points at rest.
 
-    A return on a track's circle updates the track, as does a beam through the circle without a
-    return. Other returns close to each other start a new track.
+    A scan is cut into segments, these are given to the predicted tracks, and each group is
+    fitted by a circle (circle_fit.py) that updates its track (track_bank.py) or starts one.
+    Errors of the odometry are estimated from all tracks together (pose_error.py). A track moves
+    if its velocity is significant and its outline is seen whole, or if it has entered space that
+    was seen free (free_space.py); otherwise it stands, and its velocity is 0.
     """
 
     def __init__(self, params: TrackingParams | None = None) -> None:
         """Start without tracks."""
         self.params = params or TrackingParams()
-        self.tracks: list[Track] = []
-        self._points: list[Point] = []
+        self._reader = BeamReader()
         self._stamp_ns: int | None = None
+        self._pose = Pose2D(0.0, 0.0)
+        self._clear()
+
+    def _clear(self) -> None:
+        self._bank = TrackBank()
+        self._pose_error = PoseError()
+        self._free = FreeSpace()
+        self._walls: list[Point] = []
+        self._scans = 0
+        self._range_variance = self.params.range_sd_m**2
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """All tracks, in the order of their start."""
+        return tuple(
+            Track(
+                center_m=(x, y),
+                radius_m=r,
+                velocity_mps=(vx, vy) if moving else (0.0, 0.0),
+                position_sd_m=position_sd,
+                velocity_sd_mps=velocity_sd,
+                moving=moving,
+                unseen_s=unseen,
+            )
+            for (x, y, vx, vy, r), position_sd, velocity_sd, moving, unseen in zip(
+                self._bank.state.tolist(),
+                self._bank.position_sd_m.tolist(),
+                self._bank.speed_sd_mps.tolist(),
+                self._bank.moving.tolist(),
+                self._bank.unseen_s.tolist(),
+            )
+        )
 
     def update(self, stamp_ns: int, pose: Pose2D, scan: Scan) -> None:
-        """Update by a scan; an older stamp drops all tracks, an equal one is ignored."""
-        if self._stamp_ns is not None and stamp_ns <= self._stamp_ns:
-            if stamp_ns == self._stamp_ns:
+        """Update by a scan in a frame aligned with odom, taken from the pose at the stamp.
+
+        An older stamp drops all tracks, an equal one is ignored.
+        """
+        dt = 0.0
+        velocity = (0.0, 0.0, 0.0)
+        if self._stamp_ns is not None:
+            dt = (stamp_ns - self._stamp_ns) * NANO
+            if dt == 0.0:
                 return
-            self.tracks = []
-        elif self._stamp_ns is not None:
-            for track in self.tracks:
-                track.predict((stamp_ns - self._stamp_ns) * NANO, self.params.turning_mps2)
-        self._stamp_ns = stamp_ns
-        r = np.asarray(scan.ranges_m, dtype=np.float64)
-        near = np.isneginf(r)
-        hit = near | ((r >= scan.range_min_m) & (r <= scan.range_max_m))
-        self._points = []
-        if not (self.tracks or hit.any()):
-            return
-        angles = scan.angle_min_rad + scan.angle_increment_rad * np.arange(r.size)
-        rays = np.column_stack((np.cos(angles), np.sin(angles)))
+            if dt < 0.0:
+                self._clear()
+                dt = 0.0
+            else:
+                last = self._pose
+                turn = math.remainder(pose.yaw - last.yaw, 2.0 * math.pi)
+                velocity = ((pose.x - last.x) / dt, (pose.y - last.y) / dt, turn / dt)
+        self._stamp_ns, self._pose = stamp_ns, pose
+        p, bank = self.params, self._bank
+        beams = self._reader.read(pose, velocity, scan)
         origin = np.array(pose.position)
-        reach = np.where(near, scan.range_min_m, r)[hit]
-        points = origin + reach[:, None] * rays[hit]
-        free = rays[np.isposinf(r)]
-        track_of = self._associate(points)
-        for number, track in enumerate(self.tracks):
-            returns = points[track_of == number]
-            if len(returns):
-                track.observed_ns = stamp_ns
-            self._correct(track, returns, pose, free, scan.range_max_m)
-        self._start_tracks(points[track_of < 0], pose, stamp_ns)
-        self.tracks = [t for t in self.tracks if self._is_kept(t, stamp_ns)]
+        bank.pass_time(dt)
+        self._free.pass_time(dt)
+        bank.predict(self._expected_times(beams, origin), p.acceleration_sd)
+        sd = np.minimum(bank.position_sd_m + self._pose_sd(origin, bank.state), 1.0)
+        found, off = self._segments(beams, sd)
+        v = bank.state[:, 2:4]
+        turned_m = _TURN_SHARE * dt * np.sqrt(v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1])
+        track = associate(found, off, origin, bank.state, sd, p.gate_m + turned_m)
+        self._use(beams, found, track, origin)
+        self._follow_odometry(dt, origin)
+        self._free.add(beams, self._pose_error.error, self._pose_error.sd_rad)
+
+    def _follow_odometry(self, dt: float, origin: Array) -> None:
+        """Move the tracks towards the odometry, whose errors have the mean 0.
+
+        Nothing but that tells whether all obstacles turn around the robot. The gains are those
+        of a least-squares line through the errors of the last scans.
+        """
+        self._scans += 1
+        if dt <= 0.0:
+            return
+        bank, error = self._bank, self._pose_error
+        anchors = int(np.count_nonzero(~bank.moving & (bank.scans >= _SETTLED)))
+        # After n scans the rate of turn is known to 3.5 sd / (dt n^1.5).
+        noise = 3.5 * max(error.sd_m / _FAR_M, error.sd_rad) * _FAR_M / (dt * _DRIFT_MPS)
+        n = int(min(max(noise ** (2.0 / 3.0), _FEWEST_SCANS), _MOST_SCANS))
+        if anchors < _ANCHORS:
+            n = max(_FEWEST_SCANS, min(n, self._scans))
+        gain, rate = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1) * dt)
+        x, y, turn = error.error
+        bank.turn_with(error.follow(gain), (rate * x, rate * y, rate * turn), origin)
 
     def circles(self, now_ns: int, robot_radius_m: float) -> tuple[Circle, ...]:
-        """The tracked circles, predicted to now_ns and enlarged by the robot's radius."""
-        ahead_s = (now_ns - (self._stamp_ns or now_ns)) * NANO
-        p, found = self.params, []
-        for track in self.tracks:
-            x, y, vx, vy, r = track.state
-            position_sd, speed_sd = track.deviations()
+        """The tracked circles, predicted to now_ns and enlarged by the robot's radius.
+
+        They are relative to the pose that was given with the last scan, error included: the
+        planner knows no other.
+        """
+        bank, p = self._bank, self.params
+        circles: list[Circle] = []
+        if bank.count:
+            ahead_s = (now_ns - (self._stamp_ns or now_ns)) * NANO
+            moving = bank.moving
+            velocity = np.where(moving[:, None], bank.state[:, 2:4], 0.0)
+            ahead = np.where(moving, ahead_s - bank.time_s, 0.0)
+            shift_x, shift_y = self._pose_error.shift(
+                bank.state[:, 0], bank.state[:, 1], np.array(self._pose.position)
+            )
+            x = bank.state[:, 0] + shift_x + bank.shift_m[:, 0] + velocity[:, 0] * ahead
+            y = bank.state[:, 1] + shift_y + bank.shift_m[:, 1] + velocity[:, 1] * ahead
+            speed_sd = bank.speed_sd_mps
             enlargement = (
-                p.allowance_m + p.position_sd_factor * position_sd + p.speed_sd_factor_s * speed_sd
+                p.allowance_m
+                + p.position_sd_factor * bank.position_sd_m
+                + p.speed_sd_factor_s * np.minimum(speed_sd, _MOST_SPEED_SD)
+                + np.maximum(bank.rms_m - math.sqrt(self._range_variance), 0.0)
             )
-            found.append(
+            r = bank.state[:, RADIUS] + np.minimum(enlargement, _MAX_ENLARGEMENT_M)
+            circles = [
                 Circle(
-                    center_m=(x + vx * ahead_s, y + vy * ahead_s),
-                    radius_m=r + robot_radius_m + min(enlargement, _MAX_ENLARGEMENT_M),
+                    center_m=(cx, cy),
+                    radius_m=cr + robot_radius_m,
                     velocity_mps=(vx, vy),
+                    velocity_sd_mps=sd,
                 )
+                for cx, cy, cr, (vx, vy), sd in zip(
+                    x.tolist(), y.tolist(), r.tolist(), velocity.tolist(), speed_sd.tolist()
+                )
+            ]
+        radius = robot_radius_m + p.allowance_m
+        circles += [Circle(center_m=point, radius_m=radius) for point in self._walls]
+        return tuple(circles)
+
+    def _expected_times(self, beams: Beams, origin: Array) -> Array:
+        """When the beams meet each track, s after the stamp; (m,)."""
+        bank = self._bank
+        if not (bank.count and beams.time_s.size and beams.time_s.any()):
+            return np.zeros(bank.count)
+        bearing = np.arctan2(bank.state[:, 1] - origin[1], bank.state[:, 0] - origin[0])
+        index = np.clip(beams.index_of(bearing), 0, beams.count - 1)
+        time_s = np.zeros(beams.count)
+        time_s[beams.number] = beams.time_s
+        times: Array = time_s[index]
+        return times
+
+    def _pose_sd(self, origin: Array, state: Array) -> Array:
+        """Standard deviation of the tracks' measured places by errors of the odometry; (m,)."""
+        dx, dy = state[:, 0] - origin[0], state[:, 1] - origin[1]
+        e = self._pose_error
+        sd: Array = np.sqrt(e.variance_m2 + e.variance_rad2 * (dx * dx + dy * dy))
+        return sd
+
+    def _segments(self, beams: Beams, sd: Array) -> tuple[Segments, Array]:
+        """The scan's segments and the distances (k, m) of its returns from the tracks."""
+        taken = taken_from_a_gap(beams)
+        r = beams.range_m[taken]
+        x = beams.origin_x[taken] + r * beams.cos[taken]
+        y = beams.origin_y[taken] + r * beams.sin[taken]
+        label, off = expected_labels(x, y, self._bank.state, np.minimum(sd, 0.2))
+        noise = math.sqrt(self._range_variance)
+        join, hump = self.params.join_m + 3.0 * noise, self.params.hump_m + 2.5 * noise
+        bank = self._bank
+        radius_sd = np.sqrt(bank.covariance[:, RADIUS, RADIUS])
+        round_ = (bank.scans >= _ROUND_SCANS) & (radius_sd < _ROUND_SD_M)
+        return segments(beams, taken, x, y, label, round_, join, hump), off
+
+    def _use(self, beams: Beams, found: Segments, track: Array, origin: Array) -> None:
+        """Fit the groups, and update, start and drop tracks by them."""
+        bank, p = self._bank, self.params
+        known = np.unique(track[track != NONE])
+        new = np.flatnonzero(track == NONE)
+        group_of_track = np.full(bank.count, NONE)
+        group_of_track[known] = np.arange(known.size)
+        group = np.where(track == NONE, 0, group_of_track[track]) if bank.count else track.copy()
+        group[new] = known.size + np.arange(new.size)
+        groups = known.size + new.size
+        self._walls = []
+        updated = np.zeros(bank.count, dtype=bool)
+        if groups:
+            radius = np.full(groups, p.radius_m)
+            variance = np.full(groups, p.radius_sd_m**2)
+            radius[: known.size] = bank.state[known, RADIUS]
+            variance[: known.size] = bank.covariance[known, RADIUS, RADIUS] + 0.03**2
+            outline = outline_of(beams, found, group, groups, radius)
+            fitted = fit(outline.returns, outline.start, radius, variance, self._range_variance)
+            wall = self._is_wall(fitted, outline)
+            is_known = np.arange(groups) < known.size
+            round_known = (~wall & is_known).nonzero()[0]
+            self._correct(known[round_known], round_known, fitted, origin)
+            updated[known[round_known]] = True
+            self._learn_noise(fitted, outline, ~wall)
+            noise = math.sqrt(self._range_variance)
+            judge_motion(
+                bank, known[round_known], round_known, fitted, outline, noise, self._appeared
             )
-        found += [Circle(center_m=point, radius_m=robot_radius_m) for point in self._points]
-        return tuple(found)
+            new = (~wall & ~is_known).nonzero()[0]
+            new = new[~fragments(new, fitted, outline, wall, noise)]
+            self._start(new, fitted, outline, origin)
+            self._walls = thinned(found, wall[group[found.segment]])
+        drop_lost(bank, beams, origin, updated, self._pose_sd(origin, bank.state), p)
 
-    def _associate(self, points: Array) -> Array:
-        """Index of the nearest track within gate_m for each point, -1 for none; (k,)."""
-        if not self.tracks or not len(points):
-            return np.full(len(points), -1)
-        states = np.array([track.state for track in self.tracks])
-        off = points[:, None, :] - states[None, :, :2]
-        residual = np.abs(np.hypot(off[..., 0], off[..., 1]) - states[:, 4])
-        track_of = residual.argmin(axis=1)
-        far = residual[np.arange(len(points)), track_of] > self.params.gate_m
-        track_of[far] = -1
-        return track_of
+    def _is_wall(self, fitted: Fit, outline: Outline) -> Array:
+        """Groups that are no circles: too wide, or far from round; (g,)."""
+        limit = 0.06 + 3.0 * math.sqrt(self._range_variance)
+        wall: Array = (
+            (fitted.z[:, 2] > self.params.widest_m)
+            | (outline.width_m > 2.0 * self.params.widest_m)
+            | (fitted.rms_m > limit)
+        )
+        return wall
 
-    def _correct(
-        self, track: Track, points: Array, pose: Pose2D, free: Array, longest_m: float
-    ) -> None:
-        """Update a track by its returns and by beams through it without a return."""
-        p = self.params
-        count = min(len(points), _MAX_HITS)
-        taken = points[np.linspace(0, len(points) - 1, count).round().astype(int)].tolist()
-        beams = self._beams_through(track, pose, free, longest_m)
-        before = track.state, track.covariance
-        variance = p.range_sd_m**2 * max(1.0, count / max(len(points), 1))
-        for retry in (False, True):
-            squared_innovation = 0.0
-            for px, py in taken:
-                squared_innovation += track.update_hit(px, py, variance)
-            for ux, uy in beams:
-                squared_innovation += track.update_miss(pose.x, pose.y, ux, uy, variance)
-            if retry or squared_innovation <= 9.0 + 3.0 * (count + len(beams)):
-                return
-            # The obstacle has turned: its velocity is unknown again.
-            track.state, covariance = before
-            track.covariance = [list(row) for row in covariance]
-            for axis in (2, 3):
-                track.covariance[axis][axis] += p.speed_sd_mps**2
-            for axis in (0, 1):
-                track.covariance[axis][axis] += p.range_sd_m**2
-
-    @staticmethod
-    def _beams_through(
-        track: Track, pose: Pose2D, free: Array, longest_m: float
-    ) -> list[tuple[float, float]]:
-        """A few free beams through the circle, those nearest to its centre first."""
-        x, y, _, _, r = track.state
-        ox, oy = x - pose.x, y - pose.y
-        if not len(free) or math.sqrt(ox * ox + oy * oy) <= r:
-            return []
-        along = free[:, 0] * ox + free[:, 1] * oy
-        across = np.abs(free[:, 0] * oy - free[:, 1] * ox)
-        depth = np.sqrt(np.maximum(r * r - across * across, 0.0))
-        through = np.flatnonzero((across < r) & (along > 0.0) & (along - depth < longest_m))
-        deepest = through[np.argsort(across[through], kind="stable")[:_MAX_MISSES]]
-        return [(ux, uy) for ux, uy in free[deepest].tolist()]
-
-    def _start_tracks(self, points: Array, pose: Pose2D, stamp_ns: int) -> None:
-        """A new track for each group of returns; points at rest for a group too wide."""
-        if not len(points):
+    def _correct(self, index: Array, group: Array, fitted: Fit, origin: Array) -> None:
+        """Update tracks by their groups, less the error of the odometry."""
+        bank, error = self._bank, self._pose_error
+        measured = fitted.z[group, :2]
+        predicted, covariance = bank.expected(index)
+        covariance += fitted.covariance[group][:, :2, :2]
+        settled = bank.scans[index] >= _KNOWN
+        left = error.estimate(measured, predicted, covariance, settled, origin)
+        if not index.size:
             return
-        p = self.params
-        difference = np.roll(points, -1, axis=0) - points
-        cuts = np.flatnonzero(np.hypot(difference[:, 0], difference[:, 1]) > p.join_m) + 1
-        if len(cuts):
-            points = np.roll(points, -cuts[0], axis=0)
-            groups = np.split(points, cuts[1:] - cuts[0])
-        else:
-            groups = [points]
-        for group in groups:
-            if math.dist(group[0], group[-1]) > p.widest_m:
-                self._points += [(x, y) for x, y in group.tolist()]
-                continue
-            middle = group.mean(axis=0)
-            ux, uy = (middle - np.array(pose.position)).tolist()
-            distance_m = math.sqrt(ux * ux + uy * uy) or 1e-9
-            mx, my = middle.tolist()
-            r = p.radius_m
-            position_sd, speed_sd = p.position_sd_m, p.speed_sd_mps
-            track = Track(
-                [mx + ux / distance_m * r, my + uy / distance_m * r, 0.0, 0.0, r],
-                [position_sd, position_sd, speed_sd, speed_sd, p.radius_sd_m],
-                stamp_ns,
-            )
-            self._correct(track, group, pose, np.empty((0, 2)), math.inf)
-            self.tracks.append(track)
+        sx, sy = error.shift(measured[:, 0], measured[:, 1], origin)
+        information = fitted.information[group]
+        vector = fitted.vector[group]
+        vector -= information[:, :, 0] * sx[:, None] + information[:, :, 1] * sy[:, None]
+        noise = error.noise(measured, left, origin)
+        bank.update(index, information, vector, noise, self.params.speed_sd_mps)
+        bank.known_s[index] += bank.unseen_s[index]
+        bank.unseen_s[index] = bank.predicted_s[index] = 0.0
+        bank.scans[index] += 1
+        bank.rms_m[index] = fitted.rms_m[group]
+        bank.missed[index] = 0
 
-    def _is_kept(self, track: Track, stamp_ns: int) -> bool:
-        p = self.params
-        unobserved_s = (stamp_ns - track.observed_ns) * NANO
-        too_uncertain = track.covariance[0][0] + track.covariance[1][1] > 0.25
-        return unobserved_s <= p.forget_s and not too_uncertain and track.state[4] > 0.0
+    def _learn_noise(self, fitted: Fit, outline: Outline, round_: Array) -> None:
+        """Learn the range's variance from the residuals of groups of many returns."""
+        count = outline.returns.count
+        many = round_ & (count >= 6.0) & outline.whole
+        if many.any():
+            sample = float(
+                np.sort(fitted.rms_m[many] ** 2 * count[many] / (count[many] - 3.0))[
+                    int(many.sum()) // 2
+                ]
+            )
+            low, high = self.params.range_sd_m**2, 0.05**2
+            learnt = self._range_variance + 0.1 * (sample - self._range_variance)
+            self._range_variance = min(max(learnt, low), high)
+
+    def _appeared(self, x: Array, y: Array) -> Array:
+        """Whether returns (k,) of the present scan lie in space that was seen free."""
+        error = self._pose_error
+        sx, sy = error.shift(x, y, np.array(self._pose.position))
+        margin = 3.0 * math.sqrt(self._range_variance) + 2.0 * error.sd_m
+        return self._free.appeared(x - sx, y - sy, margin)
+
+    def _start(self, group: Array, fitted: Fit, outline: Outline, origin: Array) -> None:
+        """Start a track for each of these groups."""
+        if not group.size:
+            return
+        z = fitted.z[group].copy()
+        sx, sy = self._pose_error.shift(z[:, 0], z[:, 1], origin)
+        z[:, 0] -= sx
+        z[:, 1] -= sy
+        self._bank.add(
+            z, fitted.covariance[group], outline.time_s[group], fitted.rms_m[group],
+            self.params.speed_sd_mps,
+        )  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.planner_types import Ranges, Scan
+from .scan_coverage import covered_sectors, covers_a_full_turn, usable_beams
 from .sensory_vector import SensorParams, mark_sectors, single_precision
 
 # A driver may send the first beam of the next turn as well, and rounds the increment.
@@ -26,8 +27,8 @@ def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: Sensor
 
     yaw_rad is the yaw of the scan's frame in the sectors' frame. As in REP-117, +inf is free
     space and -inf an obstacle nearer than range_min (taken at range_min); NaN and values outside
-    [range_min, range_max] are ignored. A sector without a beam counts as free. Raises InputError
-    for a scan without any usable beam or with unusable geometry: it must not count as free.
+    [range_min, range_max] tell nothing. A sector that no beam covers reads 0.0: it is not known
+    to be free. Raises InputError for a scan without any usable beam or with unusable geometry.
     """
     geometry = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m, yaw_rad)
     if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:
@@ -43,14 +44,20 @@ def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: Sensor
             f"scan of {r.size} beams with angle_increment={scan.angle_increment_rad}: they span "
             f"{turn_rad:.4g} rad, not more than 0 and at most a full turn; check the lidar driver"
         )
-    near = np.isneginf(r)
-    hits = near | ((r >= scan.range_min_m) & (r <= scan.range_max_m) & np.isfinite(r))
-    if not (hits | np.isposinf(r)).any():
-        raise InputError(f"scan of {r.size} beams without one usable range; check the lidar")
+    near, known = np.isneginf(r), usable_beams(scan)
+    if not known.any():
+        raise InputError(
+            f"scan of {r.size} beams without one usable range; check the lidar, and "
+            "scan_no_return if its driver reports free space otherwise than by inf"
+        )
+    hits = known & ~np.isposinf(r)
     d = np.where(near, scan.range_min_m, r)
     hits &= np.where(hits, d, np.inf) - robot_radius_m <= params.sensing_range_m
     angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hits) + yaw_rad
     ranges = [math.inf] * params.sectors
     for distance_m, angle in zip(d[hits].tolist(), angles.tolist()):
         mark_sectors(ranges, distance_m, robot_radius_m, angle)
+    if not covers_a_full_turn(scan, known):
+        for sector in np.flatnonzero(~covered_sectors(scan, known, params.sectors, -yaw_rad)):
+            ranges[sector] = 0.0
     return single_precision(ranges)

@@ -85,6 +85,17 @@ def sense_circles(
     return single_precision(ranges)
 
 
+def enlarged_radii(count: int, radii_m: Sequence[float], robot_radius_m: float) -> list[float]:
+    """The radii of `count` obstacles enlarged by the robot; a single radius holds for all.
+
+    Raises InputError unless there is one or one per obstacle.
+    """
+    radii = list(radii_m) * count if len(radii_m) == 1 else radii_m
+    if len(radii) != count:
+        raise InputError(f"{count} obstacles but {len(radii)} obstacle_radii_m; give one each")
+    return [r + robot_radius_m for r in radii]
+
+
 def single_precision(ranges: Sequence[float]) -> Ranges:
     """Round to float32 and back, as a message does."""
     if ranges.count(math.inf) == len(ranges):

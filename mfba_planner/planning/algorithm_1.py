@@ -65,6 +65,7 @@ def decide(obs: Observation, mode: Mode, params: PlannerParams, generate: Genera
         waypoint=waypoint,
         velocity=velocity,
         candidates=candidates,
+        perception="sectors" if obs.ranges_m else "",
     )
 
 

@@ -92,12 +92,7 @@ class BasePlanner:
         return with_odometry_jump(self._decision(obs, move), odometry_jump_reason)
 
     def _missing_input(self, obs: Observation) -> tuple[Event, str] | None:
-        given = {
-            "sectors": bool(obs.ranges_m),
-            "circles": obs.circles is not None,
-            "scan": obs.scan is not None,
-        }
-        if not self.inputs or any(given[name] for name in self.inputs):
+        if not self.inputs or set(_given_inputs(obs)) & set(self.inputs):
             return None
         return Event.INVALID, f"refused input: none of {', '.join(self.inputs)}"
 
@@ -127,4 +122,20 @@ class BasePlanner:
             waypoint=waypoint,
             velocity=move.velocity,
             candidates=move.candidates,
+            perception=self._perception(obs),
         )
+
+    def _perception(self, obs: Observation) -> str:
+        """The input by which move() perceives obstacles: the first of circles, scan, sectors."""
+        given = _given_inputs(obs)
+        return next((name for name in reversed(given) if name in self.inputs), "")
+
+
+def _given_inputs(obs: Observation) -> list[str]:
+    """Names of the inputs that an observation holds, the most informative one last."""
+    given = (
+        ("sectors", bool(obs.ranges_m)),
+        ("scan", obs.scan is not None),
+        ("circles", obs.circles is not None),
+    )
+    return [name for name, is_given in given if is_given]

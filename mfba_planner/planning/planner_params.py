@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 
+from ..core.errors import ConfigError
 from ..core.option_specs import check, option
-from ..core.planner_types import NANO
+from ..core.planner_types import NANO, ROBOT_RADIUS_M
+from ..core.robot_base import Base
 from ..swarm.bat_swarm import BatParams
 from .gap_vector import GapHeading
 from .progress_checker import ProgressParams
@@ -22,6 +24,14 @@ class Method(Enum):
     PREDICTIVE = "predictive"
 
 
+class PerceptionInput(Enum):
+    """What the predictive planner perceives obstacles by; auto: a scan wherever there is one."""
+
+    AUTO = "auto"
+    SCAN = "scan"
+    SECTORS = "sectors"
+
+
 class Swarm(Enum):
     """A fresh swarm at every goal step, or one persistent swarm for the trip."""
 
@@ -30,8 +40,11 @@ class Swarm(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerParams:
-    """The reading `section6` of Algorithm 1 and section 6.2."""
+class PlannerParams(Base):
+    """The reading `section6` of Algorithm 1 and section 6.2, and the robot it plans for.
+
+    In a run the robot's radius, drive and limits are the scenario's; see for_robot().
+    """
 
     method: Method = option(Method.PAPER, "Algorithm 1 of the paper, or our predictive planner")
     jump_m: float = option(
@@ -41,12 +54,16 @@ class PlannerParams:
         minimum=0.01,
         maximum=1e6,
     )
-    scan_radius_m: float = option(
-        0.0,
-        "predictive: distance kept from tracked scan obstacles; 0: use sectors, no scan",
+    perception: PerceptionInput = option(
+        PerceptionInput.AUTO,
+        "predictive: obstacles from the scan or from the sectors; auto: the scan if there is one",
+    )
+    robot_radius_m: float = option(
+        ROBOT_RADIUS_M,
+        "radius of the robot: every obstacle is enlarged by it (Fig. 4)",
         unit="m",
         minimum=0.0,
-        maximum=10.0,
+        maximum=100.0,
     )
     speed_mps: float = option(0.785, "robot speed", unit="m/s", minimum=0.01, maximum=100.0)
     step_length_m: float = option(
@@ -56,7 +73,11 @@ class PlannerParams:
         0.02, "distance at which the goal counts as reached", unit="m", minimum=1e-6, maximum=10.0
     )
     input_timeout_s: float = option(
-        1.0, "age at which odometry or sectors are stale", unit="s", minimum=0.001, maximum=3600.0
+        1.0,
+        "age at which odometry, sectors or scan are stale, since their arrival or by their stamps",
+        unit="s",
+        minimum=0.001,
+        maximum=3600.0,
     )
     gap_heading: GapHeading = option(
         GapHeading.BOUNDARY,
@@ -71,8 +92,12 @@ class PlannerParams:
     progress: ProgressParams = field(default_factory=ProgressParams)
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range."""
+        """Raise ConfigError for a value out of range, or a perception the method does not use."""
         check(self)
+        if self.perception is PerceptionInput.SCAN and self.method is Method.PAPER:
+            raise ConfigError(
+                "perception=scan: method=paper reads sectors only; give auto, or method=predictive"
+            )
 
     @property
     def label(self) -> str:
@@ -86,6 +111,14 @@ class PlannerParams:
         return round(self.step_length_m / self.speed_mps / NANO)
 
     @property
-    def tracks_scan(self) -> bool:
-        """Whether the planner uses the scan in addition to the sectors."""
-        return self.method is Method.PREDICTIVE and self.scan_radius_m > 0.0
+    def reads_scan(self) -> bool:
+        """Whether the planner uses a scan, if there is one, in addition to the sectors."""
+        return self.method is Method.PREDICTIVE and self.perception is not PerceptionInput.SECTORS
+
+    def for_robot(self, radius_m: float, base: Base) -> PlannerParams:
+        """These options for a robot of that radius, drive and limits."""
+        return replace(
+            self,
+            robot_radius_m=radius_m,
+            **{item.name: getattr(base, item.name) for item in fields(Base)},
+        )

@@ -11,14 +11,17 @@ import numpy as np
 
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
-from ..core.planner_types import NANO, ROBOT_RADIUS_M, Bits, Circle, Observation, Ranges
+from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
+from ..perception.scan_coverage import ScanCoverage
 from ..perception.sensory_vector import SensorParams, sense_circles
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
+from .differential_drive import Speeds, apply_command, command
+from .drive_rollout import DriveRollout
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
@@ -35,7 +38,10 @@ LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a direction is needed
 HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
+# A differential drive cannot step aside when an obstacle beside it turns towards it.
+TURNING_MARGIN_M = 0.1
 _FREE_M = 1e-9
+_STILL_M = 1e-4
 _LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
 
 
@@ -50,13 +56,6 @@ class PredictiveParams:
     search_m: float = option(
         0.3, "radius of the disc the bats search", unit="m", minimum=0.001, maximum=100.0
     )
-    robot_radius_m: float = option(
-        ROBOT_RADIUS_M,
-        "radius of the robot, by which scan obstacles are enlarged",
-        unit="m",
-        minimum=0.0,
-        maximum=10.0,
-    )
     sector_radius_m: float = option(
         0.3,
         "radius of the circle that replaces a set sector",
@@ -64,6 +63,10 @@ class PredictiveParams:
         minimum=0.01,
         maximum=10.0,
     )
+    coverage_s: float = option(
+        1.0, "time for which an observed direction stays observed", unit="s", minimum=0.0,
+        maximum=60.0,
+    )  # fmt: skip
     memory: ObstacleMemoryParams = field(default_factory=ObstacleMemoryParams)
     tracking: TrackingParams = field(default_factory=TrackingParams)
     risk: RiskParams = field(default_factory=RiskParams)
@@ -98,6 +101,10 @@ class Predictive(BasePlanner):
     reads_sectors = False
     preset = staticmethod(preset)
     _perceived: Sequence[Circle] = ()
+    _by_sectors = True
+    _speeds: Speeds = Speeds()
+    _unobserved: np.ndarray | None = None  # headings the lidar has not covered; None: none
+    _coverage: ScanCoverage
 
     def __init__(
         self,
@@ -126,10 +133,12 @@ class Predictive(BasePlanner):
         position = obs.pose.position
         last_waypoint, self._waypoint = self._waypoint, None
         self._perceived = circles = self._circles(obs)
-        if not circles:
+        self._by_sectors = obs.circles is None and obs.scan is None
+        self._unobserved = None if obs.scan is None else self._coverage.uncovered(obs.stamp_ns)
+        if not circles and self._is_observed((goal[0] - position[0], goal[1] - position[1])):
             self._changes.not_enclosed()
             straight = self.straight(position, goal, self.params.speed_mps)
-            return Move(velocity=straight, reason="no obstacle within SR")
+            return Move(velocity=straight, reason="no obstacle in range")
         at_rest = ObstaclesAtRest(position, circles)
         misplaced = at_rest.misplaced()
         if misplaced:
@@ -151,10 +160,15 @@ class Predictive(BasePlanner):
         speed, tick_s = self.params.speed_mps, self.tick_s
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
-        costs = TrajectoryCost(position, circles, self.options.risk, tick_s, speed)
+        drive = self._drive_rollout(obs)
+        risk = self.options.risk
+        if drive is not None:
+            risk = replace(risk, margin_m=risk.margin_m + TURNING_MARGIN_M)
+        costs = TrajectoryCost(position, circles, risk, tick_s, speed, drive)
         share = min(1.0, speed * tick_s / goal_distance)
         waypoint, t1 = (to_goal[0] * share, to_goal[1] * share), share * goal_distance / speed
-        least = costs.cost(waypoint, t1, to_goal, speed)
+        observed = self._is_observed(to_goal)
+        least = costs.cost(waypoint, t1, to_goal, speed) if observed else math.inf
         if least <= goal_distance + _FREE_M:
             straight = self.straight(position, goal, speed)
             return Move(velocity=straight, reason="the straight way is free")
@@ -163,16 +177,23 @@ class Predictive(BasePlanner):
         if enclosure and self._changes.at_rest(obs):
             return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
+        if drive is not None:  # where the bits, which know the turn but not the arc, are wrong
+            gaps = sorted({*gaps, *range(0, len(vs), len(vs) // HEADINGS_IF_CLOSED)})
         candidates = self._waypoints(gaps, to_goal, goal_distance)
         if last_waypoint is not None:  # often still the best: then most others need no evaluation
             q = (last_waypoint[0] - x, last_waypoint[1] - y)
             candidates.insert(
                 0, (-math.inf, q, max(distance((0.0, 0.0), q) / speed, tick_s), _LAST_WAYPOINT)
             )
+        if self._unobserved is not None:
+            candidates = [item for item in candidates if self._is_observed(item[1])]
         found = costs.cheapest(candidates, to_goal, speed, least)
         if found is not None:
             waypoint, t1, least = found
         swarm = self._refine(costs, waypoint, to_goal, least, obs.stamp_ns)
+        if not min(swarm.best_value, least) < math.inf:
+            reason = "no direction that the lidar has covered leads on"
+            return Move(velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=vs, vg=vs)
         if swarm.best_value < least:
             (qx, qy), least = swarm.best_x, swarm.best_value
             waypoint = (qx, qy)
@@ -200,7 +221,16 @@ class Predictive(BasePlanner):
 
     def _closed_headings(self, costs: TrajectoryCost) -> Bits:
         speed = self.params.speed_mps
-        return tuple(costs.closed(self._cos * speed, self._sin * speed).tolist())
+        closed = costs.closed(self._cos * speed, self._sin * speed)
+        if self._unobserved is not None:
+            closed |= self._unobserved
+        return tuple(closed.tolist())
+
+    def _is_observed(self, offset: Point) -> bool:
+        """Whether the lidar has covered the direction of an offset; standing still needs none."""
+        if self._unobserved is None or math.hypot(*offset) < _STILL_M:
+            return True
+        return not self._unobserved[self._gap(offset) - 1]
 
     def _enclosure(self, position: Point, at_rest: ObstaclesAtRest) -> str:
         """Why no path leads out between obstacles at rest; "" if one does, or a heading is open.
@@ -223,31 +253,60 @@ class Predictive(BasePlanner):
         return replace(move, velocity=(share * vx, share * vy), reason=f"{move.reason}; {note}")
 
     def surroundings(self, position: Point) -> Ranges:
-        """Range per sector to the circles of the last decision, inf where there are none."""
+        """Range per sector to the circles of the last decision, inf where there are none.
+
+        0 where no beam has covered a direction; empty if the decision was made on sectors.
+        """
+        if self._by_sectors:
+            return ()
         sensor = replace(self.sensor, sensing_range_m=self.options.reach_m)
         circles = [(circle.center_m, circle.radius_m) for circle in self._perceived]
-        return sense_circles(position, circles, sensor)
+        ranges = list(sense_circles(position, circles, sensor))
+        if self._unobserved is not None:
+            count, n = len(ranges), self.options.headings
+            for k in np.flatnonzero(self._unobserved).tolist():
+                ranges[(k + 1) * count // n % count] = 0.0
+        return tuple(ranges)
+
+    def plan(self, obs: Observation) -> Decision:
+        """Decide, and for a differential drive keep the speeds that the decision leads to."""
+        decision = super().plan(obs)
+        if self.params.turns:
+            tick_ns = self.params.tick_ns
+            given = command(decision, self.params, tick_ns)
+            _, self._speeds = apply_command(obs.pose, self._speeds, given, self.params, tick_ns)
+        return decision
 
     def forget(self) -> None:
         """Drop the last waypoint, the tracks and the remembered circles."""
         self._waypoint = None
         self._perceived = ()
+        self._speeds = Speeds()
+        self._unobserved = None
+        self._coverage = ScanCoverage(self.options.headings, self.options.coverage_s)
         self._changes = SectorChanges()
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
-        """Circles at obs.stamp_ns: given and remembered, tracked, or one for each set sector."""
+        """Circles at obs.pose_ns: given and remembered, tracked, or one for each set sector."""
         stamp_ns, pose = obs.sensed or (obs.stamp_ns, obs.pose)
         if obs.circles is not None:
             reach_m = self.sensor.sensing_range_m
             known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
-            return predicted_circles(known, (obs.stamp_ns - stamp_ns) * NANO)
+            return predicted_circles(known, (obs.pose_ns - stamp_ns) * NANO)
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
-            radius_m = self.params.scan_radius_m or self.options.robot_radius_m
-            return self._tracker.circles(obs.stamp_ns, radius_m)
+            self._coverage.update(stamp_ns, obs.scan)
+            return self._tracker.circles(obs.pose_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
+
+    def _drive_rollout(self, obs: Observation) -> DriveRollout | None:
+        """The rollout of a differential drive from its present state; None for others."""
+        if not self.params.turns:
+            return None
+        speed = self.params.speed_mps
+        return DriveRollout(self.params, obs.pose.yaw, self._speeds, speed, self.tick_s)
 
     def _nearest_free(self, closed: Bits, to_goal: Point) -> list[int]:
         """The free headings nearest to the goal's on both sides; every sixth if none is free."""
@@ -295,7 +354,10 @@ class Predictive(BasePlanner):
             for qx, qy in swarm.ask():
                 # At least one tick: the velocity is held that long and must not overshoot.
                 t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
-                values.append(costs.cost((qx, qy), t1, to_goal, speed, bound))
+                if self._is_observed((qx, qy)):
+                    values.append(costs.cost((qx, qy), t1, to_goal, speed, bound))
+                else:
+                    values.append(math.inf)
             swarm.tell(values)
             bound = min(bound, swarm.best_value)
         return swarm

@@ -13,9 +13,11 @@ import numpy as np
 from ..core.geometry import Point, towards
 from ..core.option_specs import check, option
 from ..core.planner_types import Circle, Ranges
+from .drive_rollout import DriveRollout
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12
+SLOW = 0.9  # share of the speed below which a candidate waits
 _Row = tuple[float, float, float, float, float, float, float, float, float]
 _by_clearance = itemgetter(0)
 Candidate = tuple[float, Point, float, int]
@@ -69,8 +71,13 @@ class TrajectoryCost:
         params: RiskParams,
         tick_s: float,
         speed_mps: float = math.inf,
+        drive: DriveRollout | None = None,
     ) -> None:
-        """Take the present circles; those out of reach within the horizon are left out."""
+        """Take the present circles; those out of reach within the horizon are left out.
+
+        With a drive, the risk is that of the path which a differential base takes.
+        """
+        self._drive = drive
         self.params = params
         px, py = position
         tau, per_mps = params.horizon_s, params.margin_ticks * tick_s
@@ -96,6 +103,10 @@ class TrajectoryCost:
         if not self._rows:
             return np.zeros(ux.shape, dtype=int)
         _, x, y, vx, vy, _, _, outer, away = np.array(self._rows).T[:, :, None]
+        if self._drive is not None:
+            delay = self._drive.turn_delay.towards_all(ux, uy)
+            x, y = x + vx * delay, y + vy * delay
+            away = x * x + y * y
         wx, wy = vx - ux, vy - uy
         b = x * wx
         b += y * wy
@@ -157,6 +168,13 @@ class TrajectoryCost:
         if total >= bound:
             return total
         budget, tau = bound - total, self._tau
+        if self._drive is not None:
+            turns_s = self._drive.turn_delay.towards(qx, qy)
+            total += self._waiting * speed * turns_s
+            budget = bound - total
+            if budget <= 0.0:
+                return total
+            return total + self._rollout_risk(waypoint, t1, to_goal, budget)
         risk = self._segment_risk(
             0.0, 0.0, 0.0, 0.0, qx / t1, qy / t1, t1 if t1 < tau else tau, budget
         )
@@ -168,6 +186,25 @@ class TrajectoryCost:
             if later > risk:
                 risk = later
         return total + risk
+
+    def _rollout_risk(self, waypoint: Point, t1: float, to_goal: Point, budget: float) -> float:
+        """The risk of cost() on the path that a differential drive takes."""
+        assert self._drive is not None
+        (qx, qy), tau = waypoint, self._tau
+        share = math.sqrt(qx * qx + qy * qy) / (t1 * self._drive.full_mps)
+        wait_s = t1 if share < SLOW else 0.0
+        worst = 0.0
+        for x, y, t, driven, ux, uy, lasts in self._drive.stretches(
+            waypoint, wait_s, share, to_goal, tau
+        ):
+            if driven >= tau:
+                break
+            risk = self._segment_risk(x, y, t, driven, ux, uy, lasts, budget)
+            if risk > worst:
+                worst = risk
+                if worst >= budget:
+                    break
+        return worst
 
     def _leave_out_unreachable(self, to_goal: Point, bound: float) -> None:
         """Leave circles out of cost() that no candidate with a cost below the bound can reach.

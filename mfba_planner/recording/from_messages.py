@@ -11,16 +11,16 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-import numpy as np
-
 from ..core.errors import FrameError, InputError
 from ..core.geometry import Point, Pose2D, yaw_from_quaternion
 from ..core.planner_types import Decision, Mode, Ranges, RefusalReason, Scan
+from ..core.robot_base import Base
+from ..perception.no_return import NoReturn, rep_117
 from ..perception.sensory_vector import blind
-from ..simulation.differential_drive import command
-from ..simulation.robot_model import Base
+from ..planning.differential_drive import command
 
 SECOND_NS = 1_000_000_000
+LONGEST_SCAN_S = 10.0  # from first to last beam
 
 T = TypeVar("T")
 
@@ -124,18 +124,52 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
     return ranges
 
 
-def laser_scan(message: Any, frame: str = "") -> Scan:
-    """sensor_msgs/LaserScan to a Scan; FrameError for another frame.
+def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF) -> Scan:
+    """sensor_msgs/LaserScan to a Scan; beams that turn clockwise are put in reverse sequence.
 
-    perception.scan_to_sectors.sense_scan checks the ranges.
+    Raises FrameError for another frame, and InputError where the fields contradict each other.
+    perception.scan_to_sectors.sense_scan checks the ranges. As some drivers leave angle_max at
+    0 or one increment too far, it is only compared roughly, and not where both limits are 0.
+    no_return is the range by which the driver reports that nothing is there.
     """
     require_frame(message, frame, "scan", "scan_frame")
+    count, increment = len(message.ranges), message.angle_increment
+    first, last = message.angle_min, message.angle_max
+    if not count:
+        raise InputError("scan holds 0 ranges; check the lidar driver")
+    _finite("scan angle_min, angle_max or angle_increment", (first, last, increment))
+    if not message.range_max > message.range_min >= 0.0:
+        raise InputError(
+            f"scan has range_min={message.range_min:g}, range_max={message.range_max:g}: not "
+            "0 <= range_min < range_max; check the lidar driver"
+        )
+    if count > 1 and increment == 0.0:
+        raise InputError(
+            f"scan of {count} beams has angle_increment=0: all in one direction; "
+            "check the lidar driver"
+        )
+    spanned = count if count == 1 or first == last == 0.0 else (last - first) / increment + 1.0
+    if abs(spanned - count) > max(2.0, 0.02 * count):
+        raise InputError(
+            f"scan holds {count} ranges, but angle_min={first:g}, angle_max={last:g} and "
+            f"angle_increment={increment:g} make {spanned:.0f}; check the lidar driver"
+        )
+    time_s = float(message.time_increment)
+    if not 0.0 <= time_s * count <= LONGEST_SCAN_S:
+        raise InputError(
+            f"scan of {count} beams has time_increment={time_s:g} s: not from 0 to "
+            f"{LONGEST_SCAN_S:g} s in all; check the lidar driver"
+        )
+    ranges = rep_117(message.ranges, message.range_max, no_return)
+    if increment < 0.0:
+        first, increment, ranges = first + (count - 1) * increment, -increment, ranges[::-1]
     return Scan(
-        ranges_m=np.asarray(message.ranges, dtype=np.float64),
-        angle_min_rad=message.angle_min,
-        angle_increment_rad=message.angle_increment,
+        ranges_m=ranges,
+        angle_min_rad=first,
+        angle_increment_rad=increment,
         range_min_m=message.range_min,
         range_max_m=message.range_max,
+        time_increment_s=time_s,
     )
 
 
@@ -186,6 +220,23 @@ def decision_field(diagnostics: Any, key: str) -> str:
     return next((item.value for item in diagnostics.status[0].values if item.key == key), "")
 
 
+def scan_fields(pose_stamp_ns: int | None, scan_pose: Pose2D) -> dict[str, str]:
+    """Keys of planner/decision for a scan older than the pose: its pose, and the pose's stamp."""
+    return {"pose_stamp_ns": str(pose_stamp_ns), "scan_pose": ",".join(map(repr, scan_pose))}
+
+
+def scan_timing(diagnostics: Any) -> tuple[int | None, Pose2D | None]:
+    """Inverse of scan_fields, None without them. InputError if malformed."""
+    stamp, pose = (decision_field(diagnostics, key) for key in ("pose_stamp_ns", "scan_pose"))
+    if not stamp and not pose:
+        return None, None
+    try:
+        x, y, yaw = map(float, pose.split(","))
+        return int(stamp), Pose2D(x, y, yaw)
+    except ValueError as error:
+        raise InputError(f"planner/decision: malformed {error}; was it edited?") from None
+
+
 def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:
     """planner/decision and the ranges of its stamp to a Decision; InputError if malformed."""
     try:
@@ -206,6 +257,7 @@ def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:
             waypoint=parse_points(fields["waypoint"])[0],
             velocity=parse_points(fields["velocity"])[0],
             candidates=parse_points(fields["candidates"]),
+            perception=fields.get("perception", ""),
         )
     except (KeyError, ValueError, IndexError) as error:
         raise InputError(

@@ -10,6 +10,7 @@ from ..core.errors import BagError, ConfigError, InputError
 from ..core.geometry import Pose2D
 from ..core.option_specs import flatten, override
 from ..core.planner_types import Decision
+from ..perception.no_return import NoReturn
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..scenarios.scenario_files import load_scenario
@@ -24,7 +25,15 @@ from .fleet_topics import NO_NAMESPACE
 T = TypeVar("T")
 
 # Options that older bags lack; their defaults are the behaviour of that time, ...
-NEWER_OPTIONS = ("method", "jump_m", "scan_radius_m", "speed_limit.", "recovery.", "progress.")
+NEWER_OPTIONS = (
+    "method",
+    "jump_m",
+    "perception",
+    "robot_radius_m",
+    "speed_limit.",
+    "recovery.",
+    "progress.",
+)
 # ... but for this one, which was off.
 BEHAVIOUR_THEN = {"progress.time_allowance_s": 0.0}
 
@@ -40,6 +49,7 @@ class Setup(NamedTuple):
     lockstep: bool
     odom_frame: str = ""  # required frame of the inputs; "": any
     scan_frame: str = ""  # required frame of the scans; "": any
+    scan_no_return: NoReturn = NoReturn.INF
 
     def episode(self, ticks: tuple[Decision, ...], truth: Mapping[int, Pose2D] = {}) -> Episode:
         """The Episode of these decisions, at least one; `truth` is the true pose by stamp."""
@@ -88,6 +98,7 @@ def read_setups(reader: BagReader) -> Setups:
                 lockstep=bool(planner["lockstep"]),
                 odom_frame=planner.get("odom_frame", ""),
                 scan_frame=sensor.get("scan_frame", ""),
+                scan_no_return=NoReturn(sensor.get("scan_no_return", NoReturn.INF.value)),
             )
         single = setups.get(NO_NAMESPACE)
         return Setups(scenario, single.seed if single else world["seed"], setups)

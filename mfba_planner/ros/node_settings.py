@@ -11,12 +11,15 @@ from enum import Enum
 
 from ..core.option_specs import check, option
 from ..core.planner_types import ROBOT_RADIUS_M
+from ..perception.no_return import NoReturn
 from ..planning.planner_params import PlannerParams
-from ..simulation.robot_model import Base, Robot
+from ..simulation.robot_model import Robot
 
 _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
 _WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause (false) starts it"
+_NO_RETURN = "the range by which the lidar reports that nothing is there; inf: REP-117"
 _DIAGNOSTICS = "period of /diagnostics"
+_SCAN_FRAME = "frame that scans must be in, that of scan_yaw; empty: any"
 _HARDWARE = "hardware_id of /diagnostics, to tell robots apart"
 
 
@@ -90,7 +93,7 @@ class VirtualSensorSettings:
     source: Source = option(Source.OBSTACLES, "obstacles (the paper) or scan (any LaserScan)")
     robot_radius_m: float = option(
         ROBOT_RADIUS_M,
-        "added to every obstacle (Fig. 4)",
+        "radius of the robot: every obstacle is enlarged by it (Fig. 4)",
         unit="m",
         minimum=0.0,
         maximum=100.0,
@@ -98,12 +101,13 @@ class VirtualSensorSettings:
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )
-    scan_frame: str = option("", "frame that scans must be in, that of scan_yaw; empty: any")
+    scan_frame: str = option("", _SCAN_FRAME)
+    scan_no_return: NoReturn = option(NoReturn.INF, _NO_RETURN)
     lockstep: bool = option(False, "pair odom with scan by stamp; false: newest odom")
     odom_frame: str = option("odom", "frame the sectors are aligned with")
     input_timeout_s: float = option(
         1.0,
-        "age at which /diagnostics calls odometry and scan stale",
+        "age at which odometry, sectors or scan are stale, since their arrival or by their stamps",
         unit="s",
         minimum=0.001,
         maximum=3600.0,
@@ -118,7 +122,7 @@ class VirtualSensorSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerSettings(Base):
+class PlannerSettings:
     """Settings of planner; PlannerParams are its parameters too."""
 
     seed: int = option(0, "seed of all random draws", minimum=0, maximum=2**63 - 1)
@@ -132,6 +136,8 @@ class PlannerSettings(Base):
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )
+    scan_frame: str = option("", _SCAN_FRAME)
+    scan_no_return: NoReturn = option(NoReturn.INF, _NO_RETURN)
     diagnostics_period_s: float = option(1.0, _DIAGNOSTICS, unit="s", minimum=0.01, maximum=3600.0)
     hardware_id: str = option("none", _HARDWARE)
     autostart: bool = option(

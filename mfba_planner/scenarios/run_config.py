@@ -18,8 +18,9 @@ from ..core.geometry import Pose2D
 from ..core.option_specs import Scalar, check, flatten, option
 from ..core.planner_types import NANO
 from ..perception.sensory_vector import SensorParams
-from ..planning.planner_params import PlannerParams
+from ..planning.planner_params import PerceptionInput, PlannerParams
 from ..simulation.fleet import robot_seed, scenarios_with_others
+from ..simulation.robot_model import DEFAULT_BEAMS
 from ..simulation.scenario import Scenario
 from .scenario_json import scenario_to_json
 
@@ -55,17 +56,25 @@ class RunConfig:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range, or an input timeout shorter than a tick."""
         check(self)
-        if self.planner.tracks_scan and not self.scenario.robot.lidar.beams:
-            raise ConfigError(
-                f"planner.scan_radius_m={self.planner.scan_radius_m:g}: the robot has no lidar; "
-                "give robot.lidar.beams=360, or 0"
-            )
         tick_s, timeout_s = self.planner.tick_ns * NANO, self.planner.input_timeout_s
         if self.real_time and timeout_s <= tick_s:
             raise ConfigError(
                 f"planner.input_timeout_s={timeout_s:g}: a tick takes {tick_s:g} s, so in real "
                 "time the robot would stop before each tick; give more, or a shorter step_length_m"
             )
+
+
+def with_perception(scenario: Scenario, planner: PlannerParams) -> tuple[Scenario, PlannerParams]:
+    """Scenario and planner of a run, the planner's perception no longer auto.
+
+    A robot without a lidar gets the default one if its planner reads scans.
+    """
+    if not planner.reads_scan:
+        return scenario, planner
+    robot = scenario.robot
+    if not robot.lidar.beams:
+        robot = replace(robot, lidar=replace(robot.lidar, beams=DEFAULT_BEAMS))
+    return replace(scenario, robot=robot), replace(planner, perception=PerceptionInput.SCAN)
 
 
 def run_facts(config: RunConfig) -> dict[str, Scalar]:
@@ -89,6 +98,9 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     timeout_s = min(config.planner.input_timeout_s / min(config.speed_factor, 1.0), 3600.0)
     # Lockstep is rarely watched, and markers cost more than the decisions.
     common = {"lockstep": lockstep, "wait_for": ",".join(peers)}
+    # In real time, inputs are dated by the world's clock. Faster, a delay of the machine would be
+    # many times as long by that clock, so arrival times count; in lockstep nothing reads a clock.
+    dated = {"use_sim_time": True} if not lockstep and config.speed_factor <= 1.0 else {}
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
     robot = config.scenario.robot
     radii = [obstacle.radius_m for obstacle in config.scenario.obstacles]
@@ -103,6 +115,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             "seed": config.seed,
         },
         "virtual_sensor": common
+        | dated
         | flatten(config.sensor)
         | {
             "robot_radius_m": config.scenario.robot_radius_m,
@@ -110,8 +123,8 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             **({"source": "scan", "scan_yaw": robot.lidar.yaw_rad} if robot.lidar.beams else {}),
         },
         "planner": viewed
-        | flatten(config.planner)
-        | flatten(robot.base)
+        | dated
+        | flatten(config.scenario.planner_params(config.planner))
         | {"seed": config.seed, "scan_yaw": robot.lidar.yaw_rad}
         | ({} if lockstep else {"input_timeout_s": timeout_s}),
     }

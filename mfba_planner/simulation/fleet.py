@@ -13,9 +13,9 @@ from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, bearing, distance, towards
 from ..core.planner_types import NANO, Decision, PathPlanner
 from ..perception.sensory_vector import SensorParams
+from ..planning.differential_drive import command
 from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import supervised_algorithm_1
-from .differential_drive import command
 from .episode import Episode, Outcome
 from .nearby_obstacles import Nearby
 from .obstacle_motion import Obstacle, Turn

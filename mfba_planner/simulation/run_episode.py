@@ -8,10 +8,10 @@ from typing import TypeVar
 
 from ..core.planner_types import Observation, PathPlanner
 from ..perception.sensory_vector import SensorParams
+from ..planning.differential_drive import command
 from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import supervised_algorithm_1
-from .differential_drive import command
 from .episode import Episode, Outcome
 from .fleet import Fleet, run_fleet
 from .planner_observations import Observe, observe_scan, observe_sectors
@@ -103,14 +103,15 @@ def simulate(
     go_on: Callable[[World], bool] = lambda _: True,
 ) -> Episode:
     """simulation.run_episode.run with the planner of planner.method."""
+    params = scenario.planner_params(planner)
     return run(
         scenario,
-        planner=planner,
+        planner=params,
         sensor=sensor,
         seed=seed,
         go_on=go_on,
-        path_planner=make_planner(planner, sensor, seed),
-        observe=observe_scan if planner.tracks_scan else observe_sectors,
+        path_planner=make_planner(params, sensor, seed),
+        observe=observe_scan if params.reads_scan else observe_sectors,
     )
 
 
@@ -123,12 +124,13 @@ def simulate_fleet(
     go_on: Callable[[Fleet], bool] = lambda _: True,
 ) -> tuple[Episode, ...]:
     """simulation.fleet.run_fleet with a planner of planner.method for every robot."""
+    params = scenario.planner_params(planner)
     return run_fleet(
         scenario,
-        planner=planner,
+        planner=params,
         sensor=sensor,
         seed=seed,
         go_on=go_on,
-        path_planner=lambda child: make_planner(planner, sensor, child),
-        observe=observe_scan if planner.tracks_scan else observe_sectors,
+        path_planner=lambda child: make_planner(params, sensor, child),
+        observe=observe_scan if params.reads_scan else observe_sectors,
     )

@@ -10,6 +10,7 @@ from itertools import combinations, pairwise
 from ..core.errors import ConfigError
 from ..core.geometry import Point, distance
 from ..core.planner_types import ROBOT_RADIUS_M
+from ..planning.planner_params import PlannerParams
 from .obstacle_motion import Obstacle, Walls, center_at
 from .robot_model import Robot
 
@@ -84,6 +85,10 @@ class Scenario:
         _check_kidnappings(self)
         if self.robots:
             _check_fleet(self)
+
+    def planner_params(self, params: PlannerParams) -> PlannerParams:
+        """The options of a planner, for this scenario's robot."""
+        return params.for_robot(self.robot_radius_m, self.robot.base)
 
     def enlarged_radius(self, obstacle: Obstacle) -> float:
         """Obstacle radius plus robot radius (Fig. 4), metres."""

@@ -6,8 +6,8 @@ from __future__ import annotations
 from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, distance
 from ..core.planner_types import NANO
+from ..planning.differential_drive import Speeds, apply_command
 from .batched_motion import Motion
-from .differential_drive import Speeds, apply_command
 from .episode import Outcome, stamp_of
 from .nearby_obstacles import Nearby, NearbyObstacles
 from .obstacle_motion import velocity_at

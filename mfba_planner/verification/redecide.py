@@ -12,7 +12,8 @@ from typing import Any
 
 from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner_types import Decision, Ranges, RefusalReason, observe
+from ..core.planner_types import Decision, Ranges, RefusalReason, Scan, observe
+from ..perception.no_return import NoReturn
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import make_planner
@@ -44,6 +45,7 @@ class RedecideParams:
     """Parameters that a recording lacks; goal and scan_yaw_rad None: as recorded."""
 
     robot_radius_m: float
+    scan_no_return: NoReturn = NoReturn.INF
     scan_yaw_rad: float | None = None
     goal: Point | None = None
     scan: str = ""
@@ -207,7 +209,8 @@ class _PlannerRun:
         self._poses = poses
         self._goals = goals
         self._faults = faults
-        self._planner = make_planner(params.planner, params.sensor, params.seed)
+        planner = replace(params.planner, robot_radius_m=params.robot_radius_m)
+        self._planner = make_planner(planner, params.sensor, params.seed)
         self._pose = Pose2D(0.0, 0.0)
         self._counts: Counter[str] = Counter()
 
@@ -241,10 +244,13 @@ class _PlannerRun:
         goal = next((g for t, g in reversed(self._goals) if t <= log_time_ns), None)
         observation = observe(stamp, pose, ranges, goal, self._pose, max(stamp - pose_stamp, 0))
         self._pose = observation.pose
-        if self._params.planner.tracks_scan and not observation.refused:
+        if self._params.planner.reads_scan and not observation.refused:
             yaw = observation.pose.yaw + self._scan_yaw.yaw_rad(scan)
-            observation = replace(observation, scan=aligned(laser_scan(scan), yaw))
+            observation = replace(observation, scan=aligned(self._laser_scan(scan), yaw))
         return self._planner.plan(observation)
+
+    def _laser_scan(self, scan: Any) -> Scan:
+        return laser_scan(scan, no_return=self._params.scan_no_return)
 
     def _measure(self, pose: Pose2D | RefusalReason, scan: Any) -> Ranges | RefusalReason:
         if isinstance(pose, str):
@@ -252,5 +258,6 @@ class _PlannerRun:
         params = self._params
         yaw = pose.yaw + self._scan_yaw.yaw_rad(scan)
         return value_or_refusal(
-            lambda x: sense_scan(laser_scan(x), yaw, params.robot_radius_m, params.sensor), scan
+            lambda x: sense_scan(self._laser_scan(x), yaw, params.robot_radius_m, params.sensor),
+            scan,
         )

@@ -26,6 +26,7 @@ from ..recording.from_messages import (
     laser_scan,
     obstacle_centers,
     robot_pose,
+    scan_timing,
     sector_ranges,
     value_or_refusal,
     velocity,
@@ -155,7 +156,7 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
         observation = observe(tick.stamp_ns, pose_input, ranges, goal, pose)
         pose = observation.pose
         recorded.append(decision)
-        decided.append(planner.plan(_with_scan(setup, tick, observation)))
+        decided.append(planner.plan(_with_scan(setup, tick, decision, observation)))
         faults += _contradictions(setup, tick, decision)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
@@ -174,16 +175,23 @@ def _inputs(setup: Setup) -> list[str]:
     return [
         SECTORS,
         *([ODOM] if setup.lockstep else []),  # in real time the pose of the decision is used
-        *([SCAN] if setup.planner.tracks_scan else []),
+        *([SCAN] if setup.planner.reads_scan and setup.scenario.robot.lidar.beams else []),
     ]
 
 
-def _with_scan(setup: Setup, tick: Tick, obs: Observation) -> Observation:
-    """The observation with the scan, for a planner that tracks scans."""
-    if not setup.planner.tracks_scan or obs.refused or SCAN not in tick.messages:
+def _with_scan(setup: Setup, tick: Tick, recorded: Decision, obs: Observation) -> Observation:
+    """The observation with the scan, where the recorded decision was made on one."""
+    if recorded.perception != "scan" or obs.refused or SCAN not in tick.messages:
         return obs
-    yaw = obs.pose.yaw + setup.scenario.robot.lidar.yaw_rad
-    return replace(obs, scan=aligned(laser_scan(tick.messages[SCAN]), yaw))
+    pose_stamp_ns, scan_pose = scan_timing(tick.messages[DECISION])
+    scan = laser_scan(tick.messages[SCAN], no_return=setup.scan_no_return)
+    yaw = (scan_pose or obs.pose).yaw + setup.scenario.robot.lidar.yaw_rad
+    return replace(
+        obs,
+        scan=aligned(scan, yaw),
+        sensed=(obs.stamp_ns, scan_pose) if scan_pose else None,
+        pose_stamp_ns=pose_stamp_ns,
+    )
 
 
 def _contradictions(setup: Setup, tick: Tick, decision: Decision) -> list[str]:
@@ -226,7 +234,8 @@ def _sectors_match_sensor(setup: Setup, tick: Tick, decision: Decision) -> bool:
     try:
         pose = robot_pose(tick.messages[ODOM])
         if lidar.beams:
-            scan, yaw = laser_scan(tick.messages[SCAN], setup.scan_frame), pose.yaw + lidar.yaw_rad
+            scan = laser_scan(tick.messages[SCAN], setup.scan_frame, setup.scan_no_return)
+            yaw = pose.yaw + lidar.yaw_rad
             return (
                 sense_scan(scan, yaw, scenario.robot_radius_m, setup.sensor) == decision.ranges_m
             )

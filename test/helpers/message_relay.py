@@ -47,12 +47,14 @@ class RelayedGraph:
                 "source": "scan",
                 "scan_frame": "base_link",
                 "input_timeout_s": TIMEOUT_S / SPEED_FACTOR,
+                "use_sim_time": True,
             },
             cli_args=_remapped("odom", "scan"),
         )
         self.planner = graph.start(
             PlannerNode,
             {"step_length_m": 0.08, "speed_mps": 0.8, "input_timeout_s": TIMEOUT_S / SPEED_FACTOR}
+            | {"use_sim_time": True}
             | planner,
             cli_args=_remapped("odom", "sectors"),
         )

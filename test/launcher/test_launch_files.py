@@ -2,6 +2,7 @@
 """The launch files: the node parameters they give, and that `launch` can read them."""
 
 import importlib.util
+import re
 import xml.etree.ElementTree as ElementTree
 from importlib import import_module
 from pathlib import Path
@@ -29,7 +30,13 @@ from mfba_planner.ros.node_settings import Source
 from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.replaying.replay_arguments import parse
-from mfba_planner.scenarios.run_config import NODES, OF_ROBOT, RunConfig, node_parameters
+from mfba_planner.scenarios.run_config import (
+    NODES,
+    OF_ROBOT,
+    RunConfig,
+    node_parameters,
+    with_perception,
+)
 from mfba_planner.scenarios.scenario_files import load_scenario
 
 LAUNCH = ROOT / "launch"
@@ -41,7 +48,8 @@ def given(**changes: str) -> dict[str, str]:
 
 def test_defaults_are_case_study_1_in_real_time_and_unrecorded() -> None:
     usual = preset(PlannerParams(method=Method.PREDICTIVE))
-    config = RunConfig(scenario=load_scenario("case1"), planner=usual, real_time=True)
+    scenario, usual = with_perception(load_scenario("case1"), usual)
+    config = RunConfig(scenario=scenario, planner=usual, real_time=True)
     expected = node_parameters(config, NODES)
     expected["world_sim"]["start_paused"] = False
     assert launch_parameters(given()) == expected
@@ -215,7 +223,7 @@ def test_remaps_and_files_reach_the_nodes_of_a_robot(tmp_path: Path) -> None:
     changes["params_file"] = str(mine)
     sensor, planner = robot_nodes(by_default(PLANNER_ARGUMENTS) | changes)
     assert sensor.remaps == (("scan", "/front/scan"), ("odom", "wheel/odom"))
-    assert planner.remaps == (("odom", "wheel/odom"),)
+    assert planner.remaps == sensor.remaps
     assert planner.parameters["enable_stamped_cmd_vel"] is True
     assert sensor.files == planner.files == (str(mine),)
     with pytest.raises(InputError, match="params_file:=nowhere: does not exist"):
@@ -249,11 +257,17 @@ def test_nodes_accept_the_shipped_parameters_in_any_namespace(
         ("virtual_sensor", flatten(sensor.settings) | flatten(sensor.sensor)),
     ):
         defaults = {k: v for params in reference.NODES[node] for k, v in flatten(params).items()}
-        assert found == defaults | reference.ROBOT[node]
+        assert found == defaults | reference.ROBOT["*"] | reference.ROBOT[node]
+
+
+def test_what_both_nodes_need_stands_once_in_the_shipped_parameters() -> None:
+    text = (LAUNCH.parent / "config/planner.yaml").read_text(encoding="utf-8")
+    for name in ("robot_radius_m", "scan_yaw", "odom_frame", "input_timeout_s"):
+        assert len(re.findall(rf"^ +(?:# )?{name}:", text, re.MULTILINE)) == 1, name
 
 
 def test_a_robot_with_the_shipped_parameters_stops_in_time() -> None:
-    planner = reference.ROBOT["planner"]
+    planner = reference.ROBOT["planner"] | reference.ROBOT["*"]
     watch_s = 0.25 * planner["input_timeout_s"]
     assert planner["input_timeout_s"] + watch_s < 0.32
     assert planner["step_length_m"] / planner["speed_mps"] == pytest.approx(0.1)

@@ -19,7 +19,7 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration_attachment import read_configuration
 from mfba_planner.recording.read_episode import read_recording
-from mfba_planner.scenarios.run_config import OF_ROBOT, Parameters
+from mfba_planner.scenarios.run_config import OF_ROBOT, Parameters, with_perception
 from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
@@ -108,7 +108,8 @@ def test_nodes_may_start_in_any_sequence(
     from mfba_planner import launcher
 
     planner = read_request([], "launcher").config.planner  # the default planner
-    core = simulate_fleet(PAIR, planner=planner, sensor=SensorParams(), seed=1)
+    scenario, planner = with_perception(PAIR, planner)
+    core = simulate_fleet(scenario, planner=planner, sensor=SensorParams(), seed=1)
     for name in ("one", "two"):
         args = ["pair.json", "--seed", "1", *PROCESSES[:-1], name]
         assert launcher.main(args) == 0, capsys.readouterr().out

@@ -2,11 +2,13 @@
 """Launcher modules: requests, directories, domains, node processes, console, signals."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,8 +19,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 from waiting import wait_until
 
-from mfba_planner.core.errors import GraphError, OutputError
+from mfba_planner.core.errors import ConfigError, GraphError, OutputError
 from mfba_planner.core.option_specs import flatten
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.launcher import node_processes
 from mfba_planner.launcher.console import RunConsole
 from mfba_planner.launcher.node_processes import NodeProcess, NodeProcesses, parameters_yaml
@@ -34,17 +37,21 @@ from mfba_planner.launcher.run_directory import RunDirectory
 from mfba_planner.launcher.set_option import option_rows
 from mfba_planner.launcher.stop_request import StoppedError, StopRequest
 from mfba_planner.paper import readings_of_paper
-from mfba_planner.planning.planner_params import Method, PlannerParams
+from mfba_planner.planning.planner_params import Method, PerceptionInput, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
-from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
+from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters, with_perception
 from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.robot_model import Robot
 from mfba_planner.swarm.bat_swarm import Algorithm
 
 
 def test_request_without_arguments_is_case_study_1() -> None:
     request = read_request([], "launcher")
     usual = preset(PlannerParams(method=Method.PREDICTIVE))
-    assert request.config == RunConfig(scenario=load_scenario("case1"), planner=usual)
+    scenario, usual = with_perception(load_scenario("case1"), usual)
+    assert request.config == RunConfig(scenario=scenario, planner=usual)
+    assert scenario.robot.lidar.beams == 360
+    assert usual.perception is PerceptionInput.SCAN
     assert request.config.driver is Driver.MULTI_PROCESS
     assert (request.out, request.timeout_s, request.picture) == (None, 600.0, True)
     assert request.node_args == {
@@ -383,3 +390,54 @@ def test_without_a_network_the_reason_is_reported() -> None:
     require_network()
     with pytest.raises(GraphError, match=r"^255.255.255.255: .*ip link set lo up"):
         require_network("255.255.255.255")  # fails like 127.0.0.1 without loopback
+
+
+@pytest.mark.parametrize(
+    ("arguments", "beams", "perception"),
+    [
+        (["case2"], 360, "scan"),
+        (["case2", "--set=robot.lidar.beams=180"], 180, "scan"),
+        (["case2", "--set=planner.perception=sectors"], 0, "sectors"),
+        (["case2", "--planner=paper"], 0, "auto"),
+        (["case2", "--algorithm=ba"], 0, "auto"),
+    ],
+)
+def test_predictive_perceives_by_a_lidar_without_being_asked(
+    arguments: list[str], beams: int, perception: str
+) -> None:
+    config = read_request(arguments, "launcher").config
+    assert config.scenario.robot.lidar.beams == beams
+    assert config.planner.perception.value == perception
+    parameters = node_parameters(config, peers=())
+    assert parameters["planner"]["perception"] == perception
+    assert parameters["virtual_sensor"].get("source", "obstacles") == (
+        "scan" if beams else "obstacles"
+    )
+
+
+def test_the_robot_is_given_once() -> None:
+    scenario = replace(
+        load_scenario("case1"), robot_radius_m=0.2, robot=Robot(drive=Drive.DIFFERENTIAL)
+    )
+    parameters = node_parameters(RunConfig(scenario=scenario), peers=())
+    assert parameters["planner"]["robot_radius_m"] == 0.2
+    assert parameters["virtual_sensor"]["robot_radius_m"] == 0.2
+    assert parameters["planner"]["drive"] == "differential"
+
+
+@pytest.mark.parametrize(
+    ("setting", "remedy"),
+    [
+        ("planner.drive=differential", "give robot.drive"),
+        ("planner.max_speed_mps=2", "give robot.max_speed_mps"),
+        ("planner.robot_radius_m=0.2", "set robot_radius_m in the scenario file"),
+    ],
+)
+def test_the_robot_is_not_set_for_the_planner_alone(setting: str, remedy: str) -> None:
+    with pytest.raises(ConfigError, match=rf"is the scenario's; {re.escape(remedy)}$"):
+        read_request([f"--set={setting}"], "launcher")
+
+
+def test_algorithm_1_reads_no_scan() -> None:
+    with pytest.raises(ConfigError, match=r"^perception=scan: method=paper reads sectors only"):
+        read_request(["--planner=paper", "--set=planner.perception=scan"], "launcher")

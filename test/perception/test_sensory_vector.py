@@ -294,6 +294,11 @@ def test_a_tangent_on_a_bound_has_a_range_in_spite_of_rounding() -> None:
 
 
 def scan(ranges: Sequence[float], start_deg: float = 0.0, step_deg: float = 10.0) -> Scan:
+    """These beams, and free ones for the rest of a full turn."""
+    return partial_scan([*ranges, *[math.inf] * (36 - len(ranges))], start_deg, step_deg)
+
+
+def partial_scan(ranges: Sequence[float], start_deg: float = 0.0, step_deg: float = 10.0) -> Scan:
     return Scan(
         ranges_m=np.array(ranges),
         angle_min_rad=math.radians(start_deg),
@@ -353,12 +358,33 @@ def test_the_limits_of_a_scan_are_valid_ranges() -> None:
         assert any(sensory_vector(ring)) is visible
 
 
+def test_a_sector_that_no_beam_covers_is_not_free() -> None:
+    def bits(ranges: Sequence[float], start_deg: float, step_deg: float, yaw_deg: float) -> str:
+        ring = sense_scan(
+            partial_scan(ranges, start_deg, step_deg), math.radians(yaw_deg), 0.3, PAPER
+        )
+        assert {r for r in ring if r < math.inf} <= {0.0}
+        return "".join(map(str, sensory_vector(ring)))
+
+    front = [math.inf] * 271  # 270 degrees, the rear is not covered
+    assert bits(front, -135.0, 1.0, 0.0) == "000001100000"
+    assert bits(front, -135.0, 1.0, 90.0) == "000000001100"
+    assert bits(front[::-1], 135.0, -1.0, 0.0) == "000001100000"
+    assert bits([math.inf], 45.0, 1.0, 0.0) == "101111111111", "a single beam"
+    assert bits([math.inf] * 12, 15.0, 30.0, 0.0) == "0" * 12, "a beam per sector"
+    masked = [math.inf] * 360
+    masked[30:60] = [math.nan] * 30
+    assert bits(masked, 0.5, 1.0, 0.0) == "010000000000", "masked by the robot's body"
+    masked[40] = math.inf
+    assert bits(masked, 0.5, 1.0, 0.0) == "0" * 12
+
+
 @pytest.mark.parametrize(
     "ranges", [[], [math.nan], [math.nan, 6.0], [0.05], [0.0, 0.0, 99.0], [-1.0]], ids=str
 )
 def test_a_scan_without_usable_ranges_is_refused(ranges: list[float]) -> None:
     with pytest.raises(InputError, match=f"^scan of {len(ranges)} beams without one usable range"):
-        sense_scan(scan(ranges), 0.0, 0.3, PAPER)
+        sense_scan(partial_scan(ranges), 0.0, 0.3, PAPER)
 
 
 @pytest.mark.parametrize(
@@ -393,13 +419,13 @@ def test_beams_in_one_direction_or_beyond_a_full_turn_are_refused(increment_rad:
 @pytest.mark.parametrize("sign", [1, -1], ids=["upright", "upside down"])
 def test_a_full_turn_with_both_its_ends_is_a_scan(beams: int, sign: int) -> None:
     increment_rad = sign * 2.0 * math.pi / max(beams - 1, 1)
-    whole = replace(scan([0.5] * beams), angle_increment_rad=increment_rad)
+    whole = replace(partial_scan([0.5] * beams), angle_increment_rad=increment_rad)
     assert any(sensory_vector(sense_scan(whole, 0.0, 0.3, PAPER)))
 
 
 def test_a_pose_without_yaw_is_refused() -> None:
     with pytest.raises(InputError, match=r"yaw=nan: unusable"):
-        sense_scan(scan([1.0]), math.nan, 0.3, PAPER)
+        sense_scan(partial_scan([1.0]), math.nan, 0.3, PAPER)
 
 
 def test_a_scan_may_have_no_upper_limit_and_start_at_0() -> None:

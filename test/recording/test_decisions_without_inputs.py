@@ -199,7 +199,7 @@ def test_verify_omits_decisions_on_a_lost_scan(tmp_path: Path) -> None:
     whole = record(tmp_path / "bag", scenario_to_json(lidar), 2)
 
     def tracking(content: Any) -> Any:
-        content["nodes"]["planner"] |= {"method": "predictive", "scan_radius_m": 0.4}
+        content["nodes"]["planner"] |= {"method": "predictive", "perception": "scan"}
         return content
 
     for index, noted in ((-1, True), (9, False)):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
 
+import numpy as np
 import pytest
 from geometry_msgs.msg import (
     Point,
@@ -349,3 +350,75 @@ def test_rotation_and_its_inverse(vector: tuple[float, float], angle: float) -> 
     turned = from_messages.rotated(vector, angle)
     assert math.hypot(*turned) == pytest.approx(math.hypot(*vector))
     assert from_messages.rotated(turned, -angle) == pytest.approx(vector, abs=1e-6)
+
+
+def a_scan(count: int = 360, **changes: Any) -> LaserScan:
+    """A scan of the whole circle, its last limit one increment before the first."""
+    width = 2.0 * math.pi / max(count, 1)
+    values = {
+        "angle_min": -math.pi,
+        "angle_max": math.pi - width,
+        "angle_increment": width,
+        "range_min": 0.1,
+        "range_max": 10.0,
+        "ranges": [1.0 + 0.01 * k for k in range(count)],
+    }
+    return LaserScan(**{**values, **changes})
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"angle_max": math.pi},  # one increment too far, as some drivers send it
+        {"angle_min": 0.0, "angle_max": 0.0},  # not set
+        {"range_min": 0.0},
+        {"range_max": math.inf},
+    ],
+)
+def test_a_scan_of_a_usual_driver_is_accepted(changes: dict[str, Any]) -> None:
+    message = a_scan(**changes)
+    scan = from_messages.laser_scan(message)
+    assert (scan.angle_min_rad, scan.angle_increment_rad) == (
+        message.angle_min,
+        message.angle_increment,
+    )
+    assert scan.ranges_m.tolist() == list(message.ranges)
+
+
+@pytest.mark.parametrize("count", [1, 2, 90])
+def test_beams_in_clockwise_sequence_keep_their_directions(count: int) -> None:
+    increment = -math.pi / 180.0
+    message = a_scan(
+        count, angle_min=0.5, angle_increment=increment, angle_max=0.5 + increment * (count - 1)
+    )
+    scan = from_messages.laser_scan(message)
+    assert scan.angle_increment_rad > 0.0
+    directions = scan.angle_min_rad + scan.angle_increment_rad * np.arange(count)
+    given_directions = message.angle_min + message.angle_increment * np.arange(count)
+    assert directions[::-1] == pytest.approx(given_directions, abs=1e-6)
+    assert scan.ranges_m[::-1].tolist() == list(message.ranges)
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"ranges": []}, r"^scan holds 0 ranges; check the lidar driver$"),
+        ({"angle_increment": 0.0}, r"^scan of 360 beams has angle_increment=0: all in one dir"),
+        (
+            {"angle_increment": math.inf},
+            r"^scan angle_min, angle_max or angle_increment holds inf; send finite numbers$",
+        ),
+        ({"angle_max": 0.0}, r"^scan holds 360 ranges, but angle_min=-3.14159, angle_max=0 and "),
+        ({"ranges": [1.0] * 300}, r"angle_increment=0.0174533 make 360; check the lidar driver$"),
+        ({"range_min": 11.0}, r"^scan has range_min=11, range_max=10: not 0 <= range_min < rang"),
+        ({"range_min": -0.1}, r"^scan has range_min=-0.1, range_max=10: "),
+        ({"range_max": math.nan}, r"^scan has range_min=0.1, range_max=nan: "),
+        ({"range_max": 0.0}, r"^scan has range_min=0.1, range_max=0: "),
+    ],
+)
+def test_a_scan_that_contradicts_itself_is_refused_in_one_line(
+    changes: dict[str, Any], line: str
+) -> None:
+    with pytest.raises(InputError, match=line):
+        from_messages.laser_scan(a_scan(**changes))

@@ -46,6 +46,27 @@ def test_inputs_are_sound_stale_or_refused() -> None:
     assert refused.values["refused odom: frame"] == "2"
 
 
+def test_a_note_is_a_warning_unless_something_is_worse() -> None:
+    health = InputHealth(("odom",))
+    health.received("odom", 1, 0.0)
+    status = health.status(0.0, 1.0, {}, "the clock is another", {"odom: dropped": "3"})
+    assert (status.level, status.message) == (
+        Level.WARN,
+        "odom are sound, but the clock is another",
+    )
+    assert status.values["odom: dropped"] == "3"
+    assert health.status(9.0, 1.0, {}, "the clock is another").level is Level.STALE
+
+
+def test_the_figures_of_a_fault_are_no_change_of_it() -> None:
+    health = InputHealth(("odom",))
+    kinds = set()
+    for fault in ("odom is 1.25 s late", "odom is 31.5 s late"):
+        health.set_fault("odom", fault)
+        kinds.add(health.kinds_of_fault)
+    assert len(kinds) == 1
+
+
 def test_a_planner_that_is_not_active_is_ok() -> None:
     status = driving_status(None, Phase.FREE, "inactive", {})
     assert (status.level, status.message) == (Level.OK, "inactive: commands nothing")

@@ -13,10 +13,11 @@ from edited_bags import rewrite
 from planner_talk import PlannerHarness, fields, odom, sectors
 from ros_graph import Graph
 
-from mfba_planner.core.planner_types import Scan
+from mfba_planner.core.planner_types import Mode, Scan
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.planner_params import Method, PlannerParams
+from mfba_planner.planning.planner_params import Method, PerceptionInput, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.from_messages import laser_scan, robot_pose
 from mfba_planner.recording.read_episode import read_episode
@@ -29,14 +30,14 @@ from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
-from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.robot_model import Lidar, Noise, Robot
 from mfba_planner.simulation.run_episode import simulate
 from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.verification.verify_bag import verify
 
 PAPER = PlannerParams(goal_tolerance_m=0.05)
-AHEAD = replace(preset(PAPER), method=Method.PREDICTIVE)
-TRACKING = replace(AHEAD, scan_radius_m=0.42)
+TRACKING = replace(preset(PAPER), method=Method.PREDICTIVE)
+AHEAD = replace(TRACKING, perception=PerceptionInput.SECTORS)
 TURNING = Robot(drive=Drive.DIFFERENTIAL)
 SCANNING = replace(TURNING, lidar=Lidar(beams=360, yaw_rad=1.0))
 NOISY = replace(
@@ -65,7 +66,7 @@ def test_the_graph_decides_as_the_core_and_verify_agrees(
     robot: Robot, planner: PlannerParams, tmp_path: Path, domain_id: int
 ) -> None:
     scenario = near(robot)
-    if planner.tracks_scan and not robot.lidar.beams:
+    if planner.reads_scan and not robot.lidar.beams:
         scenario = replace(scenario, robot=replace(robot, lidar=Lidar(beams=1080)))
     run_in_process(run_config(scenario, planner), tmp_path / "bag", domain_id=domain_id)
     recorded = read_episode(tmp_path / "bag")
@@ -75,6 +76,9 @@ def test_the_graph_decides_as_the_core_and_verify_agrees(
     assert expected.outcome is Outcome.GOAL_REACHED
     assert recorded.scenario == scenario
     assert any(tick.vs and any(tick.vs) for tick in recorded.ticks), "no obstacle was observed"
+    assert {tick.perception for tick in recorded.ticks if tick.mode is not Mode.STOPPED} == {
+        "scan" if planner is TRACKING else "sectors"
+    }
     report = verify(tmp_path / "bag")
     assert report.is_identical, report.faults
 

@@ -131,3 +131,19 @@ def test_stale_inputs_keep_their_scan() -> None:
     stale = inputs.stale(now_s=9.0, timeout_s=1.0)
     assert stale is not None
     assert stale.scan is SCAN
+
+
+@pytest.mark.parametrize("name", ["odom", "sectors"])
+def test_a_refused_stamp_leaves_its_reason_and_no_trace_in_the_sequence(name: str) -> None:
+    inputs = NewestInputs()
+    inputs.add_odom(1, POSE, 0.0)
+    inputs.add_sectors(1, FREE, 0.0, SCAN)
+    inputs.refuse(name, "too late")
+    stale = inputs.stale(now_s=9.0, timeout_s=1.0)
+    assert stale is not None
+    assert (stale.pose, stale.ranges_m) == (
+        ("too late", FREE) if name == "odom" else (POSE, "too late")
+    )
+    assert (stale.scan is None) == (name == "sectors")
+    inputs.add_odom(2, OTHER_POSE, 9.0)
+    assert inputs.add_sectors(2, FREE, 9.0, SCAN) == Inputs(2, OTHER_POSE, FREE, 0.0, SCAN)

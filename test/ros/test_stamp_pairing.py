@@ -131,3 +131,11 @@ def test_a_topic_without_partner_drops_its_oldest(monkeypatch: pytest.MonkeyPatc
         assert add(pairs, "a", stamp) is None
     assert add(pairs, "b", 6) is None
     assert add(pairs, "b", 7) == ("a7", "b7")
+
+
+def test_the_limit_of_waiting_messages_may_be_given() -> None:
+    pairs = StampPairs[str, str](limit=2)
+    for stamp in range(5):
+        add(pairs, "a", stamp)
+    assert add(pairs, "b", 2) is None
+    assert add(pairs, "b", 3) == ("a3", "b3")

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """RunConfig: the parameters of each node, and refused configurations."""
 
+from typing import Any
+
 import pytest
 
 from mfba_planner.core.errors import ConfigError
@@ -50,3 +52,21 @@ def test_values_out_of_range_are_refused() -> None:
     for bad in ({"seed": -1}, {"speed_factor": 0.0}, {"real_time": 1}):
         with pytest.raises(ConfigError, match=next(iter(bad))):
             RunConfig(scenario=CASE1, **bad)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changes", "dated"),
+    [
+        ({"real_time": True}, True),
+        ({"real_time": True, "speed_factor": 0.5}, True),
+        ({"real_time": True, "speed_factor": 2.0}, False),
+        ({}, False),
+    ],
+)
+def test_inputs_are_dated_by_the_worlds_clock_where_it_is_not_faster(
+    changes: dict[str, Any], dated: bool
+) -> None:
+    parameters = node_parameters(RunConfig(scenario=CASE1, **changes), NODES)
+    for node in ("planner", "virtual_sensor"):
+        assert parameters[node].get("use_sim_time", False) is dated
+    assert "use_sim_time" not in parameters["world_sim"], "it publishes that clock"

@@ -16,6 +16,7 @@ from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, closest_approach, distance
 from mfba_planner.core.planner_types import Decision, Mode, Observation
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import Method, PlannerParams
@@ -38,7 +39,7 @@ from mfba_planner.simulation.fleet import (
 )
 from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at
 from mfba_planner.simulation.planner_observations import Perception
-from mfba_planner.simulation.robot_model import Drive, Lidar, Robot
+from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.run_episode import run, simulate_fleet
 from mfba_planner.simulation.scenario import FleetRobot, Kidnapping, Scenario
 from mfba_planner.simulation.world import World
@@ -215,7 +216,7 @@ def test_a_lidar_detects_the_other_robots(beams: int) -> None:
 def test_differential_robots_with_lidars_share_a_world() -> None:
     robot = Robot(drive=Drive.DIFFERENTIAL, lidar=Lidar(beams=180))
     scenario = replace(head_on(), robot=robot)
-    params = PlannerParams(method=Method.PREDICTIVE, scan_radius_m=0.35)
+    params = PlannerParams(method=Method.PREDICTIVE)
     done = simulate_fleet(scenario, planner=preset(params), sensor=SensorParams(), seed=0)
     assert all(evaluate(episode).success for episode in done)
 

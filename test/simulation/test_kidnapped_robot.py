@@ -15,6 +15,7 @@ from ros_graph import Graph
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, distance
 from mfba_planner.core.planner_types import Mode, observe
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.evaluation.metrics import assess, evaluate, tick_clearances
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
@@ -34,7 +35,6 @@ from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
 from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle
-from mfba_planner.simulation.robot_model import Drive
 from mfba_planner.simulation.run_episode import run, simulate
 from mfba_planner.simulation.scenario import Kidnapping, Scenario
 from mfba_planner.verification.verify_bag import verify

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.planner_types import Mode
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.scan_to_sectors import sense_scan
@@ -25,7 +26,7 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.simulation.obstacle_motion import Walls
 from mfba_planner.simulation.planner_observations import observe_sectors, sense
-from mfba_planner.simulation.robot_model import Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.robot_model import Lidar, Noise, Robot
 from mfba_planner.simulation.run_episode import simulate
 from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.simulation.sensor_noise import NoisySensors

@@ -11,6 +11,7 @@ from pathlib import Path
 from ...core.errors import BagError, ConfigError
 from ...core.geometry import Point
 from ...launcher.set_option import with_settings
+from ...perception.no_return import NoReturn
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ...recording.fleet_topics import NO_NAMESPACE, with_robot_name
@@ -19,7 +20,7 @@ from ...verification.verify_bag import Report
 
 SHOWN = 10  # faults printed at most
 _NEEDS_OWN_BAG = {"closed_loop": "--closed-loop", "picture": "--picture", "robots": "--robot"}
-_FOREIGN_ONLY = ("goal", "seed", "robot_radius", "scan_yaw", "scan", "odom")
+_FOREIGN_ONLY = ("goal", "seed", "robot_radius", "scan_yaw", "scan_no_return", "scan", "odom")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,6 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="RAD",
         help="yaw of the scan's frame in the robot's, rad (default: from /tf_static)",
+    )
+    group.add_argument(
+        "--scan-no-return",
+        choices=[member.value for member in NoReturn],
+        help="range by which the lidar reports that nothing is there (default: inf, as REP-117)",
     )
     group.add_argument("--scan", metavar="TOPIC", help="scan topic, if there are several")
     group.add_argument("--odom", metavar="TOPIC", help="odometry topic, if there are several")
@@ -87,6 +93,7 @@ def _robot(parsed: argparse.Namespace) -> RedecideParams:
     return RedecideParams(
         robot_radius_m=settings.robot_radius_m,
         scan_yaw_rad=parsed.scan_yaw,
+        scan_no_return=NoReturn(parsed.scan_no_return or NoReturn.INF),
         goal=_goal(parsed.goal),
         scan=parsed.scan or "",
         odom=parsed.odom or "",

@@ -12,11 +12,18 @@ from typing import Any
 from ...core.errors import InputError
 from ...core.planner_types import Observation, Scan
 from ...perception.scan_to_sectors import aligned
-from ...planning.planner_params import PlannerParams
-from ...recording.from_messages import laser_scan, robot_pose, sector_ranges, stamp_ns
+from ...planning.planner_params import PerceptionInput, PlannerParams
+from ...recording.from_messages import (
+    laser_scan,
+    robot_pose,
+    scan_fields,
+    sector_ranges,
+    stamp_ns,
+)
 from ..interface import topics
 from ..node_settings import PlannerSettings
 from ..runtime.base_node import GraphNode
+from ..runtime.input_monitor import PAIRED, InputMonitor
 from ..runtime.lockstep_inputs import Inputs, LockstepInputs
 from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.stale_inputs import NewestInputs
@@ -27,7 +34,8 @@ from .planner_diagnostics import PlannerDiagnostics
 class InputSubscriptions:
     """Calls on_inputs for each pair of odom and sectors; a refused message is its error text.
 
-    Where the planner tracks obstacles, sectors wait for the scan of their stamp.
+    For a planner that reads scans, sectors wait for the scan of their stamp. With perception=auto
+    they wait only while `scan` has a publisher: without a lidar the sectors are all there is.
     """
 
     def __init__(
@@ -36,15 +44,18 @@ class InputSubscriptions:
         settings: PlannerSettings,
         params: PlannerParams,
         refused_inputs: RefusedInputs,
+        monitor: InputMonitor,
         diagnostics: PlannerDiagnostics,
         on_inputs: Callable[[Inputs], None],
     ) -> None:
-        """params.tracks_scan is read once: whether scan is subscribed to."""
-        self._node, self._settings = node, settings
-        self._tracks_scan = params.tracks_scan
+        """Subscribe to nothing yet."""
+        self._node, self._settings, self._monitor = node, settings, monitor
+        self._params = params
+        self._is_subscribed = self._is_subscribed_to_scan = False
         self._refused_inputs, self._diagnostics = refused_inputs, diagnostics
         self._on_inputs = on_inputs
         self.range_max_m = 0.0  # of the newest sectors
+        self.fields: dict[str, str] = {}  # of planner/decision: see scan_fields
         self.reset()
 
     def reset(self) -> None:
@@ -53,72 +64,132 @@ class InputSubscriptions:
         self._pairs: LockstepInputs | NewestInputs = (
             LockstepInputs() if lockstep else NewestInputs()
         )
-        self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True)
+        limit = None if lockstep else PAIRED
+        self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True, limit=limit)
+        self._monitor.reset()
 
     def subscribe(self) -> None:
         """Subscribe to odom and sectors, and to scan where it is needed."""
-        lockstep = self._settings.lockstep
-        self._node.subscribe(topics.ODOM, self._on_odom, foreign_writers=not lockstep)
-        self._node.subscribe(topics.SECTORS, self._on_sectors)
-        if self._tracks_scan:
-            self._node.subscribe(topics.SCAN, self._on_scan)
+        frame = self._settings.odom_frame
+        self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
+        self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
+        self._is_subscribed, self._is_subscribed_to_scan = True, False
+        self.set_reads_scan(self._params)
+
+    def set_reads_scan(self, params: PlannerParams) -> None:
+        """Use scans, or not, from now on; params are the planner's."""
+        self._params = params
+        if params.reads_scan and self._is_subscribed and not self._is_subscribed_to_scan:
+            frame = self._settings.scan_frame
+            self._monitor.subscribe(topics.SCAN, self._on_scan, depth=PAIRED, frame=frame)
+            self._is_subscribed_to_scan = True
+
+    def unsubscribed(self) -> None:
+        """The node has destroyed all subscriptions."""
+        self._is_subscribed = self._is_subscribed_to_scan = False
 
     def stale(self, timeout_s: float) -> Inputs | None:
         """In real time the newest inputs if one is older than timeout_s."""
+        self._monitor.timeout_s = timeout_s
         return self._pairs.stale(time.monotonic(), timeout_s)
 
-    def add_scan(self, observation: Observation, scan: Scan | None) -> Observation:
+    def add_scan(self, observation: Observation, inputs: Inputs) -> Observation:
         """Return the observation with the scan that its sectors were computed from."""
-        if scan is None or observation.refused:
+        self.fields = {}
+        if inputs.scan is None or observation.refused:
             return observation
-        yaw = observation.pose.yaw + self._settings.scan_yaw
-        return replace(observation, scan=aligned(scan, yaw))
+        pose = inputs.sensed[1] if inputs.sensed else observation.pose
+        if inputs.sensed:
+            self.fields = scan_fields(inputs.pose_stamp_ns, pose)
+        return replace(
+            observation,
+            scan=aligned(inputs.scan, pose.yaw + self._settings.scan_yaw),
+            sensed=inputs.sensed,
+            pose_stamp_ns=inputs.pose_stamp_ns,
+        )
 
     def _on_odom(self, message: Any) -> None:
-        self._receive("odom", message, robot_pose, self._pairs.add_odom)
+        fault = self._check("odom", message)
+        if fault is not None:
+            self._receive("odom", message, robot_pose, self._pairs.add_odom, fault)
 
     def _on_sectors(self, message: Any) -> None:
-        if self._tracks_scan:
-            self._pair_scan(message, self._scan_pairs.add_a)
+        fault = self._check("sectors", message)
+        if fault is None:
+            return
+        if self._waits_for_scan():
+            self._pair_scan(message, fault, self._scan_pairs.add_a)
         else:
-            self._receive_sectors(message)
+            self._receive_sectors(message, fault)
+
+    def _waits_for_scan(self) -> bool:
+        params = self._params
+        if not params.reads_scan or params.perception is PerceptionInput.SCAN:
+            return params.reads_scan
+        name = self._node.resolve_topic_name(topics.SCAN.name)
+        return self._node.count_publishers(name) > 0
 
     def _on_scan(self, message: Any) -> None:
-        self._pair_scan(message, self._scan_pairs.add_b)
+        if not self._params.reads_scan:
+            return
+        fault = self._check("scan", message)
+        if fault is not None:
+            self._diagnostics.set_fault("scan", fault)
+            self._pair_scan(message, fault, self._scan_pairs.add_b)
 
-    def _pair_scan(self, message: Any, add: Any) -> None:
+    def _check(self, name: str, message: Any) -> str | None:
+        """Why a message is refused, "" if it is not; None: it must not even be paired."""
+        verdict = self._monitor.check(name, message)
+        if verdict.is_ordered:
+            return verdict.fault
+        self._refuse(name, verdict.fault)
+        return None
+
+    def _refuse(self, name: str, fault: str) -> None:
+        self._pairs.refuse(name, fault)
+        self._diagnostics.set_fault(name, fault)
+
+    def _pair_scan(self, message: Any, fault: str, add: Any) -> None:
         try:
-            pair = add(stamp_ns(message.header.stamp), message)
+            pair = add(stamp_ns(message.header.stamp), (message, fault))
         except InputError as error:
             self._refused_inputs.add(error, "scan")
             return
         if pair is not None:
-            sectors, scan = pair
-            self._receive_sectors(sectors, laser_scan(scan))
+            (sectors, fault), (scan, scan_fault) = pair
+            convert = partial(laser_scan, no_return=self._settings.scan_no_return)
+            converted, conversion_fault = self._convert(
+                "scan", scan, convert, self._settings.scan_frame
+            )
+            fault = fault or scan_fault or conversion_fault
+            self._receive_sectors(sectors, fault, None if fault else converted)
 
-    def _receive_sectors(self, message: Any, scan: Scan | None = None) -> None:
+    def _receive_sectors(self, message: Any, fault: str, scan: Scan | None = None) -> None:
         self.range_max_m = message.range_max
-        self._receive(
-            "sectors", message, sector_ranges, partial(self._pairs.add_sectors, scan=scan)
-        )
+        add = partial(self._pairs.add_sectors, scan=scan)
+        self._receive("sectors", message, sector_ranges, add, fault)
 
-    def _receive(self, name: str, message: Any, convert: Any, add: Any) -> None:
+    def _receive(self, name: str, message: Any, convert: Any, add: Any, fault: str) -> None:
         """Convert one message and pair it; a complete pair goes to on_inputs."""
         stamp, now_s = stamp_ns(message.header.stamp), time.monotonic()
-        value, fault = self._convert(name, message, convert)
+        value: Any = fault  # refused already
+        if not fault:
+            value, fault = self._convert(name, message, convert, self._settings.odom_frame)
         try:
             inputs = add(stamp, value, now_s)
         except InputError as error:
             self._refused_inputs.add(error, name)
+            if fault:  # late, and older than one that was not
+                self._refuse(name, fault)
             return
         self._diagnostics.input_received(name, stamp, now_s, fault)
         if inputs is not None:
             self._on_inputs(inputs)
 
-    def _convert(self, name: str, message: Any, convert: Any) -> tuple[Any, str]:
+    def _convert(self, name: str, message: Any, convert: Any, frame: str) -> tuple[Any, str]:
         """The value and "", or the error text twice: as the value and as the fault."""
         try:
-            return convert(message, self._settings.odom_frame), ""
+            return convert(message, frame), ""
         except InputError as error:
             self._refused_inputs.add(error, name)
             return str(error), str(error)

@@ -12,6 +12,7 @@ from ..interface.diagnostic_status import InputHealth, driving_status
 from ..node_settings import PlannerSettings
 from ..runtime.base_node import GraphNode
 from ..runtime.goal_queue import GoalQueue
+from ..runtime.input_monitor import InputMonitor
 from ..runtime.refused_inputs import RefusedInputs
 from .diagnostics_publisher import DiagnosticsPublisher
 
@@ -20,17 +21,25 @@ class PlannerDiagnostics:
     """Records inputs and decisions; publishes once a period and when something changes."""
 
     def __init__(
-        self, node: GraphNode, settings: PlannerSettings, refused_inputs: RefusedInputs
+        self,
+        node: GraphNode,
+        settings: PlannerSettings,
+        refused_inputs: RefusedInputs,
+        monitor: InputMonitor,
     ) -> None:
         """Advertise /diagnostics."""
         self._publisher = DiagnosticsPublisher(node, settings)
-        self._refused_inputs = refused_inputs
+        self._refused_inputs, self._monitor = refused_inputs, monitor
         self._health = InputHealth(("odom", "sectors"))
         self._published: tuple[object, ...] = ()
 
     def input_received(self, name: str, stamp_ns: int, now_s: float, fault: str) -> None:
         """An input was received; fault is why its content is refused, "" if it is not."""
         self._health.received(name, stamp_ns, now_s)
+        self._health.set_fault(name, fault)
+
+    def set_fault(self, name: str, fault: str) -> None:
+        """Why the newest of an input is refused, "" if it is not."""
         self._health.set_fault(name, fault)
 
     def decision_made(
@@ -43,7 +52,12 @@ class PlannerDiagnostics:
         """Publish at once what has changed, everything else once a period."""
         now_s = time.monotonic()
         self._publisher.set_time(decision.stamp_ns, now_s)
-        present = (decision.mode, path_planner.phase, goal_queue.goal_id, *self._health.faults)
+        present = (
+            decision.mode,
+            path_planner.phase,
+            goal_queue.goal_id,
+            *self._health.kinds_of_fault,
+        )
         changed, self._published = present != self._published, present
         if changed or self._publisher.is_due(now_s):
             self.publish(decision, path_planner, goal_queue, state, changed=changed)
@@ -67,7 +81,13 @@ class PlannerDiagnostics:
             "last refused": self._refused_inputs.last,
         }
         statuses = [
-            self._health.status(now_s, timeout_s, self._refused_inputs.by_kind),
+            self._health.status(
+                now_s,
+                timeout_s,
+                self._refused_inputs.by_kind,
+                self._monitor.note,
+                self._monitor.values,
+            ),
             driving_status(decision, path_planner.phase, state, values),
         ]
         self._publisher.publish(statuses, now_s, changed=changed)

@@ -10,6 +10,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from ...core.geometry import Point
 from ...core.planner_types import Decision, Mode
 from ...planning.odometry_jump import is_odometry_jump
+from ...planning.planner_params import PlannerParams
 from ..interface import markers, to_messages, topics
 from ..node_settings import PlannerSettings
 from ..runtime.base_node import GraphNode
@@ -19,10 +20,10 @@ class PlannerPublishers:
     """The publishers of planner."""
 
     def __init__(
-        self, node: GraphNode, settings: PlannerSettings, tick_ns: Callable[[], int]
+        self, node: GraphNode, settings: PlannerSettings, params: Callable[[], PlannerParams]
     ) -> None:
-        """Advertise all topics; cmd_vel holds for one tick."""
-        self._settings, self._tick_ns = settings, tick_ns
+        """Advertise all topics; cmd_vel holds for one tick of the params."""
+        self._settings, self._params = settings, params
         self._log = node.get_logger()
         self._node_name = node.get_fully_qualified_name()
         self._goal_step = node.advertise(topics.GOAL_STEP)
@@ -55,15 +56,15 @@ class PlannerPublishers:
 
     def publish_command(self, decision: Decision) -> None:
         """Publish goal_step, then cmd_vel: the stamp of goal_step is also that of cmd_vel."""
-        s, stamp, tick_ns = self._settings, decision.stamp_ns, self._tick_ns()
+        s, stamp, params = self._settings, decision.stamp_ns, self._params()
         self._goal_step.publish(
             to_messages.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame)
         )
         if s.enable_stamped_cmd_vel:
-            twist = to_messages.twist_stamped_msg(decision, s.base_frame, s, tick_ns)
+            twist = to_messages.twist_stamped_msg(decision, s.base_frame, params, params.tick_ns)
             self._cmd_vel.publish(twist)
         else:
-            self._cmd_vel.publish(to_messages.twist_msg(decision, s, tick_ns))
+            self._cmd_vel.publish(to_messages.twist_msg(decision, params, params.tick_ns))
 
     def publish_stop(self, position: Point, stamp_ns: int) -> None:
         """Command rest at this position, without a decision."""

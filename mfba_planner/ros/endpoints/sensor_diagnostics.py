@@ -8,6 +8,7 @@ import time
 from ..interface.diagnostic_status import InputHealth
 from ..node_settings import VirtualSensorSettings
 from ..runtime.base_node import GraphNode
+from ..runtime.input_monitor import InputMonitor
 from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.stale_inputs import watch_period_s
 from .diagnostics_publisher import DiagnosticsPublisher
@@ -21,11 +22,12 @@ class SensorDiagnostics:
         node: GraphNode,
         settings: VirtualSensorSettings,
         refused_inputs: RefusedInputs,
+        monitor: InputMonitor,
         source: str,
     ) -> None:
         """Advertise /diagnostics; source is the topic measured from, beside odom."""
         self._publisher = DiagnosticsPublisher(node, settings)
-        self._refused_inputs = refused_inputs
+        self._refused_inputs, self._monitor = refused_inputs, monitor
         self._source = source
         self._health = InputHealth(("odom", source))
         self._timeout_s = settings.input_timeout_s
@@ -43,12 +45,15 @@ class SensorDiagnostics:
     def set_fault(self, name: str, fault: str) -> None:
         """Why the newest of an input is refused, "" if it is not; published at once if new."""
         self._health.set_fault(name, fault)
-        if self._health.faults != self._published:
-            self._published = self._health.faults
+        kinds = self._health.kinds_of_fault
+        if kinds != self._published:
+            self._published = kinds
             self.publish(changed=True)
 
     def publish(self, *, changed: bool = False) -> None:
         """Publish if a period has passed, or if something has changed."""
-        now_s = time.monotonic()
-        status = self._health.status(now_s, self._timeout_s, self._refused_inputs.by_kind)
+        now_s, monitor = time.monotonic(), self._monitor
+        status = self._health.status(
+            now_s, self._timeout_s, self._refused_inputs.by_kind, monitor.note, monitor.values
+        )
         self._publisher.publish([status], now_s, changed=changed)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Mapping
 from enum import IntEnum
@@ -76,6 +77,11 @@ class InputHealth:
         """Why the newest of each input is refused, "" if it is not."""
         return tuple(self._faults.values())
 
+    @property
+    def kinds_of_fault(self) -> tuple[str, ...]:
+        """The faults without their figures: what counts as a change."""
+        return tuple(re.sub(r"[\d.]+", "", fault) for fault in self.faults)
+
     def received(self, name: str, stamp_ns: int, now_s: float) -> None:
         """An input was received."""
         self.rates[name].add(stamp_ns, now_s)
@@ -84,8 +90,18 @@ class InputHealth:
         """Why the newest of an input is refused, "" if it is not."""
         self._faults[name] = fault
 
-    def status(self, now_s: float, timeout_s: float, refused: Mapping[str, int]) -> Status:
-        """The status "inputs": rates, ages, refused messages by kind, and faults."""
+    def status(
+        self,
+        now_s: float,
+        timeout_s: float,
+        refused: Mapping[str, int],
+        note: str = "",
+        more: Mapping[str, str] | None = None,
+    ) -> Status:
+        """The status "inputs": rates, ages, refused messages by kind, and faults.
+
+        note is what to warn of where there is no fault; more are other values.
+        """
         fault = next(filter(None, self.faults), "")
         values: dict[str, str] = {}
         silent: dict[str, str] = {}
@@ -97,6 +113,7 @@ class InputHealth:
                 silent[name] = f"{name} stale for {age_s:.2f} s (input_timeout_s={timeout_s:g})"
             values[f"{name}: rate [Hz]"] = f"{rate.rate_hz(now_s):.2f}"
             values[f"{name}: age [s]"] = "never" if age_s is None else f"{age_s:.3f}"
+        values |= more or {}
         values["silent"] = " ".join(silent)
         values["input_timeout_s"] = f"{timeout_s:g}"
         values["refused"] = str(sum(refused.values()))
@@ -107,7 +124,10 @@ class InputHealth:
             )
         if silent:
             return Status("inputs", Level.STALE, "; ".join(silent.values()), values)
-        return Status("inputs", Level.OK, f"{' and '.join(self.rates)} are sound", values)
+        sound = f"{' and '.join(self.rates)} are sound"
+        if note:
+            return Status("inputs", Level.WARN, f"{sound}, but {note}", values)
+        return Status("inputs", Level.OK, sound, values)
 
 
 def driving_status(

@@ -18,11 +18,11 @@ from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
 from ...core.geometry import Point, Pose2D, quaternion_from_yaw
 from ...core.planner_types import Bits, Decision, Mode, Ranges, Scan
+from ...core.robot_base import Base
 from ...perception.sensory_vector import SensorParams, bits_text, longest_range_m
 from ...planning.odometry_jump import is_odometry_jump
 from ...recording.from_messages import SECOND_NS, body_velocity, points_text, rotated
 from ...simulation.episode import Outcome
-from ...simulation.robot_model import Base
 from .diagnostic_status import Status
 
 OMNIDIRECTIONAL = Base()
@@ -201,6 +201,7 @@ def decision_msg(
         "waypoint": points_text([decision.waypoint]),
         "velocity": points_text([decision.velocity]),
         "candidates": points_text(decision.candidates),
+        "perception": decision.perception,
         "algorithm": algorithm,
         "refused_inputs": str(refused),
         **fields,

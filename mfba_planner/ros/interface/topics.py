@@ -204,11 +204,15 @@ def reading_qos(topic: Topic, *, foreign_writers: bool = True) -> list[QoSProfil
 
 def recording_qos(topic: Topic, *, foreign_writers: bool = True) -> list[QoSProfile]:
     """The QoS of a reader that must not lose a message."""
-    profiles = reading_qos(topic, foreign_writers=foreign_writers)
+    return with_depth(reading_qos(topic, foreign_writers=foreign_writers), 5000)
+
+
+def with_depth(profiles: list[QoSProfile], depth: int) -> list[QoSProfile]:
+    """The same QoS, but the last `depth` messages are kept."""
     return [
         QoSProfile(
             history=HistoryPolicy.KEEP_LAST,
-            depth=5000,
+            depth=depth,
             reliability=qos.reliability,
             durability=qos.durability,
         )

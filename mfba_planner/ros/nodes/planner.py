@@ -16,6 +16,7 @@ from ..endpoints.planner_diagnostics import PlannerDiagnostics
 from ..endpoints.planner_publishers import PlannerPublishers
 from ..interface import parameters, topics
 from ..node_settings import PlannerSettings, names
+from ..runtime.input_monitor import InputMonitor
 from ..runtime.lifecycle_node import ManagedNode
 from ..runtime.lockstep_inputs import Inputs
 from ..runtime.refused_inputs import RefusedInputs
@@ -41,12 +42,12 @@ class PlannerNode(ManagedNode):
         self.goals = GoalSubscriptions(
             self, s.odom_frame, refused, self._is_finished, lambda: self.path_planner.reset()
         )
-        self._diagnostics = PlannerDiagnostics(self, s, refused)
+        monitor = InputMonitor(self, s, refused, params.input_timeout_s, self._on_time_set_back)
+        self._diagnostics = PlannerDiagnostics(self, s, refused, monitor)
         self._inputs = InputSubscriptions(
-            self, s, params, refused, self._diagnostics, self._on_inputs
+            self, s, params, refused, monitor, self._diagnostics, self._on_inputs
         )
         self._reset()
-        self.on_time_set_back(self._on_time_set_back)
         period_s = watch_period_s(params.input_timeout_s, lockstep=s.lockstep)
         self.create_wall_timer(period_s, self._on_timer)
         self.enter_life_cycle(s.autostart)
@@ -55,7 +56,7 @@ class PlannerNode(ManagedNode):
     def configure(self) -> None:
         """Advertise and subscribe."""
         s = self.settings
-        self._outputs = PlannerPublishers(self, s, lambda: self.path_planner.params.tick_ns)
+        self._outputs = PlannerPublishers(self, s, lambda: self.path_planner.params)
         self._inputs.subscribe()
         self.goals.subscribe()
 
@@ -68,6 +69,7 @@ class PlannerNode(ManagedNode):
     def clean_up(self) -> None:
         """Forget all but the parameters; destroy publishers and subscriptions."""
         self.unsubscribe(keep=[topics.DIAGNOSTICS])
+        self._inputs.unsubscribed()
         self.goals.reset()
         self._reset()
 
@@ -91,6 +93,7 @@ class PlannerNode(ManagedNode):
         if changed.method is not self.path_planner.params.method:
             self.path_planner = make_planner(changed, seed=self.settings.seed)
         self.path_planner.params = changed
+        self._inputs.set_reads_scan(changed)
 
     def _is_finished(self) -> bool:
         arrived = self._last is not None and self._last.mode is Mode.ARRIVED
@@ -120,11 +123,11 @@ class PlannerNode(ManagedNode):
         self._publish(self._plan(self._perceive(inputs)))
 
     def _perceive(self, inputs: Inputs) -> Observation:
-        stamp, pose, ranges, age_s, scan = inputs
+        stamp, pose, ranges, age_s = inputs[:4]
         goal = self.goals.advance(pose, self.path_planner.params.goal_tolerance_m)
         observation = observe(stamp, pose, ranges, goal, self._pose, round(age_s / NANO))
         self._pose = observation.pose
-        return self._inputs.add_scan(observation, scan)
+        return self._inputs.add_scan(observation, inputs)
 
     def _plan(self, observation: Observation) -> Decision:
         self._last = self.path_planner.plan(observation)
@@ -136,7 +139,7 @@ class PlannerNode(ManagedNode):
             decision,
             planner.params.label,
             self._refused_inputs.count,
-            goals.fields,
+            {**goals.fields, **self._inputs.fields},
             self._inputs.range_max_m,
         )
         self._diagnostics.decision_made(decision, planner, goals, self.state)

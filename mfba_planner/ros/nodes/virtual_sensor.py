@@ -4,20 +4,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from ...core.errors import InputError
-from ...core.geometry import Point, Pose2D
+from ...core.geometry import Pose2D
 from ...core.planner_types import Ranges
 from ...perception.scan_to_sectors import sense_scan
-from ...perception.sensory_vector import SensorParams, sense_circles, sensory_vector
+from ...perception.sensory_vector import (
+    SensorParams,
+    enlarged_radii,
+    sense_circles,
+    sensory_vector,
+)
 from ...recording.from_messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
 from ..endpoints.sensor_diagnostics import SensorDiagnostics
 from ..interface import parameters, topics
 from ..interface.to_messages import sectors_msg, sensory_vector_msg
 from ..node_settings import Source, VirtualSensorSettings, names
 from ..runtime.base_node import GraphNode
+from ..runtime.input_monitor import NEWEST, PAIRED, InputMonitor, InputVerdict
 from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.spin_node import spin_node
 from ..runtime.stamp_pairing import StampPairs
@@ -39,16 +44,19 @@ class VirtualSensor(GraphNode):
         self.radii = parameters.declare_radii(self, _DEFAULT_RADII)
         parameters.follow(self, lambda: self.sensor, self._set_sensor)
         self._refused_inputs = RefusedInputs(self)
+        self._monitor = InputMonitor(self, s, self._refused_inputs, s.input_timeout_s, self._reset)
         self._by_stamp = s.lockstep or s.source is Source.OBSTACLES
         self._reset()
         self._sectors = self.advertise(topics.SECTORS)
         self._vector = self.advertise(topics.SENSORY_VECTOR)
-        self.subscribe(topics.ODOM, self._on_odom, foreign_writers=not s.lockstep)
         self._source = topics.OBSTACLES if s.source is Source.OBSTACLES else topics.SCAN
-        self._diagnostics = SensorDiagnostics(self, s, self._refused_inputs, self._source.name)
-        self.subscribe(self._source, self._on_source)
+        self._diagnostics = SensorDiagnostics(
+            self, s, self._refused_inputs, self._monitor, self._source.name
+        )
+        depth = PAIRED if self._by_stamp else NEWEST
+        self._monitor.subscribe(topics.ODOM, self._on_odom, depth=depth, frame=s.odom_frame)
+        self._monitor.subscribe(self._source, self._on_source, depth=depth, frame=s.scan_frame)
         self.advertise_ready(names(s.wait_for))
-        self.on_time_set_back(self._reset)
 
     def _set_sensor(self, sensor: SensorParams) -> None:
         self.sensor = sensor
@@ -57,26 +65,34 @@ class VirtualSensor(GraphNode):
         # A repeated pair is measured again: a planner may have been restarted.
         self._pairs: StampPairs[Pose2D | None, Any] = StampPairs(repeat=True)
         self._pose: Pose2D | None = None  # None: no odom yet, or the newest was refused
+        self._monitor.reset()
 
     def _on_odom(self, message: Any) -> None:
-        stamp, fault = stamp_ns(message.header.stamp), ""
-        self._diagnostics.input_received("odom", stamp)
+        stamp, (fault, is_ordered) = stamp_ns(message.header.stamp), self._check("odom", message)
         try:
-            self._pose = robot_pose(message)
+            self._pose = None if fault else robot_pose(message)
         except InputError as error:
             self._pose, fault = None, self._refuse(error, "odom")
         self._diagnostics.set_fault("odom", fault)
-        if self._by_stamp:
+        if self._by_stamp and is_ordered:
             self._pair("odom", stamp, self._pose, self._pairs.add_a)
 
     def _on_source(self, message: Any) -> None:
         """Obstacles or scan: converted in _perceive, where a refusal becomes NaN sectors."""
-        stamp = stamp_ns(message.header.stamp)
-        self._diagnostics.input_received(self._source.name, stamp)
-        if self._by_stamp:
-            self._pair(self._source.name, stamp, message, self._pairs.add_b)
+        stamp, name = stamp_ns(message.header.stamp), self._source.name
+        fault, is_ordered = self._check(name, message)
+        if not is_ordered:
+            self._diagnostics.set_fault(name, fault)
+        elif self._by_stamp:
+            self._pair(name, stamp, fault or message, self._pairs.add_b)
         else:
-            self._on_inputs(stamp, self._pose, message)
+            self._on_inputs(stamp, self._pose, fault or message)
+
+    def _check(self, name: str, message: Any) -> InputVerdict:
+        verdict = self._monitor.check(name, message)
+        if verdict.is_ordered:
+            self._diagnostics.input_received(name, stamp_ns(message.header.stamp))
+        return verdict
 
     def _pair(self, name: str, stamp: int, value: Any, add: Any) -> None:
         try:
@@ -90,12 +106,12 @@ class VirtualSensor(GraphNode):
     def _on_inputs(self, stamp: int, pose: Pose2D | None, message: Any) -> None:
         """One tick: the sectors of one stamp, NaN where an input was refused."""
         ranges: Ranges = (math.nan,) * self.sensor.sectors
-        fault = ""
+        fault = message if isinstance(message, str) else ""
         if pose is None:
             self.get_logger().warning(
                 "no usable odom: the sectors are blind", throttle_duration_sec=1.0
             )
-        else:
+        elif not fault:
             try:
                 ranges = self._perceive(pose, message)
             except InputError as error:
@@ -107,20 +123,12 @@ class VirtualSensor(GraphNode):
         """Convert obstacles or scan and measure; InputError where it is refused."""
         s = self.settings
         if s.source is Source.SCAN:
-            scan = laser_scan(message, s.scan_frame)
+            scan = laser_scan(message, s.scan_frame, s.scan_no_return)
             return sense_scan(scan, pose.yaw + s.scan_yaw, s.robot_radius_m, self.sensor)
         centers = obstacle_centers(message)
-        circles = zip(centers, self._enlarged_radii(centers))
+        radii = enlarged_radii(len(centers), self.radii, s.robot_radius_m)
+        circles = zip(centers, radii)
         return sense_circles(pose.position, circles, self.sensor)
-
-    def _enlarged_radii(self, centers: Sequence[Point]) -> list[float]:
-        """A single radius holds for all obstacles; otherwise one per obstacle is required."""
-        radii = self.radii * len(centers) if len(self.radii) == 1 else self.radii
-        if len(radii) != len(centers):
-            raise InputError(
-                f"{len(centers)} obstacles but {len(radii)} obstacle_radii_m; give one each"
-            )
-        return [r + self.settings.robot_radius_m for r in radii]
 
     def _publish(self, stamp: int, ranges: Ranges) -> None:
         s = self.settings

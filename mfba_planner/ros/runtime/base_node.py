@@ -18,7 +18,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from ..interface import parameters
-from ..interface.topics import Topic, expected_readers, reading_qos
+from ..interface.topics import Topic, expected_readers, reading_qos, with_depth
 from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
 
 SPIN_S = 0.1  # longest time until a signal is noticed
@@ -63,21 +63,30 @@ class GraphNode(Node):
         profiles = reading_qos(topic, foreign_writers=foreign_writers)
         self.create_subscriptions(message_type or topic.type, topic.name, callback, profiles)
 
+    def subscribe_with_info(
+        self, topic: Topic, callback: Callable[[Any, Any], None], depth: int
+    ) -> None:
+        """As subscribe, with a queue of this depth; callback gets rclpy's MessageInfo as well."""
+        profiles = with_depth(reading_qos(topic), depth)
+        self.create_subscriptions(topic.type, topic.name, callback, profiles, info=True)
+
     def create_subscriptions(
         self,
         message_type: Any,
         name: str,
         callback: Callable[..., None],
         profiles: list[QoSProfile],
+        *,
+        info: bool = False,
     ) -> None:
         """Subscribe with each QoS profile; a message that fits more than one is delivered once.
 
-        With one profile, a callback of two arguments gets rclpy's MessageInfo as well.
+        With one profile, or with info, a callback of two arguments gets rclpy's MessageInfo too.
         """
         several = len(profiles) > 1
         # With several, a publisher that does not fit one profile fits another: no warning then.
         events = SubscriptionEventCallbacks(use_default_callbacks=not several)
-        call: Any = _without_duplicates(callback) if several else callback
+        call: Any = _without_duplicates(callback, info=info) if several else callback
         for qos in profiles:
             self._subscribed.append(
                 self.create_subscription(message_type, name, call, qos, event_callbacks=events)
@@ -174,12 +183,14 @@ class GraphNode(Node):
         super().destroy_node()
 
 
-def _without_duplicates(callback: Callable[[Any], None]) -> Callable[[Any, Any], None]:
+def _without_duplicates(
+    callback: Callable[..., None], *, info: bool
+) -> Callable[[Any, Any], None]:
     """Call back once per message, though two subscriptions deliver it."""
     duplicates = DuplicateFilter()
 
-    def call(message: Any, info: Any) -> None:
-        if duplicates.is_new(info):
-            callback(message)
+    def call(message: Any, message_info: Any) -> None:
+        if duplicates.is_new(message_info):
+            callback(*((message, message_info) if info else (message,)))
 
     return call

@@ -11,13 +11,19 @@ from .stamp_pairing import StampPairs
 
 
 class Inputs(NamedTuple):
-    """What one decision is made on; scan is the one of the sectors, for a tracking planner."""
+    """What one decision is made on; scan is the one of the sectors, for a planner that reads it.
+
+    The stamp is that of sectors and scan. pose_stamp_ns is that of the pose if it is later, and
+    sensed then the scan's stamp and the pose at it, as in Observation.
+    """
 
     stamp_ns: int
     pose: Pose2D | RefusalReason
     ranges_m: Ranges | RefusalReason
     age_s: float = 0.0
     scan: Scan | None = None
+    pose_stamp_ns: int | None = None
+    sensed: tuple[int, Pose2D] | None = None
 
 
 class LockstepInputs:
@@ -44,6 +50,9 @@ class LockstepInputs:
     ) -> Inputs | None:
         """Add sectors and their scan; StampError for a stamp older than the last pair's."""
         return _inputs(stamp_ns, self._pairs.add_b(stamp_ns, (ranges_m, scan)))
+
+    def refuse(self, _name: str, _fault: str) -> None:
+        """Nothing: in lockstep no stamp is refused before it is paired."""
 
     def stale(self, _now_s: float, _timeout_s: float) -> Inputs | None:
         """None: in lockstep time does not pass without a message."""

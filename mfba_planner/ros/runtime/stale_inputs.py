@@ -7,6 +7,7 @@ from ...core.errors import StampError
 from ...core.geometry import Pose2D
 from ...core.planner_types import Ranges, RefusalReason, Scan
 from .lockstep_inputs import Inputs
+from .pose_history import PoseHistory
 
 
 def watch_period_s(timeout_s: float, *, lockstep: bool) -> float:
@@ -15,13 +16,17 @@ def watch_period_s(timeout_s: float, *, lockstep: bool) -> float:
 
 
 class NewestInputs:
-    """Real time: each sectors message with the newest odom; now_s is of any steady clock."""
+    """Real time: each sectors message with the newest odom; now_s is of any steady clock.
+
+    With a scan, odometry of another stamp is brought to the stamps: see _newest.
+    """
 
     def __init__(self) -> None:
         """Start with nothing received."""
         self._pose: Pose2D | RefusalReason = "no odom yet"
         self._ranges: Ranges | RefusalReason = "no sectors yet"
         self._scan: Scan | None = None
+        self._history = PoseHistory()
         self._odom_ns = self._sectors_ns = -1
         self._odom_s = self._sectors_s = 0.0
 
@@ -32,6 +37,8 @@ class NewestInputs:
         if stamp_ns > self._odom_ns:  # the same stamp again does not make odom younger
             self._odom_s = now_s
         self._odom_ns, self._pose = stamp_ns, pose
+        if not isinstance(pose, str):
+            self._history.add(stamp_ns, pose)
         return None
 
     def add_sectors(
@@ -48,6 +55,16 @@ class NewestInputs:
         self._scan = scan
         return self._newest(now_s - self._odom_s if self._odom_ns >= 0 else 0.0)
 
+    def refuse(self, name: str, fault: str) -> None:
+        """A message of odom or sectors is refused, and its stamp has no place among the others.
+
+        Its reason takes the place of what is known; no decision follows, unless one is due.
+        """
+        if name == "odom":
+            self._pose = fault
+        else:
+            self._ranges, self._scan = fault, None
+
     def stale(self, now_s: float, timeout_s: float) -> Inputs | None:
         """The newest inputs if one is older than timeout_s; None before any sectors."""
         oldest_s = min(self._sectors_s, self._odom_s if self._odom_ns >= 0 else self._sectors_s)
@@ -55,7 +72,17 @@ class NewestInputs:
         return self._newest(now_s - oldest_s) if too_old else None
 
     def _newest(self, age_s: float) -> Inputs:
-        return Inputs(self._sectors_ns, self._pose, self._ranges, age_s, self._scan)
+        """With a scan that is older than odom: also the pose at the scan's stamp.
+
+        With a scan that is newer, the pose is brought to its stamp.
+        """
+        inputs = Inputs(self._sectors_ns, self._pose, self._ranges, age_s, self._scan)
+        at_scan = self._history.at(self._sectors_ns)
+        if self._scan is None or isinstance(self._pose, str) or at_scan is None:
+            return inputs
+        if self._odom_ns <= self._sectors_ns:
+            return inputs._replace(pose=at_scan)
+        return inputs._replace(pose_stamp_ns=self._odom_ns, sensed=(self._sectors_ns, at_scan))
 
 
 def _goes_back(what: str, stamp_ns: int, last_ns: int) -> str:

@@ -20,9 +20,10 @@ class StampPairs(Generic[A, B]):
     With `repeat`, the last pair is returned again when both its messages are received again.
     """
 
-    def __init__(self, *, repeat: bool = False) -> None:
-        """Start with nothing waiting."""
+    def __init__(self, *, repeat: bool = False, limit: int | None = None) -> None:
+        """Start with nothing waiting; limit replaces WAITING_LIMIT."""
         self._repeat = repeat
+        self._limit = WAITING_LIMIT if limit is None else limit
         self._a: OrderedDict[int, A] = OrderedDict()
         self._b: OrderedDict[int, B] = OrderedDict()
         self._paired_ns = -1
@@ -34,7 +35,7 @@ class StampPairs(Generic[A, B]):
             pair = (value, self._b[stamp_ns])
             self._drop_up_to(stamp_ns)
             return pair
-        _keep(stamp_ns, value, self._a)
+        self._keep(stamp_ns, value, self._a)
         return None
 
     def add_b(self, stamp_ns: int, value: B) -> tuple[A, B] | None:
@@ -44,7 +45,7 @@ class StampPairs(Generic[A, B]):
             pair = (self._a[stamp_ns], value)
             self._drop_up_to(stamp_ns)
             return pair
-        _keep(stamp_ns, value, self._b)
+        self._keep(stamp_ns, value, self._b)
         return None
 
     def _refuse_old(self, stamp_ns: int) -> None:
@@ -61,8 +62,7 @@ class StampPairs(Generic[A, B]):
             while waiting and next(iter(waiting)) <= stamp_ns:
                 waiting.popitem(last=False)
 
-
-def _keep(stamp_ns: int, value: Any, waiting: OrderedDict[int, Any]) -> None:
-    waiting[stamp_ns] = value
-    if len(waiting) > WAITING_LIMIT:
-        waiting.popitem(last=False)
+    def _keep(self, stamp_ns: int, value: Any, waiting: OrderedDict[int, Any]) -> None:
+        waiting[stamp_ns] = value
+        if len(waiting) > self._limit:
+            waiting.popitem(last=False)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ..core.geometry import Point, Pose2D, bearing, distance, wrap_angle
 from ..core.planner_types import NANO, Decision
-from .robot_model import Base
+from ..core.robot_base import Base
 
 SUBTICK_NS = 10_000_000  # period at which speeds change within a tick
 

@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D, distance, pose_as_in_message
 from mfba_planner.core.planner_types import Decision, Mode
-from mfba_planner.planning.planner_params import PlannerParams
-from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
-from mfba_planner.scenarios.scenario_json import scenario_to_json
-from mfba_planner.simulation.differential_drive import (
+from mfba_planner.core.robot_base import Base, Drive
+from mfba_planner.planning.differential_drive import (
     Speeds,
     apply_command,
     arc,
@@ -22,8 +20,11 @@ from mfba_planner.simulation.differential_drive import (
     command,
     track,
 )
+from mfba_planner.planning.planner_params import PlannerParams
+from mfba_planner.scenarios.scenario_files import load_scenario, parse_scenario
+from mfba_planner.scenarios.scenario_json import scenario_to_json
 from mfba_planner.simulation.episode import Outcome
-from mfba_planner.simulation.robot_model import Base, Drive, Lidar, Noise, Robot
+from mfba_planner.simulation.robot_model import Lidar, Noise, Robot
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.simulation.world import World

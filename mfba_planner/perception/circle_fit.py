@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Circles through returns and along edges: weighted Gauss-Newton for many circles at once.
+
+A return p gives |p - c| - r = 0, weighted by the range's variance. A sure edge gives the tangent
+between the last beam that met the circle and the first that did not: n . (c - o) + r = 0 with the
+outward normal n, weighted by the variance of a uniform angle within that gap. Edges show the
+width even where few returns show no curvature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import small_matrices as sm
+
+Array = np.ndarray
+
+MOST_RETURNS = 8.0  # returns of a circle that count as independent
+_UNIFORM = 1.0 / 12.0  # variance of a uniform number in an interval of length 1
+_TINY = 1e-9
+_WEAK = 1.0 / 0.3**2  # information on a centre that nothing else shows, 1/m^2
+LEAST_RADIUS_M = 0.01
+_SYMMETRIC = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])  # from the upper triangle
+
+
+@dataclass(frozen=True, slots=True)
+class Returns:
+    """k returns of g groups, one circle each, and e sure edges of these groups."""
+
+    x: Array  # (k,) m
+    y: Array
+    group: Array  # (k,) int
+    edge_x: Array  # (e,) m, origin of the beam at the edge
+    edge_y: Array
+    normal_x: Array  # (e,) outward
+    normal_y: Array
+    edge_gap_m: Array  # (e,) width of the gap at the surface
+    edge_group: Array  # (e,) int
+    count: Array  # (g,) returns of each group
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Measured circles: z = (x, y, r), its information matrix without the prior, residuals."""
+
+    z: Array  # (g, 3) m
+    information: Array  # (g, 3, 3) of returns and edges
+    covariance: Array  # (g, 3, 3) with the prior
+    rms_m: Array  # (g,) of the returns' residuals
+    vector: Array  # (g, 3): information z, as returns and edges alone would have it
+
+
+def fit(
+    returns: Returns,
+    start: Array,
+    prior_radius_m: Array,
+    prior_variance: Array,
+    range_variance: float,
+    passes: int = 2,
+) -> Fit:
+    """Fit the circles from their starts (g, 3) and priors of the radius (g,).
+
+    The centre has no prior but a weak one at the start, for groups that do not show it.
+    """
+    groups = start.shape[0]
+    rows = _Rows(returns, range_variance, groups)
+    prior = np.zeros((groups, 3, 3))
+    prior[:, 0, 0] = prior[:, 1, 1] = _WEAK
+    prior[:, 2, 2] = 1.0 / prior_variance
+    anchor = start * _WEAK
+    anchor[:, 2] = prior_radius_m / prior_variance
+    z = start
+    for _ in range(passes):
+        information, gradient = rows.normal_equations(z)
+        covariance = sm.inverse(information + prior)
+        vector = sm.applied(information, z) + gradient
+        z = sm.applied(covariance, vector + anchor)
+        np.maximum(z[:, 2], LEAST_RADIUS_M, out=z[:, 2])
+    return Fit(z, information, covariance, rows.rms(z), vector)
+
+
+class _Rows:
+    """The linear equations of all returns, then of all edges."""
+
+    def __init__(self, returns: Returns, range_variance: float, groups: int) -> None:
+        self._returns, self._groups = returns, groups
+        k, e = returns.x.size, returns.edge_group.size
+        shared = np.minimum(1.0, MOST_RETURNS / np.maximum(returns.count, 1.0)) / range_variance
+        self._group = np.concatenate((returns.group, returns.edge_group))
+        self._weight = np.empty(k + e)
+        self._weight[:k] = shared[returns.group]
+        self._weight[k:] = 1.0 / (_UNIFORM * returns.edge_gap_m**2 + range_variance)
+        self._hx, self._hy, self._residual = np.empty(k + e), np.empty(k + e), np.empty(k + e)
+        self._hx[k:], self._hy[k:] = returns.normal_x, returns.normal_y
+        self._edge = returns.normal_x * returns.edge_x + returns.normal_y * returns.edge_y
+        self._sums = (9 * self._group + np.arange(9)[:, None]).ravel()
+        self._terms = np.empty((9, k + e))
+
+    def normal_equations(self, z: Array) -> tuple[Array, Array]:
+        """Information (g, 3, 3) and gradient (g, 3) at circles z (g, 3)."""
+        returns, hx, hy, e = self._returns, self._hx, self._hy, self._residual
+        k = returns.x.size
+        of_return, of_edge = z[returns.group], z[returns.edge_group]
+        dx, dy = returns.x - of_return[:, 0], returns.y - of_return[:, 1]
+        d = np.sqrt(dx * dx + dy * dy)
+        d += _TINY
+        np.divide(dx, d, out=hx[:k])
+        np.divide(dy, d, out=hy[:k])
+        np.subtract(d, of_return[:, 2], out=e[:k])
+        e[k:] = self._edge - hx[k:] * of_edge[:, 0] - hy[k:] * of_edge[:, 1] - of_edge[:, 2]
+        t, w = self._terms, self._weight
+        np.multiply(w, hx, out=t[2])
+        np.multiply(w, hy, out=t[4])
+        t[5] = w
+        np.multiply(t[2], hx, out=t[0])
+        np.multiply(t[2], hy, out=t[1])
+        np.multiply(t[4], hy, out=t[3])
+        np.multiply(t[2], e, out=t[6])
+        np.multiply(t[4], e, out=t[7])
+        np.multiply(w, e, out=t[8])
+        total = np.bincount(self._sums, t.ravel(), 9 * self._groups).reshape(-1, 9)
+        return total[:, _SYMMETRIC].reshape(-1, 3, 3), total[:, 6:]
+
+    def rms(self, z: Array) -> Array:
+        """Root mean square (g,) of the returns' distances from circles z (g, 3)."""
+        returns = self._returns
+        of_return = z[returns.group]
+        dx, dy = returns.x - of_return[:, 0], returns.y - of_return[:, 1]
+        e = np.sqrt(dx * dx + dy * dy) - of_return[:, 2]
+        squares = np.bincount(returns.group, e * e, self._groups)
+        rms: Array = np.sqrt(squares / np.maximum(returns.count, 1.0))
+        return rms
+
+
+def start_of(
+    origin: Array, nearest_m: Array, right: Array, left: Array, sure: Array, radius_m: Array
+) -> Array:
+    """First guess (g, 3) from directions (g, 2) to both edges and the range of the nearest return.
+
+    Where both edges are sure, the tangents give the radius: r = (d + r) sin(alpha) with half the
+    angle between them; otherwise it is radius_m (g,).
+    """
+    middle = right + left
+    length = np.sqrt(middle[:, 0] ** 2 + middle[:, 1] ** 2)
+    middle = middle / np.maximum(length, _TINY)[:, None]
+    across = right[:, 0] * left[:, 1] - right[:, 1] * left[:, 0]
+    along = right[:, 0] * left[:, 0] + right[:, 1] * left[:, 1]
+    # sin of half the angle, from its cosine
+    half = np.sqrt(np.maximum(0.5 * (1.0 - along), 0.0))
+    wide = (across <= 0.0) & (along < 0.5)  # more than half a turn: the robot is within its hull
+    half = np.where(wide, 1.0, np.minimum(half, 0.95))
+    shown = nearest_m * half / (1.0 - np.minimum(half, 0.95))
+    r = np.where(sure & ~wide, np.clip(shown, LEAST_RADIUS_M, 3.0), radius_m)
+    reach = nearest_m + r
+    return np.column_stack((origin + middle * reach[:, None], r))

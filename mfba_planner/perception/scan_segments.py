@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Segments of a scan: neighbouring returns of one surface, and the edges that show its width."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scan_beams import Beams
+
+Array = np.ndarray
+
+_JOIN_SPACINGS = 3.0  # neighbours of one surface are nearer than so many spacings of the beams
+_JOIN_MOST_M = 0.6
+_EDGE_STEP_M = 0.1  # the beam beside an edge ends at least so much farther
+_LIMIT_M = 0.2  # surfaces so near to the longest range may continue beyond it
+_MOST_MISSING = 3  # beam numbers between neighbours of one segment
+_PASSES = 4  # cuts at humps within one segment, each halving it
+_APART = 1e4  # m, offset between segments whose running minima must not meet
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """n segments of k returns, in the order of their angles.
+
+    left and right refer to the robot: the first return of a segment is at its right edge. An
+    edge is sure if the beam beside it went on for at least 0.1 m: there the surface ends.
+    """
+
+    x: Array  # (k,) m, returns in odom
+    y: Array
+    beam: Array  # (k,) index in Beams
+    range_m: Array  # (k,) m
+    segment: Array  # (k,) int, ascending
+    first: Array  # (n,) index of a segment's first return
+    last: Array
+    right_gap_rad: Array  # (n,) angle to the beam beside the edge; 0 if the edge is not sure
+    left_gap_rad: Array
+
+    @property
+    def count(self) -> int:
+        """Number of segments."""
+        return self.first.size
+
+
+def no_segments() -> Segments:
+    """Of a scan without returns."""
+    none, empty = np.empty(0, dtype=np.int64), np.empty(0)
+    return Segments(empty, empty, none, empty, none, none, none, empty, empty)
+
+
+def segments(
+    beams: Beams,
+    taken: Array,
+    x: Array,
+    y: Array,
+    label: Array,
+    known: Array,
+    join_m: float,
+    hump_m: float,
+) -> Segments:
+    """Cut the returns of a scan.
+
+    taken (k,) are the indices of beams with a return, from taken_from_a_gap(), and x, y where
+    they are. label (k,) is the number of the obstacle at which a return is expected, or -1:
+    where it changes from one obstacle to another there is a cut, and where it changes to none
+    from one whose outline is known (m,): something else begins there.
+    """
+    if not taken.size:
+        return no_segments()
+    r = beams.range_m[taken]
+    dx, dy = x[1:] - x[:-1], y[1:] - y[:-1]
+    lower = np.minimum(r[1:], r[:-1])
+    lower *= _JOIN_SPACINGS * beams.spacing_rad
+    limit = np.maximum(np.minimum(lower, _JOIN_MOST_M), join_m)
+    number = beams.number[taken]
+    missing = (number[1:] - number[:-1]) % beams.count
+    cut = dx * dx + dy * dy > limit * limit
+    cut |= (taken[1:] - taken[:-1]) % beams.range_m.size != 1
+    cut |= missing > _MOST_MISSING
+    if known.size:
+        one, other = label[1:], label[:-1]
+        surely = known[np.maximum(one, other)]  # of the obstacle, if the other is none
+        cut |= (one != other) & ((np.minimum(one, other) >= 0) | surely)
+    _cut_at_humps(r, cut, hump_m)
+    last = np.concatenate((np.flatnonzero(cut), [r.size - 1]))
+    first = np.concatenate(([0], last[:-1] + 1))
+    segment = np.zeros(r.size, dtype=np.int64)
+    segment[first[1:]] = 1
+    segment = np.cumsum(segment)
+    right, left = _edges(beams, taken, first, last)
+    return Segments(x, y, taken, r, segment, first, last, right, left)
+
+
+def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
+    """Cut where ranges rise and fall again by hump_m: two convex bodies side by side.
+
+    The height of a return is that above the lower of the two nearest returns on its sides; the
+    highest of a segment is cut, then its parts are looked at again. Changes cut (k - 1,).
+    """
+    if r.size < 3:
+        return
+    joined = ~cut
+    smooth = r.copy()  # the mean of three, where all are of one segment
+    inner = joined[1:] & joined[:-1]
+    smooth[1:-1] = np.where(inner, (r[:-2] + r[1:-1] + r[2:]) / 3.0, r[1:-1])
+    for _ in range(_PASSES):
+        offset = np.concatenate(([0.0], np.cumsum(cut) * _APART))
+        before = np.minimum.accumulate(smooth - offset) + offset
+        after = (np.minimum.accumulate((smooth + offset)[::-1]))[::-1] - offset
+        height = smooth - np.maximum(before, after)
+        high = np.flatnonzero(height > hump_m)
+        if not high.size:
+            return
+        # The highest of each segment: sorted by segment, then by height, the last one.
+        number = offset[high]
+        order = np.lexsort((height[high], number))
+        number = number[order]
+        top = high[order[np.concatenate((number[1:] != number[:-1], [True]))]]
+        # The return itself stays with the nearer of its neighbours.
+        top = top[(top > 0) & (top < r.size - 1)]
+        if not top.size:
+            return
+        with_next = np.abs(r[top + 1] - r[top]) < np.abs(r[top] - r[top - 1])
+        cut[np.where(with_next, top - 1, top)] = True
+
+
+def _edges(beams: Beams, taken: Array, first: Array, last: Array) -> tuple[Array, Array]:
+    """Angles from the outermost returns to the beams beside them; 0 where that is no edge."""
+    size = beams.range_m.size
+    gaps = []
+    for index, step in ((taken[first], -1), (taken[last], 1)):
+        beside = index + step
+        inside = (beside >= 0) & (beside < size)
+        beside = beside % size
+        r = beams.range_m[index]
+        gap = ((beams.number[beside] - beams.number[index]) * step) % beams.count
+        if not beams.turns:
+            gap = np.where(inside, gap, 0)
+        sure = (beams.range_m[beside] > r + _EDGE_STEP_M) & (r < beams.longest_m - _LIMIT_M)
+        sure &= gap * beams.spacing_rad < 0.5 * math.pi
+        gaps.append(np.where(sure, gap * beams.spacing_rad, 0.0))
+    return gaps[0], gaps[1]
+
+
+def taken_from_a_gap(beams: Beams) -> Array:
+    """Indices (k,) of the beams with a return, in the order of their angles.
+
+    In a full turn the first is one after a beam that met nothing or, without such, after the
+    largest step: no surface may begin at the end of the arrays and go on at their start.
+    """
+    hit = np.isfinite(beams.range_m)
+    taken = np.flatnonzero(hit)
+    if not beams.turns or taken.size < 2:
+        return taken
+    if taken.size < hit.size:
+        start = int(np.argmin(hit))
+    else:
+        r = beams.range_m
+        start = (int(np.argmax(np.abs(r[1:] - r[:-1]))) + 1) if r.size > 1 else 0
+    k = int(np.searchsorted(taken, start))
+    return np.concatenate((taken[k:], taken[:k])) if 0 < k < taken.size else taken

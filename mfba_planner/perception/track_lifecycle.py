@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What happens to tracks beside their filter: whether they move, and when they end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from .circle_fit import Fit
+from .group_outline import Outline
+from .scan_beams import Beams
+from .track_association import NONE
+from .track_bank import RADIUS, VX, VY, TrackBank
+from .tracking_params import TrackingParams
+
+Array = np.ndarray
+Appeared = Callable[[Array, Array], Array]
+
+_MOVES, _RESTS = 12.0, 4.0  # squared significances of a velocity: begins to move, is at rest
+_SURELY_MOVES, _SURE_SCANS = 100.0, 4  # where one edge only is seen
+_UNKNOWN_SPEED_SD = 0.15  # m/s
+_LEAST_SPEED = 0.03  # m/s; slower counts as at rest
+_APPEARED_S = 1.0  # for so long after returns in free space a velocity is believed
+_SEES_PAST_M = 0.15  # beams that end so much behind a circle have seen through it
+_MIDDLE_SHARE = 0.7  # of a radius: beams so near to the centre must meet the circle
+_MOST_MISSED = 2  # scans in a row that see through a track before it is dropped
+_NEW_S = 0.25  # a track is kept so long without a return, and as long again as it was seen
+_LOST_VARIANCE = 0.25  # m^2, of a centre too uncertain to keep
+_FRAGMENT_M = 0.05
+
+
+def judge_motion(
+    bank: TrackBank,
+    index: Array,
+    group: Array,
+    fitted: Fit,
+    outline: Outline,
+    noise_m: float,
+    appeared: Appeared,
+) -> None:
+    """Decide which of the tracks of these indices move.
+
+    appeared tells of points (k,) whether they lie in space that was seen free.
+    """
+    if not index.size:
+        return
+    v = bank.state[index, 2:4]
+    speed2 = v[:, 0] ** 2 + v[:, 1] ** 2
+    P = bank.covariance[index]
+    variance = 0.5 * (P[:, VX, VX] + P[:, VY, VY])
+    significance = speed2 / variance
+    moving = bank.moving[index]
+    fast = speed2 > _LEAST_SPEED**2
+    begins = ~moving & (significance > _MOVES) & fast
+    round_ = fitted.rms_m[group] < 0.02 + 2.0 * noise_m
+    surely = (significance > _SURELY_MOVES) & (bank.scans[index] >= _SURE_SCANS)
+    clean = round_ & (outline.whole[group] | (outline.half[group] & surely))
+    unclear = (begins & ~clean).nonzero()[0]
+    if unclear.size:
+        _look_for_free_space(bank, index[unclear], group[unclear], outline, appeared)
+    believed = clean | (bank.appeared_s[index] < _APPEARED_S)
+    # What has just turned moves on, though its velocity is not known well.
+    still = (significance > _RESTS) | (variance > _UNKNOWN_SPEED_SD**2)
+    moving = np.where(moving, still & fast, begins & believed)
+    bank.moving[index] = moving
+
+
+def _look_for_free_space(
+    bank: TrackBank, index: Array, group: Array, outline: Outline, appeared: Appeared
+) -> None:
+    returns = outline.returns
+    position = np.full(outline.start.shape[0], NONE)
+    position[group] = np.arange(group.size)
+    of = position[returns.group]
+    chosen = of != NONE
+    found = appeared(returns.x[chosen], returns.y[chosen])
+    share = np.bincount(of[chosen], found, group.size)
+    total = np.bincount(of[chosen], minlength=group.size)
+    bank.appeared_s[index[share >= np.maximum(0.3 * total, 1.0)]] = 0.0
+
+
+def fragments(group: Array, fitted: Fit, outline: Outline, wall: Array, noise_m: float) -> Array:
+    """Which of these groups are one or two returns at the edge of a larger group's circle."""
+    returns = outline.returns
+    small = returns.count[group] <= 2.0
+    large = (~wall & (returns.count > 2.0)).nonzero()[0]
+    if not (small.any() and large.size):
+        return np.zeros(group.size, dtype=bool)
+    z = fitted.z[large]
+    dx, dy = returns.x[:, None] - z[:, 0], returns.y[:, None] - z[:, 1]
+    limit = z[:, 2] + _FRAGMENT_M + 2.0 * noise_m
+    inside = (dx * dx + dy * dy < limit * limit).any(axis=1)
+    outside = np.bincount(returns.group, ~inside, returns.count.size)
+    fragment: Array = small & (outside[group] == 0.0)
+    return fragment
+
+
+def drop_lost(
+    bank: TrackBank,
+    beams: Beams,
+    origin: Array,
+    updated: Array,
+    pose_sd_m: Array,
+    params: TrackingParams,
+) -> None:
+    """Drop tracks that beams see through, that are inside others, or unseen for too long."""
+    p = params
+    unseen = np.zeros(bank.count, dtype=bool)
+    unseen[: updated.size] = ~updated
+    index = np.flatnonzero(unseen)
+    if not index.size:
+        return
+    state = bank.state[index]
+    dx, dy = state[:, 0] - origin[0], state[:, 1] - origin[1]
+    bank.missed[index] += _beams_through(bank, beams, index, dx, dy, pose_sd_m[index])
+    other = bank.state[~unseen]
+    ox, oy = state[:, 0, None] - other[:, 0], state[:, 1, None] - other[:, 1]
+    covered = np.any(ox * ox + oy * oy < other[:, RADIUS] ** 2, axis=1)
+    longest = np.where(bank.moving[index], p.forget_s, p.forget_standing_s)
+    longest = np.minimum(longest, _NEW_S + 2.0 * bank.known_s[index])
+    P = bank.covariance[index]
+    lost = bank.moving[index] & (P[:, 0, 0] + P[:, 1, 1] > _LOST_VARIANCE)
+    few = bank.scans[index] < 3
+    gone = (bank.missed[index] >= np.where(few, 1, _MOST_MISSED)) | covered | lost
+    gone |= bank.unseen_s[index] > longest
+    kept = np.ones(bank.count, dtype=bool)
+    kept[index[gone]] = False
+    bank.keep(kept)
+
+
+def _beams_through(
+    bank: TrackBank, beams: Beams, index: Array, dx: Array, dy: Array, pose_sd_m: Array
+) -> Array:
+    """Whether the beams through the middle of each circle end behind it, and there is one; (j,).
+
+    dx and dy (j,) are the centres relative to the robot.
+    """
+    d = np.sqrt(dx * dx + dy * dy)
+    bearing = np.arctan2(dy, dx)
+    number = beams.index_of(bearing)
+    inside = (number >= 0) & (number < beams.count)
+    number = np.where(inside, number, 0)
+    off = np.remainder(bearing - beams.angle_min_rad - number * beams.spacing_rad, 2.0 * math.pi)
+    off = np.where(off > math.pi, off - 2.0 * math.pi, off)
+    reach = np.zeros(beams.count)
+    reach[beams.number] = np.minimum(beams.range_m, beams.longest_m)
+    margin = _SEES_PAST_M + 2.0 * np.minimum(bank.position_sd_m[index], 0.15)
+    middle = _MIDDLE_SHARE * bank.state[index, RADIUS] - pose_sd_m
+    any_beam, all_pass = np.zeros(index.size, dtype=bool), inside
+    for beside in (-1, 0, 1):
+        met = np.abs(off - beside * beams.spacing_rad) * d < middle
+        any_beam = any_beam | met
+        all_pass = all_pass & (~met | (reach[(number + beside) % beams.count] > d + margin))
+    through: Array = any_beam & all_pass
+    return through
