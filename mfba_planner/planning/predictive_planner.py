@@ -41,7 +41,6 @@ HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
 # A differential drive cannot step aside when an obstacle beside it turns towards it.
 TURNING_MARGIN_M = 0.1
 _FREE_M = 1e-9
-_STILL_M = 1e-4
 _LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
 
 
@@ -227,8 +226,8 @@ class Predictive(BasePlanner):
         return tuple(closed.tolist())
 
     def _is_observed(self, offset: Point) -> bool:
-        """Whether the lidar has covered the direction of an offset; standing still needs none."""
-        if self._unobserved is None or math.hypot(*offset) < _STILL_M:
+        """Whether the lidar has covered an offset's direction; waiting has that of the goal."""
+        if self._unobserved is None:
             return True
         return not self._unobserved[self._gap(offset) - 1]
 

@@ -19,7 +19,7 @@ from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 
 TIMEOUT_S = 5.0  # long, so that a busy machine does not look like a fault
-TRACKING = {"method": "predictive", "scan_radius_m": 0.3}  # a planner that reads scans itself
+TRACKING = {"method": "predictive"}  # a planner that reads scans itself
 BEAMS = 90
 FREE = (math.inf,) * BEAMS
 WALL = (0.7,) * BEAMS  # on all sides

@@ -230,7 +230,7 @@ def test_two_lidars_on_one_topic_stop_the_robot(graph: Graph) -> None:
     assert robot.inputs("virtual_sensor").level == OK
 
 
-def test_two_lidars_are_told_apart_by_their_frames(graph: Graph) -> None:
+def test_two_lidars_are_distinguished_by_their_frames(graph: Graph) -> None:
     robot = RealTimeRobot(graph)
     other = graph.writer(topics.SCAN)
     assert robot.drive() == DRIVES
@@ -366,7 +366,7 @@ def test_a_scan_that_contradicts_itself_stops_the_robot_and_is_named(
     assert robot.drive() == DRIVES
 
 
-def test_beams_that_turn_clockwise_are_seen_where_they_are(graph: Graph) -> None:
+def test_beams_that_turn_clockwise_have_their_directions(graph: Graph) -> None:
     robot = RealTimeRobot(graph)
     ranges = [math.inf] * BEAMS
     ranges[BEAMS // 8] = 0.7  # 45 degrees clockwise of the first beam
@@ -374,5 +374,5 @@ def test_beams_that_turn_clockwise_are_seen_where_they_are(graph: Graph) -> None
     clockwise["angle_max"] = clockwise["angle_increment"] * (BEAMS - 1)
     robot.send_odom(stamp())
     robot.send_scan(scan_of(stamp(), ranges, **clockwise))
-    seen = [i for i, r in enumerate(robot.sectors[-1].ranges, start=1) if r < math.inf]
-    assert seen == [10, 11, 12]
+    found = [i for i, r in enumerate(robot.sectors[-1].ranges, start=1) if r < math.inf]
+    assert found == [10, 11, 12]

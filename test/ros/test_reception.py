@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dropped messages and competing publishers, told by sequence numbers; without ROS."""
+"""Dropped messages and competing publishers, found by sequence numbers; without ROS."""
 
 import pytest
 from hypothesis import given

@@ -123,8 +123,8 @@ def test_while_an_input_is_silent_it_is_no_measure_for_the_others() -> None:
     assert inputs.tick(3.0) == ("", "")
 
 
-def test_any_pace_of_simulated_time_is_accepted() -> None:
-    for pace in (0.1, 1.0, 50.0):
+def test_any_speed_of_simulated_time_is_accepted() -> None:
+    for speed in (0.1, 1.0, 50.0):
         inputs = Inputs(zero_ns=10 * SECOND)
-        faults = [inputs.tick(0.1 * pace * k) for k in range(20)]
-        assert [scan for _, scan in faults] == [""] * 20, pace
+        faults = [inputs.tick(0.1 * speed * k) for k in range(20)]
+        assert [scan for _, scan in faults] == [""] * 20, speed

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""On the real graph: the robot does not drive into directions that no beam has covered."""
+
+import math
+from typing import Any
+
+import pytest
+from real_time_robot import BEAMS, DRIVES, FREE, STOPS, TRACKING, RealTimeRobot, scan_of, stamp
+from ros_graph import Graph
+
+from mfba_planner.core.planner_types import Mode
+from mfba_planner.recording.from_messages import decision
+
+PAPER = {"method": "paper"}
+FRONT = tuple(math.nan if abs(k - BEAMS // 2) < 12 else math.inf for k in range(BEAMS))
+
+
+def velocity(robot: RealTimeRobot) -> tuple[float, float]:
+    return decision(robot.decisions[-1], ()).velocity
+
+
+@pytest.mark.parametrize("planner", [PAPER, TRACKING], ids=["paper", "predictive"])
+@pytest.mark.parametrize(
+    ("convention", "reading", "mode"),
+    [
+        ("inf", math.inf, DRIVES),
+        ("inf", 0.0, STOPS),
+        ("inf", math.nan, STOPS),
+        ("zero", 0.0, DRIVES),
+        ("nan", math.nan, DRIVES),
+        ("range_max", 10.0, DRIVES),
+        ("zero", math.nan, STOPS),
+    ],
+)
+def test_what_a_driver_reports_for_nothing(
+    graph: Graph, planner: dict[str, str], convention: str, reading: float, mode: str
+) -> None:
+    robot = RealTimeRobot(graph, planner=planner, scan_no_return=convention)
+    ranges = (reading,) * BEAMS
+    robot.drive(ranges=ranges)
+    assert robot.drive(ranges=ranges) == mode
+    if mode == STOPS:
+        assert "scan_no_return" in robot.inputs("virtual_sensor").message
+
+
+@pytest.mark.parametrize("planner", [PAPER, TRACKING], ids=["paper", "predictive"])
+def test_a_goal_in_a_direction_that_no_beam_covers(graph: Graph, planner: dict[str, str]) -> None:
+    robot = RealTimeRobot(graph, planner=planner)
+    for _ in range(3):
+        assert robot.drive(ranges=FRONT) == Mode.OBSTACLE_AVOIDANCE.value
+        vx, vy = velocity(robot)
+        assert abs(math.atan2(vy, vx)) > math.radians(40.0)
+    for _ in range(3):
+        robot.drive()
+    vx, vy = velocity(robot)
+    assert math.atan2(vy, vx) == pytest.approx(0.0, abs=0.1), "it is covered now"
+
+
+def test_a_direction_stays_observed_for_a_moment(graph: Graph) -> None:
+    robot = RealTimeRobot(graph, planner=TRACKING)
+    start, heading = stamp(), []
+    for k in range(16):
+        ranges: Any = FREE if k < 2 else FRONT
+        robot.send_odom(start + k * 100_000_000)
+        robot.send_scan(scan_of(start + k * 100_000_000, ranges))
+        heading.append(math.atan2(*velocity(robot)[::-1]))
+    assert heading[:12] == pytest.approx([0.0] * 12, abs=1e-6)
+    assert all(abs(angle) > math.radians(40.0) for angle in heading[12:])
