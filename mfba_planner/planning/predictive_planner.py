@@ -100,6 +100,7 @@ class Predictive(BasePlanner):
     reads_sectors = False
     preset = staticmethod(preset)
     _perceived: Sequence[Circle] = ()
+    _by_sectors = True
     _speeds: Speeds = Speeds()
     _unobserved: np.ndarray | None = None  # headings the lidar has not covered; None: none
     _coverage: ScanCoverage
@@ -131,15 +132,20 @@ class Predictive(BasePlanner):
         position = obs.pose.position
         last_waypoint, self._waypoint = self._waypoint, None
         self._perceived = circles = self._circles(obs)
+        self._by_sectors = obs.circles is None and obs.scan is None
         self._unobserved = None if obs.scan is None else self._coverage.uncovered(obs.stamp_ns)
         if not circles and self._is_observed((goal[0] - position[0], goal[1] - position[1])):
+            self._changes.not_enclosed()
             straight = self.straight(position, goal, self.params.speed_mps)
             return Move(velocity=straight, reason="no obstacle in range")
         at_rest = ObstaclesAtRest(position, circles)
         misplaced = at_rest.misplaced()
         if misplaced:
             return Move(velocity=(0.0, 0.0), reason=misplaced, event=Event.NO_GAP)
-        return self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
+        move = self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
+        if not all(move.vs or (0,)):
+            self._changes.not_enclosed()
+        return move
 
     def _choose(
         self,
@@ -151,8 +157,6 @@ class Predictive(BasePlanner):
         """The cheapest waypoint and speed; no search while the straight line is free."""
         position, circles = obs.pose.position, self._perceived
         speed, tick_s = self.params.speed_mps, self.tick_s
-        only_sectors = obs.circles is None and obs.scan is None
-        moving = only_sectors and self._changes.moving(obs.stamp_ns, position, obs.ranges_m)
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
         drive = self._drive_rollout(obs)
@@ -168,8 +172,8 @@ class Predictive(BasePlanner):
             straight = self.straight(position, goal, speed)
             return Move(velocity=straight, reason="the straight way is free")
         vs = self._closed_headings(costs)
-        enclosure = "" if 0 in vs or moving else self._enclosure(position, at_rest)
-        if enclosure:
+        enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
+        if enclosure and self._changes.at_rest(obs):
             return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
         if drive is not None:  # where the bits, which know the turn but not the arc, are wrong
@@ -248,10 +252,20 @@ class Predictive(BasePlanner):
         return replace(move, velocity=(share * vx, share * vy), reason=f"{move.reason}; {note}")
 
     def surroundings(self, position: Point) -> Ranges:
-        """Range per sector to the circles of the last decision, inf where there are none."""
+        """Range per sector to the circles of the last decision, inf where there are none.
+
+        0 where no beam has covered a direction; empty if the decision was made on sectors.
+        """
+        if self._by_sectors:
+            return ()
         sensor = replace(self.sensor, sensing_range_m=self.options.reach_m)
         circles = [(circle.center_m, circle.radius_m) for circle in self._perceived]
-        return sense_circles(position, circles, sensor)
+        ranges = list(sense_circles(position, circles, sensor))
+        if self._unobserved is not None:
+            count, n = len(ranges), self.options.headings
+            for k in np.flatnonzero(self._unobserved).tolist():
+                ranges[(k + 1) * count // n % count] = 0.0
+        return tuple(ranges)
 
     def plan(self, obs: Observation) -> Decision:
         """Decide, and for a differential drive keep the speeds that the decision leads to."""

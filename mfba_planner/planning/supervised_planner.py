@@ -35,7 +35,7 @@ class HasSurroundings(Protocol):
     """A planner that may decide without sectors."""
 
     def surroundings(self, position: Point) -> Ranges:
-        """Range per sector to what its last decision was made on, inf where nothing is."""
+        """Range per sector to what its last decision was made on; empty if on sectors."""
         ...
 
 
@@ -177,10 +177,10 @@ class SupervisedPlanner:
         )
 
     def _surroundings(self, decision: Decision) -> Ranges:
-        """The sectors, or ranges like them from a planner that decides without sectors."""
-        if decision.ranges_m or not isinstance(self.inner, HasSurroundings):
-            return decision.ranges_m
-        return self.inner.surroundings(decision.pose.position)
+        """Ranges like those of sectors, of what the decision was made on."""
+        if isinstance(self.inner, HasSurroundings):
+            return self.inner.surroundings(decision.pose.position) or decision.ranges_m
+        return decision.ranges_m
 
     def _apply_speed_limit(self, decision: Decision) -> Decision:
         """The decision with waypoint and velocity scaled to the allowed speed."""

@@ -147,3 +147,12 @@ def test_sectors_that_change_are_no_ring_at_rest() -> None:
     steady = planner()
     modes = {steady.plan(sector_observation(tick, *[0.6] * 12)).mode for tick in range(20)}
     assert modes == {Mode.BLOCKED}
+
+
+@pytest.mark.parametrize("between", [[math.inf] * 12, [math.inf] * 11 + [0.7]])
+def test_a_ring_that_appears_after_another_is_at_rest(between: list[float]) -> None:
+    one = planner()
+    rings = [[0.05] * 12, between, [0.2] * 12, [0.2] * 12]
+    modes = [one.plan(sector_observation(t, *ranges)).mode for t, ranges in enumerate(rings)]
+    assert modes[0] is modes[2] is modes[3] is Mode.BLOCKED
+    assert modes[1] is not Mode.BLOCKED

@@ -2,11 +2,12 @@
 """Sectors that change while the robot rests tell that obstacles move."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from mfba_planner.core.geometry import Point
-from mfba_planner.core.planner_types import Ranges
+from mfba_planner.core.geometry import Point, Pose2D
+from mfba_planner.core.planner_types import Observation, Ranges
 from mfba_planner.planning.sector_changes import SectorChanges
 
 S = 10**9
@@ -14,9 +15,16 @@ RING: Ranges = (0.4,) * 12
 HERE, THERE = (1.0, 2.0), (1.05, 2.0)
 
 
+def observation(at_s: float, where: Point, ranges: Ranges) -> Observation:
+    stamp_ns = round(at_s * S)
+    return Observation(
+        stamp_ns=stamp_ns, now_ns=stamp_ns, pose=Pose2D(*where), ranges_m=ranges, goal=(9.0, 9.0)
+    )
+
+
 def moving(*ticks: tuple[float, Point, Ranges]) -> list[bool]:
     changes = SectorChanges()
-    return [changes.moving(round(at_s * S), where, ranges) for at_s, where, ranges in ticks]
+    return [not changes.at_rest(observation(*tick)) for tick in ticks]
 
 
 @pytest.mark.parametrize("noise_m", [0.0, 0.02, 0.045])
@@ -43,3 +51,22 @@ def test_a_change_while_the_robot_moves_says_nothing() -> None:
 
 def test_a_sector_at_the_edge_of_the_sensing_range_says_nothing() -> None:
     assert moving((1, HERE, RING), (2, HERE, (math.inf, *RING[1:]))) == [False] * 2
+
+
+def test_a_ring_that_appears_is_at_rest_until_it_changes() -> None:
+    """As when a door is opened and closed again in front of a robot that stands."""
+    changes = SectorChanges()
+    assert changes.at_rest(observation(1.0, HERE, RING))
+    changes.not_enclosed()
+    assert changes.at_rest(observation(1.2, HERE, (0.2,) * 12))
+
+
+def test_without_room_to_evade_it_stays_enclosed() -> None:
+    assert moving((1.0, HERE, RING), (1.1, HERE, (0.0, *RING[1:]))) == [False, False]
+
+
+def test_where_circles_are_known_sectors_do_not_count() -> None:
+    changes = SectorChanges()
+    for tick, ranges in enumerate((RING, (0.2,) * 12)):
+        known = replace(observation(tick, HERE, ranges), circles=())
+        assert changes.at_rest(known)

@@ -6,17 +6,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import groupby
 
+import numpy as np
 import pytest
 
 from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.option_specs import override
-from mfba_planner.core.planner_types import Circle, Decision, Mode, Observation
+from mfba_planner.core.planner_types import Circle, Decision, Mode, Observation, Scan
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
 from mfba_planner.planning.planner_factory import make_planner
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.planning.recovery import Phase
-from mfba_planner.planning.supervised_planner import SupervisedPlanner
+from mfba_planner.planning.supervised_planner import HasSurroundings, SupervisedPlanner
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.run_episode import simulate
@@ -165,6 +166,26 @@ def test_without_sectors_it_backs_off_by_the_circles() -> None:
             moved.append(decision.velocity)
     assert moved
     assert all(x < 0.0 for x, _ in moved)
+
+
+def test_it_does_not_back_off_to_where_no_beam_has_covered() -> None:
+    """A lidar of 270 degrees that looks to +x, and sectors that are free behind."""
+    chosen = params(Method.PREDICTIVE, **{"recovery.enabled": True})
+    angles = np.radians(np.arange(-135.0, 135.5))
+    scan = Scan(
+        ranges_m=np.where(np.abs(angles) < 1.0, 0.5, np.inf), angle_min_rad=float(angles[0]),
+        angle_increment_rad=math.radians(1.0), range_min_m=0.1, range_max_m=3.5,
+    )  # fmt: skip
+    planner = make_planner(chosen)
+    obs = Observation(
+        stamp_ns=10**9, now_ns=10**9, pose=Pose2D(0.0, 0.0), goal=GOAL, scan=scan,
+        ranges_m=(0.2, math.inf, *[math.inf] * 8, math.inf, 0.2),
+    )  # fmt: skip
+    planner.plan(obs)
+    assert isinstance(planner.inner, HasSurroundings)
+    ranges = planner.inner.surroundings((0.0, 0.0))
+    assert {i + 1 for i, r in enumerate(ranges) if r == 0.0} == {5, 6, 7, 8}
+    assert ranges[0] == pytest.approx(0.2, abs=0.05)
 
 
 def test_without_sectors_the_speed_limit_knows_the_circles() -> None:
