@@ -386,13 +386,14 @@ def test_seeds_of_a_world_are_a_single_case() -> None:
         ({"planners": ()}, "--planner: none given"),
         ({"planners": ("paper", "paper")}, "--planner paper: given twice"),
         (
-            {"planners": ("orca",), "setting": Setting(perception="scan-360")},
-            "--perception scan-360: planner orca uses none of it; give --perception known",
+            {"planners": ("orca",), "setting": Setting(perception="sectors")},
+            "--perception sectors: planner orca uses none of it; give --perception lidar or ",
         ),
         (
             {"planners": ("paper", "dwa"), "setting": Setting(perception="sectors")},
             "--perception sectors: planner dwa uses none of it; "
-            "give --perception known or scan-12 or scan-360",
+            "give --perception lidar or lidar-differential or lidar-realistic or known or "
+            "scan-12 or scan-360",
         ),
         ({"worlds": 0}, "--worlds=0: out of range; give at least 1"),
         ({"first": -1}, "--first=-1: out of range; give at least 0"),
@@ -409,6 +410,9 @@ def test_invalid_specs_are_refused(changes: dict[str, Any], reason: str) -> None
     ("changes", "reason"),
     [
         ({"perception": "scan-13"}, "did you mean 'scan-12'?"),
+        ({"perception": "lidar-realistc"}, "did you mean 'lidar-realistic'?"),
+        ({"perception": "lidar", "noise_m": -0.1}, "noise_m=-0.1"),
+        ({"perception": "lidar", "latency_ticks": -1}, "latency_ticks=-1"),
         ({"noise_m": math.nan}, "noise_m=nan"),
         ({"latency_ticks": -1}, "latency_ticks=-1"),
         ({"patience_s": 0.0}, "--patience=0: out of range"),

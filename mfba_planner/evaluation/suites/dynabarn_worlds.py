@@ -56,7 +56,7 @@ def dynabarn_obstacles(name: str, rng: np.random.Generator) -> tuple[Obstacle, .
 
 
 def _disc(difficulty: Difficulty, rng: np.random.Generator) -> Obstacle:
-    points = _way_points(difficulty, rng)
+    points = _path_points(difficulty, rng)
     # Somewhere on its first crossing, as in a world that has run for a while.
     start = [next(points) for _ in range(int(rng.integers(1, PIECES)))][-1]
     at_s, position = 0.0, start
@@ -75,7 +75,7 @@ def _disc(difficulty: Difficulty, rng: np.random.Generator) -> Obstacle:
     )
 
 
-def _way_points(difficulty: Difficulty, rng: np.random.Generator) -> Iterator[Point]:
+def _path_points(difficulty: Difficulty, rng: np.random.Generator) -> Iterator[Point]:
     """Of one crossing after the other, there and back: along one axis, curved along the other."""
     along_x, sign = rng.random() < 0.5, 1.0 if rng.random() < 0.5 else -1.0
     aside = rng.uniform(-HALF_SIDE_M, HALF_SIDE_M)
