@@ -8,6 +8,7 @@ import os
 import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +38,23 @@ from mfba_planner.evaluation.sweep.single_run import (
 )
 from mfba_planner.evaluation.sweep.summary import comparisons, planner_summaries, versus
 from mfba_planner.evaluation.sweep.sweep_chunks import chunks_of, make
-from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, read_run
+from mfba_planner.evaluation.sweep.sweep_spec import (
+    Run,
+    Setting,
+    SweepSpec,
+    default_setting,
+    make_planner,
+    own_preset,
+    read_run,
+)
 from mfba_planner.evaluation.sweep.table import sorted_hash, to_csv, to_parquet, write
 from mfba_planner.evaluation.sweep.table_columns import COLUMNS, TIMINGS, Row
 from mfba_planner.evaluation.sweep.worker import Lost, Worker, run_in_worker
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.planner_params import PlannerParams, Swarm
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.planner_observations import observe_scan
+from mfba_planner.simulation.robot_model import Lidar
 from mfba_planner.simulation.run_episode import run
 
 
@@ -438,6 +450,46 @@ def test_perception_reaches_the_planner() -> None:
         spec_of(planners=("paper",), worlds=3, setting=Setting(perception="scan-12"))
     ).rows
     assert [row["length_m"] for row in known] != [row["length_m"] for row in scan]
+
+
+@pytest.mark.parametrize("planner", ["paper", "predictive", "orca"])
+def test_by_default_a_run_is_that_of_sim_with_a_lidar(planner: str) -> None:
+    """Decision by decision; the robot sees nothing but its scan."""
+    scenario = suite("random-10").world(3)
+    robot = replace(scenario.robot, lidar=Lidar(beams=360))
+    setting = Setting(params=own_preset(planner, PlannerParams(speed_mps=0.8)))
+    run_of_sweep = run_one(Run("random-10", 3, planner, 5), setting)
+    episode = run(
+        replace(scenario, robot=robot),
+        planner=setting.params,
+        path_planner=make_planner(planner, setting.params, setting.sensor, 5),
+        observe=observe_scan,
+        seed=5,
+    )
+    assert digest(run_of_sweep.episode.ticks) == digest(episode.ticks)
+    assert run_of_sweep.episode.scenario == episode.scenario
+    blind = run_one(Run("random-10", 3, "straight", 5), setting)
+    assert digest(blind.episode.ticks) != digest(episode.ticks)
+
+
+def test_the_realistic_robot_is_judged_by_its_true_path() -> None:
+    setting = Setting(perception="lidar-realistic")
+    completed = run_one(Run("random-3", 0, "predictive", 0), setting)
+    episode = completed.episode
+    assert episode.scenario.robot.turns
+    assert len(episode.truth) == len(episode.ticks)
+    row = sweep(spec_of(planners=("predictive",), worlds=1, setting=setting)).rows[0]
+    true_m = [math.dist(a.position, b.position) for a, b in pairwise(episode.truth)]
+    assert row["length_m"] == pytest.approx(math.fsum(true_m))
+    assert row["outcome"] == "goal_reached"
+
+
+@pytest.mark.parametrize("planner", ["paper", "straight"])
+def test_a_suite_s_own_speed_is_the_default(planner: str) -> None:
+    setting = default_setting("fast-10")
+    assert setting.params.speed_mps == suite("fast-10").speed_mps == 1.0
+    rows = sweep(spec_of(suite="fast-10", planners=(planner,), worlds=1, setting=setting)).rows
+    assert rows[0]["length_m"] / rows[0]["time_s"] == pytest.approx(1.0, rel=0.05)
 
 
 def test_a_directory_belongs_to_one_spec(tmp_path: Path) -> None:
