@@ -59,7 +59,9 @@ def pedestrian_obstacles(
     params: PedestrianParams, rng: np.random.Generator
 ) -> tuple[Obstacle, ...]:
     """The pedestrians of a world; none is near start or goal at t = 0."""
-    starts, targets, speeds = [], [], []
+    starts: list[Point] = []
+    targets: list[Point] = []
+    speeds: list[float] = []
     while len(starts) < params.pedestrians:
         start, target = _walk(params, rng)
         if leaves_room(start, params.radius_m, params.margin_m):
