@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from multiprocessing import get_context
 
-from mfba_planner.core.geometry import Point, bearing, distance
+from mfba_planner.core.geometry import Point, bearing, distance, wrap_angle
 from mfba_planner.core.planner_types import NANO
 from mfba_planner.evaluation.metrics import assess, steps_driven
 from mfba_planner.evaluation.statistics import share_interval
@@ -27,6 +27,7 @@ from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
 
 STANDING_MPS = 0.05  # below it the robot stands
+BEHIND_RAD = math.radians(135.0)  # from its direction; as in `mfba show`
 
 
 class Ending(Enum):
@@ -53,10 +54,10 @@ class Robot:
     @property
     def label(self) -> str:
         """One line of words."""
-        seen = f"{self.beams} beams of {self.range_m:g} m, {math.degrees(self.fov_rad):.0f} deg"
+        observed = f"{self.beams} beams of {self.range_m:g} m, {math.degrees(self.fov_rad):.0f} deg"
         if self.perception == "known":
-            seen = f"within {self.range_m:g} m"
-        return f"{self.planner}, {self.perception}, {seen}, {self.speed_mps:g} m/s"
+            observed = f"within {self.range_m:g} m"
+        return f"{self.planner}, {self.perception}, {observed}, {self.speed_mps:g} m/s"
 
 
 def cross(scenario: Scenario, robot: Robot, seed: int) -> Episode:
@@ -94,8 +95,8 @@ def ending(episode: Episode) -> Ending:
     if distance(start, end) <= STANDING_MPS * episode.planner.tick_ns * NANO:
         return Ending.STANDING
     person = episode.scenario.centers(time_s)[motion.first_contact_with - 1]
-    turn = bearing(start, person) - bearing(start, end)
-    return Ending.BY_ROBOT if math.cos(turn) >= 0.0 else Ending.BEHIND
+    turn = abs(wrap_angle(bearing(start, person) - bearing(start, end)))
+    return Ending.BEHIND if turn >= BEHIND_RAD else Ending.BY_ROBOT
 
 
 def judge(task: tuple[Scenario, Robot, int]) -> Ending:
