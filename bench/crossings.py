@@ -54,7 +54,9 @@ class Robot:
     @property
     def label(self) -> str:
         """One line of words."""
-        observed = f"{self.beams} beams of {self.range_m:g} m, {math.degrees(self.fov_rad):.0f} deg"
+        observed = (
+            f"{self.beams} beams of {self.range_m:g} m, {math.degrees(self.fov_rad):.0f} deg"
+        )
         if self.perception == "known":
             observed = f"within {self.range_m:g} m"
         return f"{self.planner}, {self.perception}, {observed}, {self.speed_mps:g} m/s"

@@ -192,7 +192,7 @@ def test_a_passer_by_comes_from_every_side_and_meets_a_straight_driver(
     assert passed == [crossings.Ending.CLEAR] * 6
 
 
-def test_a_view_of_270_degrees_does_not_see_who_comes_from_behind(
+def test_a_view_of_270_degrees_does_not_cover_what_comes_from_behind(
     bench: dict[str, ModuleType],
 ) -> None:
     crossings, passer_by = bench["crossings"], bench["passer_by"]
