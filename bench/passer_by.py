@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One passer-by, who does not react, from every side: how often the robot lets him pass.
+"""One passer-by, who does not react, from every side: how often the robot avoids contact.
 
     python bench/passer_by.py                      # predictive, 360 beams of 3.5 m, 1 m/s
     python bench/passer_by.py --planner orca --perception known --range 3.5

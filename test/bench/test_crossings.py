@@ -95,7 +95,7 @@ def test_an_obstacle_follows_its_samples_and_goes_on_straight(
 
 
 def recording(directory: Path) -> Path:
-    """Twelve people who cross 12 m in both directions, one every 4 s; sampled every 0.4 s."""
+    """Thirty people who cross 12 m in both directions, one every 2 s; sampled every 0.4 s."""
     rows = ["t_s,person,x_m,y_m"]
     for person in range(30):
         begin, sign = 2.0 * person, 1.0 if person % 2 else -1.0

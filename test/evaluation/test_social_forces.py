@@ -61,7 +61,7 @@ def test_the_force_is_the_negative_gradient_of_the_potential(
     assert unseen == pytest.approx(BEHIND * found)
 
 
-def test_two_people_who_meet_pass_each_other_and_go_on() -> None:
+def test_two_people_meet_pass_each_other_and_go_on() -> None:
     starts = np.array([[0.0, 0.0], [10.0, 0.1]])
     targets = np.array([[50.0, 0.0], [-40.0, 0.1]])
     paths = trajectories(starts, targets, np.array([1.3, 1.3]), 15.0)
