@@ -43,7 +43,6 @@ from mfba_planner.evaluation.sweep.sweep_spec import (
     Setting,
     SweepSpec,
     default_setting,
-    make_planner,
     own_preset,
     read_run,
 )
@@ -51,7 +50,9 @@ from mfba_planner.evaluation.sweep.table import sorted_hash, to_csv, to_parquet,
 from mfba_planner.evaluation.sweep.table_columns import COLUMNS, TIMINGS, Row
 from mfba_planner.evaluation.sweep.worker import Lost, Worker, run_in_worker
 from mfba_planner.planning.algorithm_1 import Algorithm1
-from mfba_planner.planning.planner_params import PlannerParams, Swarm
+from mfba_planner.planning.planner_factory import make_planner as planner_of_sim
+from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
+from mfba_planner.planning.recovery import RecoveryParams
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.planner_observations import observe_scan
 from mfba_planner.simulation.robot_model import Lidar
@@ -452,17 +453,18 @@ def test_perception_reaches_the_planner() -> None:
     assert [row["length_m"] for row in known] != [row["length_m"] for row in scan]
 
 
-@pytest.mark.parametrize("planner", ["paper", "predictive", "orca"])
-def test_by_default_a_run_is_that_of_sim_with_a_lidar(planner: str) -> None:
-    """Decision by decision; the robot sees nothing but its scan."""
+@pytest.mark.parametrize("method", [Method.PAPER, Method.PREDICTIVE])
+def test_by_default_a_run_is_that_of_sim_with_a_lidar(method: Method) -> None:
+    """Decision by decision: supervised, and the robot sees nothing but its scan."""
     scenario = suite("random-10").world(3)
     robot = replace(scenario.robot, lidar=Lidar(beams=360))
-    setting = Setting(params=own_preset(planner, PlannerParams(speed_mps=0.8)))
-    run_of_sweep = run_one(Run("random-10", 3, planner, 5), setting)
+    usual = PlannerParams(speed_mps=0.8, method=method, recovery=RecoveryParams(enabled=True))
+    setting = Setting(params=own_preset(method.value, usual))
+    run_of_sweep = run_one(Run("random-10", 3, method.value, 5), setting)
     episode = run(
         replace(scenario, robot=robot),
         planner=setting.params,
-        path_planner=make_planner(planner, setting.params, setting.sensor, 5),
+        path_planner=planner_of_sim(setting.params, setting.sensor, 5),
         observe=observe_scan,
         seed=5,
     )
@@ -470,6 +472,18 @@ def test_by_default_a_run_is_that_of_sim_with_a_lidar(planner: str) -> None:
     assert run_of_sweep.episode.scenario == episode.scenario
     blind = run_one(Run("random-10", 3, "straight", 5), setting)
     assert digest(blind.episode.ticks) != digest(episode.ticks)
+
+
+def test_runs_from_a_lidar_together_are_the_single_ones() -> None:
+    """Supervised ones too; some are blocked in this suite, and recover."""
+    params = PlannerParams(speed_mps=0.8, recovery=RecoveryParams(enabled=True))
+    setting = Setting(params=params)
+    runs = [Run("dense", world, "paper", 0) for world in range(4)]
+    assert generates_paths_together("paper", setting)
+    single = [run_one(one, setting, whole=False).episode for one in runs]
+    together = [completed.episode for completed in run_together(runs, setting)]
+    assert [digest(e.ticks) for e in together] == [digest(e.ticks) for e in single]
+    assert any("waiting for" in tick.reason for e in single for tick in e.ticks)
 
 
 def test_the_realistic_robot_is_judged_by_its_true_path() -> None:
