@@ -116,7 +116,7 @@ def _cell(figures: Mapping[str, Any]) -> str:
     if figures["certified"] is None:
         return "-"
     success = f"{100.0 * figures['certified'][0]:.4g} %"
-    return success if figures["gap"] is None else f"{success}, {100.0 * figures['gap'][0]:.3g} %"
+    return success if figures["gap"] is None else f"{success}, {100.0 * figures['gap'][0]:.2f} %"
 
 
 def with_table(readme: str, found: Facts) -> str:

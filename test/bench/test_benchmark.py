@@ -148,7 +148,7 @@ def test_the_readme_s_table_is_that_of_the_stored_results(
         figures = STORED["suites"]["random-20"]["planners"][name]
         success, gap = (float(number) for number in re.findall(r"-?[\d.]+", cells[name]))
         assert success == pytest.approx(100.0 * figures["certified"][0], rel=1e-3)
-        assert gap == pytest.approx(100.0 * figures["gap"][0], rel=1e-2)
+        assert gap == pytest.approx(100.0 * figures["gap"][0], abs=0.006)
 
 
 def test_the_benchmark_stores_its_figures_and_writes_the_readme_s_table(made: Path) -> None:
