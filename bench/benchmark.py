@@ -6,7 +6,8 @@
     python bench/benchmark.py --out DIR          # small; continues where it was interrupted
 
 Every sweep has a directory below --out, which `mfba show` reads. The optima of a suite have
-another, since they do not depend on any planner.
+another, since they do not depend on any planner. The figures also go to docs/benchmark.json, and
+from there into the table of the README.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pathlib import Path
 from benchmark_costs import measure_costs, measure_rates
 from benchmark_page import PER_MINUTE, render
 from benchmark_pictures import write_pictures
+from benchmark_results import FILE, facts, to_json, with_table
 from benchmark_runs import HEADLINE, Counts, Results, print_line
 
 from mfba_planner.core.output_files import new_run_directory
@@ -52,7 +54,7 @@ def arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument(
         "--worlds", type=int, default=20, metavar="N",
-        help=f"of paper, predictive and orca in {', '.join(HEADLINE)}; seeds of each of the "
+        help=f"of paper, predictive, orca and dwa in {', '.join(HEADLINE)}; seeds of each of the "
         "paper's cases, 1000 at most (default: 20)",
     )  # fmt: skip
     parser.add_argument(
@@ -74,7 +76,8 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, metavar="DIR", help="directory to make or to go on in")
     parser.add_argument(
         "--docs", type=Path, default=ROOT / "docs", metavar="DIR",
-        help="where benchmark.md and images/ are (default: the project's)",
+        help="where benchmark.md, benchmark.json and images/ are; README.md is beside this "
+        "directory (default: the project's)",
     )  # fmt: skip
     return parser
 
@@ -109,6 +112,11 @@ def main(args: list[str] | None = None) -> None:
     examples = write_pictures(results, suites, counts, costs, images)
     text = render(results, suites, counts, costs, rates, examples, _command(found))
     target.write_text(_between(target.read_text(encoding="utf-8"), text), encoding="utf-8")
+    figures = facts(results, suites, counts, _command(found))
+    (found.docs / FILE).write_text(to_json(figures), encoding="utf-8")
+    readme = found.docs.absolute().parent / "README.md"
+    if readme.is_file():
+        readme.write_text(with_table(readme.read_text(encoding="utf-8"), figures), "utf-8")
     print(text)
 
 

@@ -129,5 +129,5 @@ def _deciding(name: str, count: int) -> Callable[[int], object]:
 
 def _planner(name: str) -> PathPlanner:
     if name == STEPWISE:
-        return StepwiseDwa(FINE.params, SensorParams(), 0)
-    return make(name, FINE.params)
+        return StepwiseDwa(FINE, SensorParams(), 0)
+    return make(name, FINE)

@@ -6,8 +6,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 from mfba_planner.evaluation.study.chunk_store import Store
 from mfba_planner.evaluation.study.compute_chunks import compute
@@ -18,33 +20,48 @@ from mfba_planner.evaluation.sweep.summary import PlannerSummary, Versus, planne
 from mfba_planner.evaluation.sweep.sweep_chunks import OracleChunk, chunks_of
 from mfba_planner.evaluation.sweep.sweep_spec import Setting, SweepSpec
 from mfba_planner.evaluation.sweep.table_columns import Row, with_optimum
+from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive_planner import preset
+from mfba_planner.simulation.lidar_perception import LIDAR_ROBOTS
 
 ORACLE = ("core", "evaluation", "scenarios", "simulation")  # their code decides the optima
-HEADLINE = ("random-10", "random-20", "random-30", "adversarial")  # suites with --worlds
-CROWDS = ("random-10", "random-20", "random-30")  # with several perceptions
+# suites with --worlds
+HEADLINE = ("random-10", "random-20", "random-30", "adversarial", "fast-10", "fast-20")
+CROWDS = ("random-10", "random-20", "random-30", "fast-20")  # with several perceptions
 STRIPPED = ("random-20", "random-30", "adversarial")  # in which ingredients are left out
 PAPER_WORLDS = 2000  # 1000 seeds of each case are all that is asked for
 
-PAPER = Setting()  # its own step of 0.3 m
-FINE = Setting(
-    params=preset(PlannerParams(speed_mps=SPEED_MPS))
-)  # 0.08 m, the same for all others
+LIDAR, REALISTIC, KNOWN = "lidar", "lidar-realistic", "known"
+# What every planner is judged by, and how its rows are called.
+COLUMNS = {LIDAR: "", REALISTIC: ", realistic", KNOWN: ", known"}
+
+STEP_OF_PAPER = PlannerParams(speed_mps=SPEED_MPS)  # its own, 0.3 m
+FINE = preset(STEP_OF_PAPER)  # 0.08 m, the same for all others
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One line of a table."""
+    """One line of a table; its setting has the speed of most suites, see at()."""
 
     label: str
     planner: str
-    setting: Setting = FINE
+    setting: Setting
+
+    def at(self, suite: str) -> Setting:
+        """The setting in a suite: at the speed of its robot."""
+        speed = suite_of(suite).speed_mps
+        return replace(self.setting, params=replace(self.setting.params, speed_mps=speed))
 
 
-def _perceiving(perception: str, noise_m: float = 0.0, latency_ticks: int = 0) -> Setting:
-    return Setting(
-        params=FINE.params, perception=perception, noise_m=noise_m, latency_ticks=latency_ticks
+def _perceiving(perception: str, params: PlannerParams = FINE, **more: Any) -> Setting:
+    return Setting(params=params, perception=perception, **more)
+
+
+def _judged(planner: str, params: PlannerParams = FINE) -> tuple[Entry, ...]:
+    return tuple(
+        Entry(f"{planner}{suffix}", planner, _perceiving(perception, params))
+        for perception, suffix in COLUMNS.items()
     )
 
 
@@ -52,28 +69,41 @@ def _without(name: str) -> str:
     return f"mfba_planner.planning.peers.ablation:{name}"
 
 
-LEAD = (Entry("paper", "paper", PAPER), Entry("predictive", "predictive"), Entry("orca", "orca"))
-PEERS = tuple(Entry(name, name) for name in ("dwa", "vfh", "apf", "straight"))
+_WIDE = SensorParams(sensing_range_m=LIDAR_ROBOTS[LIDAR].robot.lidar.range_max_m)
+_PAPER, _PREDICTIVE = _judged("paper", STEP_OF_PAPER), _judged("predictive")
+_ORCA, _DWA = _judged("orca"), _judged("dwa")
+PAPER, PREDICTIVE, ORCA, DWA = (each[0] for each in (_PAPER, _PREDICTIVE, _ORCA, _DWA))
+PREDICTIVE_REALISTIC, PREDICTIVE_KNOWN = _PREDICTIVE[1:]
+PAPER_KNOWN = _PAPER[2]
+LEAD = (*_PAPER, *_PREDICTIVE, *_ORCA, *_DWA)
+PEERS = (*_judged("vfh"), *_judged("apf"), Entry("straight", "straight", _perceiving(KNOWN)))
+DIFFERENTIAL = Entry("lidar-differential", "predictive", _perceiving("lidar-differential"))
 PERCEPTIONS = (
-    Entry("known", "predictive"),
-    Entry("scan-12", "predictive", _perceiving("scan-12")),
-    Entry("scan-360", "predictive", _perceiving("scan-360")),
-    Entry("scan-360, 2 cm noise", "predictive", _perceiving("scan-360", 0.02)),
-    Entry("scan-360, 1 tick late", "predictive", _perceiving("scan-360", 0.0, 1)),
-    Entry("scan-360, both", "predictive", _perceiving("scan-360", 0.02, 1)),
+    replace(PREDICTIVE, label=LIDAR),
+    DIFFERENTIAL,
+    replace(PREDICTIVE_REALISTIC, label=REALISTIC),
+    replace(PREDICTIVE_KNOWN, label="known within SR"),
+    Entry("known as far as the lidar sees", "predictive", _perceiving(KNOWN, sensor=_WIDE)),
+    Entry("scan-360, not beyond SR", "predictive", _perceiving("scan-360")),
+    Entry("scan-12, not beyond SR", "predictive", _perceiving("scan-12")),
     Entry("the paper's sectors", "predictive", _perceiving("sectors")),
 )
 INGREDIENTS = (
-    Entry("paper's bits, step 0.3 m", "paper", PAPER),
-    Entry("paper's bits, step 0.08 m", "paper", Setting(params=FINE.params)),
-    Entry("predicted bits only", _without("BitsOnly")),
-    Entry("all without velocities", _without("NoVelocities")),
-    Entry("all without bats", _without("NoBats")),
-    Entry("all without waiting and slowing", _without("NoWaiting")),
-    Entry("all without the last waypoint", _without("NoLastWaypoint")),
-    Entry("all without memory of circles", _without("no_memory")),
-    Entry("all without margins", _without("no_margins")),
-    Entry("all (predictive)", "predictive"),
+    Entry("paper's bits, step 0.3 m", "paper", PAPER_KNOWN.setting),
+    Entry("paper's bits, step 0.08 m", "paper", _perceiving(KNOWN)),
+    *(
+        Entry(label, _without(name), _perceiving(KNOWN))
+        for label, name in (
+            ("predicted bits only", "BitsOnly"),
+            ("all without velocities", "NoVelocities"),
+            ("all without bats", "NoBats"),
+            ("all without waiting and slowing", "NoWaiting"),
+            ("all without the last waypoint", "NoLastWaypoint"),
+            ("all without memory of circles", "no_memory"),
+            ("all without margins", "no_margins"),
+        )
+    ),
+    Entry("all (predictive)", "predictive", PREDICTIVE_KNOWN.setting),
 )
 
 
@@ -115,8 +145,9 @@ class Results:
     def judge(self, suite: str, worlds: int) -> None:
         """Ask the oracle about a suite."""
         spec = SweepSpec(
-            suite=suite, planners=("straight",), worlds=worlds, first=self.first, setting=FINE
-        )
+            suite=suite, planners=("straight",), worlds=worlds, first=self.first,
+            setting=PREDICTIVE.at(suite),
+        )  # fmt: skip
         chunks = [chunk for chunk in chunks_of(spec) if isinstance(chunk, OracleChunk)]
         facts = {"suite": suite, "first": self.first, "worlds": worlds}
         store = Store(
@@ -134,7 +165,7 @@ class Results:
         key = (suite, entry.planner, entry.setting)
         spec = SweepSpec(
             suite=suite, planners=(entry.planner,), worlds=worlds, first=self.first,
-            oracle=False, setting=entry.setting,
+            oracle=False, setting=entry.at(suite),
         )  # fmt: skip
         plain = "".join(c if c.isalnum() or c in ".-" else "-" for c in entry.label)
         self.directories[key] = self.out / f"{suite}-{plain}"
@@ -145,7 +176,7 @@ class Results:
         print_line(f"{suite}: {entry.label}, {worlds} worlds")
         optima, number = self._optima[suite], suite_of(suite).world_number
         rows = [
-            with_optimum(row, optima[number(row["world"])], entry.setting.params.speed_mps)
+            with_optimum(row, optima[number(row["world"])], spec.setting.params.speed_mps)
             for row in swept.rows
         ]
         self._found[key] = rows, swept.timings
@@ -201,9 +232,17 @@ def _timed(rows: Sequence[Row]) -> list[Row]:
     return [
         row
         if row["gap"] is None
-        else {**row, "gap": row["time_s"] * SPEED_MPS / row["optimum_m"] - 1.0}
+        else {
+            **row,
+            "gap": row["time_s"] * suite_of(row["suite"]).speed_mps / row["optimum_m"] - 1.0,
+        }
         for row in rows
     ]
+
+
+@cache
+def _speed(suite: str) -> float:
+    return suite_of(suite).speed_mps
 
 
 def of_suite(entries: tuple[Entry, ...], suite: str) -> tuple[Entry, ...]:

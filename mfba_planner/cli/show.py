@@ -18,7 +18,14 @@ from ..evaluation.sweep.explain_run import contact_index, explain
 from ..evaluation.sweep.planner_sandbox import HungError
 from ..evaluation.sweep.read_sweep import ReadSweep, read_sweep
 from ..evaluation.sweep.single_run import CompletedRun, run_one
-from ..evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, own_preset, read_run
+from ..evaluation.sweep.sweep_spec import (
+    Run,
+    Setting,
+    SweepSpec,
+    default_setting,
+    own_preset,
+    read_run,
+)
 from ..evaluation.sweep.table_columns import Row, run_row
 
 _DESCRIPTION = """Repeat a run of a sweep and explain its outcome.
@@ -87,7 +94,7 @@ def _show_run(swept: ReadSweep | None, argument: str, out: Path | None, *, bag: 
 
 
 def _default_setting(run: Run) -> Setting:
-    default = Setting()
+    default = default_setting(run.suite)
     return replace(default, params=own_preset(run.planner, default.params))
 
 

@@ -16,18 +16,23 @@ from ..core.option_specs import Scalar, flatten
 from ..core.output_files import new_run_directory, write_same
 from ..evaluation.study.compute_chunks import check_workers
 from ..evaluation.suites import suite_names
-from ..evaluation.suites.named_suites import SPEED_MPS
 from ..evaluation.sweep.run_sweep import SweepResult, dask_executor, open_store, sweep
 from ..evaluation.sweep.sweep_chunks import chunks_of
-from ..evaluation.sweep.sweep_spec import PATIENCE_S, Setting, SweepSpec, own_preset
+from ..evaluation.sweep.sweep_spec import (
+    DEFAULT_PERCEPTION,
+    PATIENCE_S,
+    PERCEPTIONS,
+    Setting,
+    SweepSpec,
+    default_setting,
+    own_preset,
+)
 from ..evaluation.sweep.table import write
 from ..evaluation.sweep.table_columns import COLUMNS, TIMINGS
 from ..launcher.set_option import add_set_argument, with_settings
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD
-from ..planning.planner_params import PlannerParams
 from ..planning.planner_registry import PLANNERS
-from ..simulation.planner_observations import NAMES as PERCEPTIONS
 from .support.study_progress import add_work_arguments, print_status, progress
 
 _DESCRIPTION = """Run planners in the worlds of a suite and compare them.
@@ -36,6 +41,13 @@ Writes a directory: the table (a row per run), timings.csv (computing times; all
 the same on every machine), report.md, and the finished chunks of the runs: an interrupted command
 continues with --out DIR. `mfba show` explains a run.
 """
+
+
+_PERCEPTION = """lidar: 360 beams of 3.5 m, as `mfba sim` with robot.lidar.beams=360;
+lidar-differential: the same on a differential drive; lidar-realistic: that with errors: ranges
+2 cm, odometry 2 cm and 0.02 rad (standard deviations), scans 0.1 s old; known: told the truth,
+the circles within SR with their velocities; sectors: the paper's bits only; scan-N: N beams that
+see no farther than SR, to hold SR equal"""
 
 
 def main(args: list[str]) -> int:
@@ -81,22 +93,22 @@ def _parser() -> Parser:
         ("--first", 0, "number of the first world"),
         ("--seeds", 1, "seeds per world and planner"),
         ("--suite-seed", 0, "seed of all worlds"),
-        ("--latency", 0, "latency of the perception, ticks"),
+        ("--latency", 0, "latency of the perception, ticks, beside that of lidar-realistic"),
     ):
         parser.add_argument(
             name, type=int, default=default, metavar="N", help=f"{what} (default: {default})"
         )
     parser.add_argument(
-        "--perception", choices=PERCEPTIONS, default="known",
-        help="sectors: the paper's bits only; known: circles within SR with velocities; "
-        "scan-N: N beams (default: known)",
+        "--perception", choices=PERCEPTIONS, default=DEFAULT_PERCEPTION, metavar="NAME",
+        help=f"{_PERCEPTION} (default: {DEFAULT_PERCEPTION})",
     )  # fmt: skip
     parser.add_argument(
         "--noise",
         type=float,
         default=0.0,
         metavar="M",
-        help="standard deviation of ranges (of centres when known), m",
+        help="standard deviation of ranges (of centres when known), m, beside that of "
+        "lidar-realistic",
     )
     parser.add_argument(
         "--no-oracle", action="store_true", help="leave out optimum, gap, SPL and BARN score"
@@ -117,7 +129,7 @@ def _parser() -> Parser:
 
 
 def _sweep_spec(parsed: argparse.Namespace) -> SweepSpec:
-    default = PlannerParams(speed_mps=SPEED_MPS)
+    default = default_setting(parsed.suite).params
     planners = tuple(parsed.planners or [DEFAULT_METHOD.value])
     params, sensor = with_settings(default, SensorParams(), parsed.settings)
     # --set overrides every planner's own preset.
@@ -156,7 +168,7 @@ def _executor(scheduler: str | None) -> Iterator[Executor | None]:
 
 def command_line(spec: SweepSpec) -> str:
     """The shortest `mfba sweep` command line for this sweep."""
-    setting, default = spec.setting, Setting()
+    setting, default = spec.setting, default_setting(spec.suite)
     arguments = ["mfba", "sweep", spec.suite]
     for planner in spec.planners:
         arguments += ["--planner", planner]

@@ -1,33 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacles around the robot as an array, from known circles or from a scan."""
+"""Circles around the robot for planners that need them: given ones, or tracked in the scan."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ..core.planner_types import ROBOT_RADIUS_M, Observation
+from ..core.geometry import Point
+from ..core.planner_types import NANO, Circle, Observation
+from ..perception.obstacle_tracker import Tracker
+from .planner_params import PlannerParams
+from .trajectory_cost import predicted_circles
 
 
-def circle_rows(obs: Observation) -> np.ndarray:
-    """Rows (x, y, vx, vy, radius) around the robot, enlarged by it; (n, 5), n may be 0.
+class CirclesFromObservation:
+    """The circles of successive observations of one robot, at the stamp of each.
 
-    Known circles if given; otherwise each return of the scan, in a frame aligned with odom, as a
-    point at rest enlarged by the default robot radius.
+    Circles that the observation gives are taken as they are. Otherwise they are those that
+    perception.obstacle_tracker, the tracker of the predictive planner, finds in the scan.
     """
-    px, py = obs.pose.position
-    if obs.circles is not None:
-        rows = [
-            (c.center_m[0] - px, c.center_m[1] - py, *c.velocity_mps, c.radius_m)
-            for c in obs.circles
-        ]
-        return np.array(rows, dtype=np.float64).reshape(-1, 5)
-    if obs.scan is None:
-        return np.empty((0, 5))
-    ranges = np.asarray(obs.scan.ranges_m, dtype=np.float64)
-    hits = np.flatnonzero(np.isfinite(ranges))
-    angles = obs.scan.angle_min_rad + hits * obs.scan.angle_increment_rad
-    found = np.zeros((hits.size, 5))
-    found[:, 0] = ranges[hits] * np.cos(angles)
-    found[:, 1] = ranges[hits] * np.sin(angles)
-    found[:, 4] = ROBOT_RADIUS_M
-    return found
+
+    def __init__(self, params: PlannerParams) -> None:
+        """Start without tracks."""
+        self._radius_m = params.robot_radius_m
+        self._tracker = Tracker()
+
+    def update(self, obs: Observation) -> Sequence[Circle]:
+        """Enlarged circles in the odom frame, predicted to obs.pose_ns; () for neither input."""
+        stamp_ns, pose = obs.sensed or (obs.stamp_ns, obs.pose)
+        if obs.circles is not None:
+            age_s = (obs.pose_ns - stamp_ns) * NANO
+            return predicted_circles(obs.circles, age_s) if age_s else obs.circles
+        if obs.scan is None:
+            return ()
+        self._tracker.update(stamp_ns, pose, obs.scan)
+        return self._tracker.circles(obs.pose_ns, self._radius_m)
+
+
+def circle_rows(circles: Sequence[Circle], position: Point) -> np.ndarray:
+    """Rows (x, y, vx, vy, radius) relative to a position; (n, 5), n may be 0."""
+    px, py = position
+    rows = [(c.center_m[0] - px, c.center_m[1] - py, *c.velocity_mps, c.radius_m) for c in circles]
+    return np.array(rows, dtype=np.float64).reshape(-1, 5)

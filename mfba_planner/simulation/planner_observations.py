@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Observations of the simulated world: sectors, circles with velocities, or a scan."""
+"""Observations of the simulated world: sectors, circles with velocities, or a scan.
+
+Perception holds the sensing range (SR) equal for comparisons; the lidar of a robot, which sees
+as far as it sees, is observed by observe_scan().
+"""
 
 from __future__ import annotations
 
@@ -35,7 +39,8 @@ class Perception:
     sectors: sector ranges only. known: the circles whose enlarged edge is within SR, with their
     true velocities. scan-12, scan-360: beams from the robot's centre along the middles of equal
     sectors to the real circles, up to SR + robot radius. A surface at that range has its
-    enlarged edge at SR, so all sense the same region. Beams do not detect walls.
+    enlarged edge at SR, so all sense the same region: these hold SR equal, and see less far than
+    a lidar (lidar_perception). Beams do not detect walls.
 
     noise_m is the standard deviation of ranges (of centres for known), drawn from a child of the
     seed named by the stamp. With a latency, circles and scan are that many ticks old (the first

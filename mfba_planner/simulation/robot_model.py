@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from ..core.errors import ConfigError
@@ -11,11 +12,12 @@ from ..core.robot_base import Base
 
 FEWEST_BEAMS = 12
 DEFAULT_BEAMS = 360  # of the lidar that a robot without one gets for a planner that reads scans
+FULL_CIRCLE_RAD = round(2.0 * math.pi, 4)  # as written in scenario files; slightly above 2 pi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lidar:
-    """A simulated 360 degree lidar, its frame turned by yaw_rad against base_link."""
+    """A simulated lidar, its frame turned by yaw_rad against base_link."""
 
     beams: int = option(
         0, "number of beams; 0: none, the sectors come from obstacles", minimum=0, maximum=1080
@@ -29,6 +31,10 @@ class Lidar:
     yaw_rad: float = option(
         0.0, "how its frame is turned in base_link", unit="rad", minimum=-6.4, maximum=6.4
     )
+    fov_rad: float = option(
+        FULL_CIRCLE_RAD, "angle of view, half of it on each side of its x axis; 6.2832: all round",
+        unit="rad", minimum=0.1, maximum=FULL_CIRCLE_RAD,
+    )  # fmt: skip
     walls: bool = option(False, "sees the walls, which stop obstacles only (and not the robot)")
 
     def __post_init__(self) -> None:
@@ -43,6 +49,20 @@ class Lidar:
                 f"range_min_m={self.range_min_m:g}: not below range_max_m={self.range_max_m:g}; "
                 "lower it"
             )
+
+    @property
+    def covered_rad(self) -> float:
+        """The angle of view, at most a full circle."""
+        return min(self.fov_rad, 2.0 * math.pi)
+
+    @property
+    def first_beam_rad(self) -> float:
+        """Direction of the first beam in the lidar's frame: the middle of its share.
+
+        All round the shares begin at the x axis, else at the right edge of the view.
+        """
+        begin = 0.0 if self.covered_rad == 2.0 * math.pi else -0.5 * self.covered_rad
+        return begin + 0.5 * self.covered_rad / max(self.beams, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

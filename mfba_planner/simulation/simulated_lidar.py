@@ -13,15 +13,23 @@ from ..core.planner_types import Scan
 from .obstacle_motion import Walls
 from .robot_model import Lidar
 
-_RAYS: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+_FULL_CIRCLE_RAD = 2.0 * math.pi
+_RAYS: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = {}
 
 
-def rays(beams: int, turned_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Cosines and sines of n beams along the middles of n equal sectors, each (n,)."""
-    if beams not in _RAYS:
-        angles = (np.arange(beams) + 0.5) * (2.0 * math.pi / beams)
-        _RAYS[beams] = np.cos(angles), np.sin(angles)
-    c, s = _RAYS[beams]
+def rays(
+    beams: int, turned_rad: float = 0.0, fov_rad: float = _FULL_CIRCLE_RAD
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cosines and sines of n beams along the middles of n equal shares of the view, each (n,).
+
+    A view of a full circle begins at the x axis, a smaller one lies on both sides of it.
+    """
+    if (beams, fov_rad) not in _RAYS:
+        angles = (np.arange(beams) + 0.5) * (fov_rad / beams)
+        if fov_rad != _FULL_CIRCLE_RAD:
+            angles -= 0.5 * fov_rad
+        _RAYS[beams, fov_rad] = np.cos(angles), np.sin(angles)
+    c, s = _RAYS[beams, fov_rad]
     if turned_rad == 0.0:
         return c, s
     ct, st = math.cos(turned_rad), math.sin(turned_rad)
@@ -34,6 +42,7 @@ def cast_rays(
     beams: int,
     longest_m: float,
     turned_rad: float = 0.0,
+    fov_rad: float = _FULL_CIRCLE_RAD,
 ) -> np.ndarray:
     """Range of each beam to the nearest circle (x, y, radius), inf beyond longest_m; (n,), m.
 
@@ -41,7 +50,7 @@ def cast_rays(
     """
     if not circles:
         return np.full(beams, np.inf)
-    c, s = rays(beams, turned_rad)
+    c, s = rays(beams, turned_rad, fov_rad)
     x, y, r = np.array(circles).T[:, :, None]
     x, y = x - position[0], y - position[1]
     along = x * c + y * s
@@ -55,11 +64,17 @@ def cast_rays(
     return nearest
 
 
-def cast_walls(position: Point, walls: Walls, beams: int, turned_rad: float = 0.0) -> np.ndarray:
+def cast_walls(
+    position: Point,
+    walls: Walls,
+    beams: int,
+    turned_rad: float = 0.0,
+    fov_rad: float = _FULL_CIRCLE_RAD,
+) -> np.ndarray:
     """Range of each beam to the walls, from inside or outside; inf for a miss; (n,), m."""
     enter, leave = np.full(beams, -np.inf), np.full(beams, np.inf)
     for origin, low, high, slope in zip(
-        position, walls.lower_m, walls.upper_m, rays(beams, turned_rad)
+        position, walls.lower_m, walls.upper_m, rays(beams, turned_rad, fov_rad)
     ):
         with np.errstate(divide="ignore", invalid="ignore"):
             a, b = (low - origin) / slope, (high - origin) / slope
@@ -80,14 +95,15 @@ def scan_at(
     REP-117: +inf beyond range_max, -inf below range_min. All numbers in single precision, as in
     a LaserScan.
     """
-    turned = pose.yaw + lidar.yaw_rad
-    ranges = cast_rays(pose.position, circles, lidar.beams, math.inf, turned)
+    turned, fov_rad = pose.yaw + lidar.yaw_rad, lidar.covered_rad
+    ranges = cast_rays(pose.position, circles, lidar.beams, math.inf, turned, fov_rad)
     if walls is not None and lidar.walls:
-        ranges = np.minimum(ranges, cast_walls(pose.position, walls, lidar.beams, turned))
-    increment = 2.0 * math.pi / lidar.beams
+        to_walls = cast_walls(pose.position, walls, lidar.beams, turned, fov_rad)
+        ranges = np.minimum(ranges, to_walls)
+    increment = fov_rad / lidar.beams
     return Scan(
         ranges_m=limited(ranges, lidar),
-        angle_min_rad=_single(0.5 * increment),
+        angle_min_rad=_single(lidar.first_beam_rad),
         angle_increment_rad=_single(increment),
         range_min_m=_single(lidar.range_min_m),
         range_max_m=_single(lidar.range_max_m),

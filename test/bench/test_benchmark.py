@@ -7,6 +7,7 @@ import re
 import runpy
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +25,14 @@ from mfba_planner.report.sweep_tables import HEAD
 SCRIPT = ROOT / "bench" / "benchmark.py"
 PAGE = (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+MARKS = ("<!-- bench/benchmark.py: begin -->\n", "<!-- bench/benchmark.py: end -->\n")
 SHOWN = shown_commands.commands(PAGE)
 WHOLE, MADE_BY = (words for words in SHOWN if words[0] == "python")
 SMALL = shown_commands.reduced(MADE_BY)[2:]
-SEVEN = ["paper", "predictive", "orca", "dwa", "vfh", "apf", "straight"]
+SIX = ("paper", "predictive", "orca", "dwa", "vfh", "apf")
+# Each from a lidar, as a realistic robot, and with circles known; one senses nothing.
+ROWS = [f"{name}{how}" for name in SIX for how in ("", ", realistic", ", known")] + ["straight"]
+STORED = json.loads((ROOT / "docs" / "benchmark.json").read_text(encoding="utf-8"))
 OUT = Path("runs/benchmark")
 
 
@@ -48,6 +53,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("benchmark")
     (directory / "docs").mkdir()
     (directory / "docs" / "benchmark.md").write_text(PAGE, encoding="utf-8")
+    (directory / "README.md").write_text(f"above\n{MARKS[0]}old\n{MARKS[1]}below\n")
     found = bench(SMALL, directory)
     assert found.returncode == 0, found.stderr
     return directory
@@ -63,7 +69,7 @@ def lines(page: str, title: str) -> dict[str, dict[str, str]]:
 def test_the_tables_hold_what_the_rows_hold(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     found = lines(page, "### random-20")
-    assert list(found) == SEVEN
+    assert list(found) == ROWS
     (optima,) = (
         json.loads(path.read_text())["columns"]
         for path in (made / OUT / "random-20-optima" / "chunks").glob("*.json")
@@ -71,7 +77,7 @@ def test_the_tables_hold_what_the_rows_hold(made: Path) -> None:
     optimum_m = dict(zip(optima["world"], optima["optimum_m"]))
     for name, line in found.items():
         assert list(line) == list(HEAD)
-        rows = read_sweep(made / OUT / f"random-20-{name}").rows
+        rows = read_sweep(made / OUT / f"random-20-{name.replace(', ', '--')}").rows
         assert [row["world"] for row in rows] == [10184, 10185]
         good = [row for row in rows if row["success"]]
         assert line["success"].startswith(f"{50.0 * len(good):.2f} % ["), name
@@ -82,16 +88,87 @@ def test_the_tables_hold_what_the_rows_hold(made: Path) -> None:
             assert line["time s"].startswith(f"{sum(r['time_s'] for r in good) / len(good):.2f} [")
 
 
-@pytest.mark.parametrize("count", [10, 20, 30])
-def test_the_readme_s_headline_is_the_page_s(count: int) -> None:
-    (row,) = re.findall(rf"^\| {count} obstacles.*$", README, re.MULTILINE)
-    found = lines(PAGE, f"### random-{count}")
-    expected = []
-    for name in ("paper", "predictive", "orca"):
-        assert found[name]["runs"] == "10000"
-        success, gap = (float(found[name][head].split()[0]) for head in ("success", "gap"))
-        expected.append(f"{success:.2f} %, {gap:.3g} %")
-    assert [cell.strip() for cell in row.split("|")[2:5]] == expected
+def stored_cell(name: str, figures: dict[str, Any]) -> dict[str, str]:
+    """The cells of the page's table that the stored figures of a row say, as far as they do."""
+    cells = {"planner": name, "runs": str(figures["runs"]), "collided": str(figures["collided"])}
+    for head in ("success", "gap"):
+        cells[head] = shares(figures[head])
+    cells["certified"] = f"{shares(figures['certified'])} of {figures['certified_runs']}"
+    return cells
+
+
+def shares(interval: list[float] | None) -> str:
+    if interval is None:
+        return "-"
+    middle, low, high = (100.0 * value for value in interval)
+    return f"{middle:.2f} % [{low:.2f}, {high:.2f}]"
+
+
+def close(found: str, expected: str) -> bool:
+    """The same words, and numbers that differ by no more than the rounding of the stored ones."""
+    number = re.compile(r"-?\d+\.\d+")
+    if number.sub("#", found) != number.sub("#", expected):
+        return False
+    pairs = zip(number.findall(found), number.findall(expected))
+    return all(abs(float(a) - float(b)) < 0.0101 for a, b in pairs)
+
+
+def assert_is_stored(page: str, stored: dict[str, Any]) -> None:
+    """The page's tables of suites have the stored figures, row by row."""
+    for suite, figures in stored["suites"].items():
+        if suite == "paper":
+            continue  # the page has both cases apart
+        found = lines(page, f"### {suite}")
+        assert list(found) == ROWS == list(figures["planners"])
+        for name, one in figures["planners"].items():
+            for head, expected in stored_cell(name, one).items():
+                assert close(found[name][head], expected), (suite, name, head)
+
+
+def test_the_page_is_that_of_the_stored_results() -> None:
+    assert list(STORED["suites"]) == suite_names()
+    assert f"\n{STORED['command']}\n" in PAGE
+    assert_is_stored(PAGE, STORED)
+
+
+def test_the_readme_s_table_is_that_of_the_stored_results(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """To the last character; and by hand, from the file alone."""
+    monkeypatch.syspath_prepend(str(SCRIPT.parent))
+    with_table: Any = runpy.run_path(str(SCRIPT.parent / "benchmark_results.py"))["with_table"]
+    assert README.count(MARKS[0]) == README.count(MARKS[1]) == 1
+    assert with_table(README, STORED) == README
+    table = README.partition(MARKS[0])[2].partition(MARKS[1])[0].splitlines()
+    heads = [cell.strip().replace("`", "") for cell in table[0].strip("|").split("|")]
+    assert {"predictive", "predictive, realistic", "predictive, known", "orca"} <= set(heads)
+    (row,) = [line for line in table if " x 20 obstacles" in line]
+    cells = dict(zip(heads, (cell.strip() for cell in row.strip("|").split("|"))))
+    for name in heads[1:]:
+        figures = STORED["suites"]["random-20"]["planners"][name]
+        success, gap = (float(number) for number in re.findall(r"-?[\d.]+", cells[name]))
+        assert success == pytest.approx(100.0 * figures["certified"][0], rel=1e-3)
+        assert gap == pytest.approx(100.0 * figures["gap"][0], abs=0.006)
+
+
+def test_the_benchmark_stores_its_figures_and_writes_the_readme_s_table(made: Path) -> None:
+    stored = json.loads((made / "docs" / "benchmark.json").read_text(encoding="utf-8"))
+    assert_is_stored((made / "docs" / "benchmark.md").read_text(encoding="utf-8"), stored)
+    readme = (made / "README.md").read_text(encoding="utf-8")
+    assert readme.startswith(f"above\n{MARKS[0]}| worlds | `paper` |")
+    assert readme.endswith(f"{MARKS[1]}below\n")
+    assert "2 x 20 obstacles |" in readme
+    assert "old" not in readme
+
+
+def test_rows_differ_in_what_the_planner_perceives_and_in_nothing_else(made: Path) -> None:
+    for name in SIX:
+        settings = [
+            read_sweep(made / OUT / f"random-20-{name}{how}").spec.setting
+            for how in ("", "--realistic", "--known")
+        ]
+        assert [s.perception for s in settings] == ["lidar", "lidar-realistic", "known"]
+        assert len({replace(s, perception="known") for s in settings}) == 1
 
 
 def test_paper_has_its_own_step_and_all_others_share_one(made: Path) -> None:
@@ -100,26 +177,32 @@ def test_paper_has_its_own_step_and_all_others_share_one(made: Path) -> None:
         for path in (made / OUT).iterdir()
         if not path.name.endswith("optima")
     }
-    assert len(steps) == 7 + 6 + 8
-    assert {name for name, step in steps.items() if step != 0.08} == {"random-20-paper"}
-    assert steps["random-20-paper"] == 0.3
+    of_paper = {f"random-20-paper{how}" for how in ("", "--realistic", "--known")}
+    assert len(steps) == len(ROWS) + 5 + 8  # with those of perceptions and of ingredients
+    assert {name for name, step in steps.items() if step != 0.08} == of_paper
+    assert {steps[name] for name in of_paper} == {0.3}
 
 
 def test_ingredients_and_perceptions_share_what_is_the_same_run(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
-    suite = lines(page, "### random-20")["predictive"]
+    suite = lines(page, "### random-20")
     perceptions = lines(page, "## What predictive sees")
-    bought = lines(page, "## What each ingredient buys")
-    assert len(perceptions) == 7
+    bought = lines(page, "## What each ingredient buys, circles known")
+    assert len(perceptions) == 8
     assert len(bought) == 10
-    for same in (perceptions["random-20: known"], bought["random-20: all (predictive)"]):
-        assert {**same, "planner": "predictive"} == suite
+    for same, row in (
+        (perceptions["random-20: lidar"], "predictive"),
+        (perceptions["random-20: lidar-realistic"], "predictive, realistic"),
+        (perceptions["random-20: known within SR"], "predictive, known"),
+        (bought["random-20: all (predictive)"], "predictive, known"),
+    ):
+        assert {**same, "planner": row} == suite[row]
 
 
 def test_episodes_per_minute_are_of_whole_sweeps(made: Path) -> None:
     page = (made / "docs" / "benchmark.md").read_text(encoding="utf-8")
     targets = lines(page, "## Targets")
-    for name in ("paper", "predictive"):
+    for name in ("paper, known", "predictive, known"):
         found_cell = targets[f"episodes per minute, {name}, random-10, workers: 1"]["found"]
         found, low, high = map(float, re.findall(r"\d+", found_cell)[:3])
         # Two short runs, and half a second to start a process for them.
@@ -152,7 +235,7 @@ def test_what_was_written_by_hand_stays_and_pictures_are_small(made: Path) -> No
 def test_it_goes_on_from_what_is_finished(made: Path) -> None:
     chunks = sorted((made / OUT).glob("*/chunks/*.json"))
     before = {path: path.stat().st_mtime_ns for path in chunks}
-    gone = made / OUT / "random-20-orca" / "chunks"
+    gone = made / OUT / "random-20-orca--realistic" / "chunks"
     for path in gone.iterdir():
         del before[path]
         path.unlink()
@@ -193,7 +276,7 @@ def test_all_suites_are_made_by_the_command_shown_but_for_its_numbers(tmp_path: 
     page = (tmp_path / "docs" / "benchmark.md").read_text(encoding="utf-8")
     for suite in suite_names():
         labels = lines(page, f"### {suite}")  # of suites with cases: "case 1: orca"
-        assert {label.rpartition(" ")[2] for label in labels} == set(SEVEN)
+        assert {re.sub("^case .: ", "", label) for label in labels} == set(ROWS)
     assert PAGE.count("\n### ") == page.count("\n### ")
     assert PAGE.count("\n## ") == page.count("\n## ")
 
@@ -205,7 +288,7 @@ def test_the_runs_shown_have_the_outcome_on_the_page(command: list[str], tmp_pat
     suite, world, planner, _ = run.split("/")
     (headline,) = re.findall(rf"The first: (.*):\n\n```sh\n{' '.join(command)}\n", PAGE)
     sweep = f"sweep {suite} --planner {planner} --first {world} --worlds 1 --workers 1"
-    step = "--set planner.step_length_m=0.08"  # which is predictive's own
+    step = "--set planner.step_length_m=0.08"  # which is predictive's own, as is the lidar all's
     shown_commands.mfba([*sweep.split(), *step.split(), "--out", directory], tmp_path)
     assert show == "show"
     found_cell = shown_commands.mfba(command[1:], tmp_path)

@@ -196,6 +196,28 @@ def test_predictive_has_its_own_step_and_swarm_unless_others_are_given() -> None
     assert command_line(spec) == "mfba sweep " + " ".join(args)
 
 
+def test_a_suite_s_speed_and_the_lidar_are_the_defaults() -> None:
+    from mfba_planner.cli.sweep import _parser, _sweep_spec
+
+    args = ["fast-10", "--planner", "orca", "--worlds", "1"]
+    spec = _sweep_spec(_parser().parse(args))
+    assert (spec.setting.params.speed_mps, spec.setting.perception) == (1.0, "lidar")
+    assert command_line(spec) == "mfba sweep " + " ".join(args)
+    args += ["--perception", "known", "--set", "planner.speed_mps=0.8"]
+    spec = _sweep_spec(_parser().parse(args))
+    assert (spec.setting.params.speed_mps, spec.setting.perception) == (0.8, "known")
+    assert command_line(spec) == "mfba sweep " + " ".join(args)
+
+
+def test_help_says_which_perceptions_hold_the_sensing_range_equal() -> None:
+    from mfba_planner.cli.sweep import _parser
+
+    text = " ".join(_parser().format_help().split())
+    for words in ("see no farther than SR, to hold SR equal", "known: told the truth",
+                  "lidar-realistic: that with errors: ranges 2 cm"):  # fmt: skip
+        assert words in text
+
+
 def interrupted(out: Path, tmp_path: Path, send: signal.Signals, *, group: bool) -> Program:
     """A sweep that is stopped when some of its chunks are finished."""
     with Program("mfba", *LONG, "--workers", "2", "--out", str(out), cwd=tmp_path) as program:

@@ -30,7 +30,7 @@ def is_run(words: list[str]) -> bool:
     if program == "ros2":
         return bool(kind_of(words))  # by test_docs_ros2
     if program == "python":
-        return " ".join(words) in REDUCED
+        return shown_commands.reduced(words) != words
     if program == "make":
         return rest[0] in CI or BY_TESTS[rest[0]] in MAKEFILE
     return sets_up_a_workspace(words)

@@ -173,7 +173,9 @@ def test_a_covered_goal_is_reached_later_by_a_longer_path() -> None:
 # --- soundness --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["random-10", "random-30", "adversarial", "dynabarn-like"])
+@pytest.mark.parametrize(
+    "name", ["random-10", "random-30", "adversarial", "turning", "fast-20", "pedestrians"]
+)
 def test_trajectories_are_free_by_the_simulation_s_formula_too(name: str) -> None:
     for k in range(6):
         world = suite(name).world(k, V)
@@ -416,7 +418,7 @@ def test_pair_gaps_and_path_gaps_equal_gaps_bit_for_bit() -> None:
         assert path_gaps(ends, V, rows.tolist(), plain) == expected.tolist()
 
 
-@pytest.mark.parametrize("name", ["random-30", "dynabarn-like"])
+@pytest.mark.parametrize("name", ["random-30", "turning", "dynabarn-like"])
 def test_the_lattice_skips_only_segments_out_of_reach(name: str) -> None:
     rng = np.random.default_rng(6)
     segments = uniform_segments(suite(name).world(6), 40.0)

@@ -56,9 +56,19 @@ def test_the_suites_of_the_benchmark_exist() -> None:
         "random-30",
         "dense",
         "adversarial",
+        "turning",
+        "fast-10",
+        "fast-20",
         "dynabarn-like",
+        "pedestrians",
     ]
     assert len({suite(name).number for name in suite_names()}) == len(suite_names())
+
+
+def test_numbers_of_published_suites_do_not_change() -> None:
+    """They are in the seeds of the worlds; the name is not."""
+    assert {suite(name).number for name in ("dense", "adversarial", "turning")} == {101, 102, 103}
+    assert [suite(f"random-{n}").number for n in (3, 10, 20, 30)] == [3, 10, 20, 30]
 
 
 def test_an_unknown_suite_is_refused_with_the_nearest_name() -> None:
@@ -284,7 +294,19 @@ def test_first_contact_is_where_the_gap_ends(
         assert at <= 1e-6
 
 
-@pytest.mark.parametrize("name", ["random-10", "dynabarn-like"])
+def test_a_fast_suite_has_its_own_speed_and_obstacles_as_fast_as_it_and_faster() -> None:
+    obstacles = [o for k in range(40) for o in suite("fast-20").world(k).obstacles]
+    speeds = [o.speed_mps for o in obstacles]
+    assert len(obstacles) == 40 * 20
+    assert 0.5 <= min(speeds) < 0.55 < 1.95 < max(speeds) <= 2.0
+    assert [suite(name).speed_mps for name in ("random-10", "fast-10", "pedestrians")] == [
+        0.8, 1.0, 1.0,
+    ]  # fmt: skip
+    adversarial = suite("adversarial")
+    assert adversarial.world(0) == adversarial.world(0, 0.8) != adversarial.world(0, 1.0)
+
+
+@pytest.mark.parametrize("name", ["random-10", "turning", "fast-10", "dynabarn-like"])
 def test_survival_falls_with_the_crowd(name: str) -> None:
     shares = [survivability(suite(name).world(k), 0.8).share for k in range(30)]
     few = [survivability(suite("random-3").world(k), 0.8).share for k in range(30)]

@@ -8,6 +8,7 @@ import os
 import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +38,24 @@ from mfba_planner.evaluation.sweep.single_run import (
 )
 from mfba_planner.evaluation.sweep.summary import comparisons, planner_summaries, versus
 from mfba_planner.evaluation.sweep.sweep_chunks import chunks_of, make
-from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting, SweepSpec, read_run
+from mfba_planner.evaluation.sweep.sweep_spec import (
+    Run,
+    Setting,
+    SweepSpec,
+    default_setting,
+    own_preset,
+    read_run,
+)
 from mfba_planner.evaluation.sweep.table import sorted_hash, to_csv, to_parquet, write
 from mfba_planner.evaluation.sweep.table_columns import COLUMNS, TIMINGS, Row
 from mfba_planner.evaluation.sweep.worker import Lost, Worker, run_in_worker
 from mfba_planner.planning.algorithm_1 import Algorithm1
-from mfba_planner.planning.planner_params import PlannerParams, Swarm
+from mfba_planner.planning.planner_factory import make_planner as planner_of_sim
+from mfba_planner.planning.planner_params import Method, PlannerParams, Swarm
+from mfba_planner.planning.recovery import RecoveryParams
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.planner_observations import observe_scan
+from mfba_planner.simulation.robot_model import Lidar
 from mfba_planner.simulation.run_episode import run
 
 
@@ -386,13 +399,14 @@ def test_seeds_of_a_world_are_a_single_case() -> None:
         ({"planners": ()}, "--planner: none given"),
         ({"planners": ("paper", "paper")}, "--planner paper: given twice"),
         (
-            {"planners": ("orca",), "setting": Setting(perception="scan-360")},
-            "--perception scan-360: planner orca uses none of it; give --perception known",
+            {"planners": ("orca",), "setting": Setting(perception="sectors")},
+            "--perception sectors: planner orca uses none of it; give --perception lidar or ",
         ),
         (
             {"planners": ("paper", "dwa"), "setting": Setting(perception="sectors")},
             "--perception sectors: planner dwa uses none of it; "
-            "give --perception known or scan-12 or scan-360",
+            "give --perception lidar or lidar-differential or lidar-realistic or known or "
+            "scan-12 or scan-360",
         ),
         ({"worlds": 0}, "--worlds=0: out of range; give at least 1"),
         ({"first": -1}, "--first=-1: out of range; give at least 0"),
@@ -409,6 +423,9 @@ def test_invalid_specs_are_refused(changes: dict[str, Any], reason: str) -> None
     ("changes", "reason"),
     [
         ({"perception": "scan-13"}, "did you mean 'scan-12'?"),
+        ({"perception": "lidar-realistc"}, "did you mean 'lidar-realistic'?"),
+        ({"perception": "lidar", "noise_m": -0.1}, "noise_m=-0.1"),
+        ({"perception": "lidar", "latency_ticks": -1}, "latency_ticks=-1"),
         ({"noise_m": math.nan}, "noise_m=nan"),
         ({"latency_ticks": -1}, "latency_ticks=-1"),
         ({"patience_s": 0.0}, "--patience=0: out of range"),
@@ -434,6 +451,59 @@ def test_perception_reaches_the_planner() -> None:
         spec_of(planners=("paper",), worlds=3, setting=Setting(perception="scan-12"))
     ).rows
     assert [row["length_m"] for row in known] != [row["length_m"] for row in scan]
+
+
+@pytest.mark.parametrize("method", [Method.PAPER, Method.PREDICTIVE])
+def test_by_default_a_run_is_that_of_sim_with_a_lidar(method: Method) -> None:
+    """Decision by decision: supervised, and the robot sees nothing but its scan."""
+    scenario = suite("random-10").world(3)
+    robot = replace(scenario.robot, lidar=Lidar(beams=360))
+    usual = PlannerParams(speed_mps=0.8, method=method, recovery=RecoveryParams(enabled=True))
+    setting = Setting(params=own_preset(method.value, usual))
+    run_of_sweep = run_one(Run("random-10", 3, method.value, 5), setting)
+    episode = run(
+        replace(scenario, robot=robot),
+        planner=setting.params,
+        path_planner=planner_of_sim(setting.params, setting.sensor, 5),
+        observe=observe_scan,
+        seed=5,
+    )
+    assert digest(run_of_sweep.episode.ticks) == digest(episode.ticks)
+    assert run_of_sweep.episode.scenario == episode.scenario
+    blind = run_one(Run("random-10", 3, "straight", 5), setting)
+    assert digest(blind.episode.ticks) != digest(episode.ticks)
+
+
+def test_runs_from_a_lidar_together_are_the_single_ones() -> None:
+    """Supervised ones too; some are blocked in this suite, and recover."""
+    params = PlannerParams(speed_mps=0.8, recovery=RecoveryParams(enabled=True))
+    setting = Setting(params=params)
+    runs = [Run("dense", world, "paper", 0) for world in range(4)]
+    assert generates_paths_together("paper", setting)
+    single = [run_one(one, setting, whole=False).episode for one in runs]
+    together = [completed.episode for completed in run_together(runs, setting)]
+    assert [digest(e.ticks) for e in together] == [digest(e.ticks) for e in single]
+    assert any("waiting for" in tick.reason for e in single for tick in e.ticks)
+
+
+def test_the_realistic_robot_is_judged_by_its_true_path() -> None:
+    setting = Setting(perception="lidar-realistic")
+    completed = run_one(Run("random-3", 0, "predictive", 0), setting)
+    episode = completed.episode
+    assert episode.scenario.robot.turns
+    assert len(episode.truth) == len(episode.ticks)
+    row = sweep(spec_of(planners=("predictive",), worlds=1, setting=setting)).rows[0]
+    true_m = [math.dist(a.position, b.position) for a, b in pairwise(episode.truth)]
+    assert row["length_m"] == pytest.approx(math.fsum(true_m))
+    assert row["outcome"] == "goal_reached"
+
+
+@pytest.mark.parametrize("planner", ["paper", "straight"])
+def test_a_suite_s_own_speed_is_the_default(planner: str) -> None:
+    setting = default_setting("fast-10")
+    assert setting.params.speed_mps == suite("fast-10").speed_mps == 1.0
+    rows = sweep(spec_of(suite="fast-10", planners=(planner,), worlds=1, setting=setting)).rows
+    assert rows[0]["length_m"] / rows[0]["time_s"] == pytest.approx(1.0, rel=0.05)
 
 
 def test_a_directory_belongs_to_one_spec(tmp_path: Path) -> None:

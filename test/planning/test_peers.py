@@ -4,6 +4,7 @@
 import math
 import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.planner_types import Circle, Mode, Observation, Scan
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.circles_from_observation import circle_rows
+from mfba_planner.planning.base_planner import BasePlanner
 from mfba_planner.planning.peers import apf
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.planner_registry import make
@@ -23,6 +24,7 @@ from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.planner_observations import Perception
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.simulation.simulated_lidar import cast_rays
 
 PEERS = ("apf", "vfh", "dwa", "orca")
 PARAMS = PlannerParams(speed_mps=0.8)
@@ -136,51 +138,68 @@ def test_forces_that_cancel_stop_the_robot_with_a_reason(monkeypatch: pytest.Mon
     assert decision.reason == "1 repelling: forces cancel"
 
 
-@pytest.mark.parametrize("name", ["apf", "vfh", "dwa"])
-def test_a_scan_gives_the_same_velocity_as_circles(name: str) -> None:
-    """One surface ahead, given as a circle and as one beam."""
-    ranges = np.full(36, np.inf)
-    ranges[0] = 0.9
-    scan = Scan(
-        ranges_m=ranges,
-        angle_min_rad=0.0,
-        angle_increment_rad=2.0 * math.pi / 36,
-        range_min_m=0.0,
-        range_max_m=1.1,
+def crowd_scan(time_s: float) -> tuple[Scan, tuple[Circle, ...]]:
+    """Two obstacles near the robot at (1, 1): one at rest ahead, one that crosses."""
+    surfaces = [(2.0, 1.1, 0.3), (1.6, 2.4 - 0.4 * time_s, 0.3)]
+    ranges = cast_rays((1.0, 1.0), surfaces, 360, 3.5)
+    circles = tuple(
+        Circle(center_m=(x, y), radius_m=r + 0.3, velocity_mps=velocity)
+        for (x, y, r), velocity in zip(surfaces, ((0.0, 0.0), (0.0, -0.4)))
     )
-    by_scan = make(name, PARAMS).plan(replace(OBSERVATION, circles=None, scan=scan)).velocity
-    assert by_scan == pytest.approx(velocity(name, circle(0.9, 0.0, radius_m=0.3)))
+    increment = 2.0 * math.pi / 360
+    return (
+        Scan(
+            ranges_m=ranges,
+            angle_min_rad=0.5 * increment,
+            angle_increment_rad=increment,
+            range_min_m=0.0,
+            range_max_m=3.5,
+        ),
+        circles,
+    )
 
 
-@pytest.mark.parametrize(
-    ("name", "observed", "inputs"),
-    [
-        ("apf", {}, "circles, scan"),
-        ("vfh", {}, "circles, scan"),
-        ("dwa", {}, "circles, scan"),
-        ("orca", {}, "circles"),
-        ("orca", {"scan": Scan(
-            ranges_m=np.full(36, np.inf), angle_min_rad=0.0, angle_increment_rad=math.pi / 18,
-            range_min_m=0.0, range_max_m=1.1,
-        )}, "circles"),
-    ],
-    ids=["apf", "vfh", "dwa", "orca", "orca, scan"],
-)  # fmt: skip
-def test_without_an_input_that_it_uses_a_planner_stops(
-    name: str, observed: dict[str, Scan], inputs: str
-) -> None:
+def observed(time_s: float, **inputs: Any) -> Observation:
+    stamp_ns = round(time_s * 1e9)
+    return replace(OBSERVATION, stamp_ns=stamp_ns, now_ns=stamp_ns, **{"circles": None, **inputs})
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_after_some_scans_a_peer_decides_nearly_as_with_known_circles(name: str) -> None:
+    by_scan, by_circles = make(name, PARAMS), make(name, PARAMS)
+    for k in range(11):
+        scan, circles = crowd_scan(0.1 * k)
+        decision = by_scan.plan(observed(0.1 * k, scan=scan))
+        expected = by_circles.plan(observed(0.1 * k, circles=circles))
+    assert expected.velocity != pytest.approx((0.8, 0.0), abs=0.1)
+    assert math.dist(decision.velocity, expected.velocity) < 0.3
+    assert decision.mode is expected.mode
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_a_new_trip_begins_without_tracks(name: str) -> None:
+    used = make(name, PARAMS)
+    for k in range(11):
+        used.plan(observed(0.1 * k, scan=crowd_scan(0.1 * k)[0]))
+    assert isinstance(used, BasePlanner)
+    used.reset()
+    scan = crowd_scan(0.0)[0]
+    assert used.plan(observed(2.0, scan=scan)) == make(name, PARAMS).plan(observed(2.0, scan=scan))
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_without_an_input_that_it_uses_a_planner_stops(name: str) -> None:
     """Sectors are given: unknown is not free."""
-    blind = replace(OBSERVATION, circles=None, **observed)  # type: ignore[arg-type]
+    blind = replace(OBSERVATION, circles=None)
     decision = make(name, PARAMS).plan(blind)
     assert (decision.mode, decision.velocity) == (Mode.STOPPED, (0.0, 0.0))
-    assert decision.reason == f"refused input: none of {inputs}"
+    assert decision.reason == "refused input: none of circles, scan"
     assert make("straight", PARAMS).plan(blind).velocity == pytest.approx((0.8, 0.0))
 
 
-def test_circle_rows_are_relative_to_the_robot() -> None:
-    found = circle_rows(replace(OBSERVATION, circles=(circle(0.5, -0.5, 0.1, 0.2),)))
-    assert found.tolist() == [[0.5, -0.5, 0.1, 0.2, 0.6]]
-    assert circle_rows(OBSERVATION).shape == (0, 5)
+def test_vfh_masks_no_heading_for_a_circle_beyond_its_active_window() -> None:
+    assert velocity("vfh", circle(0.6 + 0.81, 0.0)) == pytest.approx((0.8, 0.0))
+    assert velocity("vfh", circle(0.6 + 0.79, 0.0)) != pytest.approx((0.8, 0.0), abs=0.1)
 
 
 def test_the_error_without_pyrvo_names_the_package_to_install(

@@ -17,7 +17,7 @@ SR_M = 0.8
 
 
 @pytest.mark.parametrize(
-    "name", ["random-3", "random-20", "random-30", "adversarial", "dynabarn-like"]
+    "name", ["random-3", "random-20", "random-30", "adversarial", "turning", "dynabarn-like"]
 )
 def test_no_obstacle_within_reach_is_missing(name: str) -> None:
     scenario = suite(name).world(3)

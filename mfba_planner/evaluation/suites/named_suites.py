@@ -13,37 +13,46 @@ from ...core.errors import ConfigError
 from ...core.option_specs import did_you_mean
 from ...simulation.scenario import Scenario
 from .adversarial_worlds import FAMILIES, adversarial_obstacles
+from .dynabarn_worlds import DIFFICULTIES, dynabarn_obstacles
 from .random_crowds import CrowdParams, Motion, crowd
+from .social_forces import PedestrianParams, pedestrian_obstacles
 from .task_geometry import ROOM, Trip, scenario
 
 WORLD_STREAM = 3  # spawn key of worlds' SeedSequence children; one number per purpose
-SPEED_MPS = 0.8  # robot speed at which gaps to the optimum are reported
+SPEED_MPS = 0.8  # of the robot, unless the suite has another
+FAST_MPS = 1.0  # of the robot in suites with obstacles as fast as it and faster
 
 _Make = Callable[["Suite", int, float], Scenario]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Suite:
-    """Worlds 0, 1, 2, ... of one kind; number is the suite's own index in the seeds."""
+    """Worlds 0, 1, 2, ... of one kind; number is the suite's own index in the seeds.
+
+    speed_mps is the robot's, at which results and gaps to the optimum are reported.
+    """
 
     name: str
     description: str
     number: int
     make: _Make
     distinct: int | None = None  # number of different worlds; None: all differ
+    speed_mps: float = SPEED_MPS
     seed: int = 0
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle by name, as `make` cannot be pickled."""
         return suite, (self.name, self.seed)
 
-    def world(self, k: int, speed_mps: float = SPEED_MPS) -> Scenario:
+    def world(self, k: int, speed_mps: float | None = None) -> Scenario:
         """World k for a robot of this speed (only adversarial worlds depend on it).
 
-        Raises ConfigError for a negative k, or a speed that is not above 0.
+        None is the suite's own speed. Raises ConfigError for a negative k, or a speed that is
+        not above 0.
         """
         if k < 0:
             raise ConfigError(f"k={k}: negative; worlds are counted from 0")
+        speed_mps = self.speed_mps if speed_mps is None else speed_mps
         if not (math.isfinite(speed_mps) and speed_mps > 0.0):
             raise ConfigError(f"speed_mps={speed_mps}: no speed; give a number above 0")
         return self.make(self, self.world_number(k), speed_mps)
@@ -97,10 +106,20 @@ def _adversarial(source: Suite, k: int, speed_mps: float) -> Scenario:
     return scenario(f"{source.name}-{k}-{family}", obstacles)
 
 
+def _dynabarn(source: Suite, k: int, _: float) -> Scenario:
+    name = list(DIFFICULTIES)[k % len(DIFFICULTIES)]
+    return scenario(f"{source.name}-{k}-{name}", dynabarn_obstacles(name, source.stream(k)))
+
+
+def _pedestrians(source: Suite, k: int, _: float) -> Scenario:
+    obstacles = pedestrian_obstacles(PedestrianParams(), source.stream(k))
+    return scenario(f"{source.name}-{k}", obstacles)
+
+
 _DENSE = CrowdParams(
     obstacles=60, radius_min_m=0.1, radius_max_m=0.3, speed_min_mps=0.05, static_share=0.3
 )
-_DYNABARN = CrowdParams(
+_TURNING = CrowdParams(
     obstacles=15,
     radius_min_m=0.2,
     radius_max_m=0.4,
@@ -110,6 +129,10 @@ _DYNABARN = CrowdParams(
     turn_every_s=2.0,
     turn_max_rad=math.radians(60.0),
 )
+
+
+def _fast(obstacles: int) -> CrowdParams:
+    return CrowdParams(obstacles=obstacles, speed_min_mps=0.5, speed_max_mps=2.0, margin_m=1.0)
 
 
 # Never change a suite's number: it would change its worlds.
@@ -143,10 +166,37 @@ _ALL = (
         make=_adversarial,
     ),
     Suite(
-        name="dynabarn-like",
+        name="turning",
         description="15 obstacles of 0.2 to 0.4 m that change speed (up to 0.5 m/s) and heading",
         number=103,
-        make=_crowd(_DYNABARN),
+        make=_crowd(_TURNING),
+    ),
+    *(
+        Suite(
+            name=f"fast-{n}",
+            description=f"{n} obstacles of 0.3 m at 0.5 to 2 m/s that bounce in 12 x 12 m; robot "
+            "1 m/s",
+            number=110 + n,
+            make=_crowd(_fast(n)),
+            speed_mps=FAST_MPS,
+        )
+        for n in (10, 20)
+    ),
+    Suite(
+        name="dynabarn-like",
+        description="5 to 24 discs of 0.5 m at 0.74, 1.23 or 1.72 m/s on average (easy, medium, "
+        "hard in turn) on curves; robot 1 m/s",
+        number=104,
+        make=_dynabarn,
+        speed_mps=FAST_MPS,
+    ),
+    Suite(
+        name="pedestrians",
+        description="24 people of 0.25 m at 1.3 m/s on average in crossing streams, by social "
+        "forces; robot 1 m/s",
+        number=105,
+        make=_pedestrians,
+        speed_mps=FAST_MPS,
     ),
 )
 _SUITES = {entry.name: entry for entry in _ALL}

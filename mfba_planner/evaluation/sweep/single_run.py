@@ -7,11 +7,14 @@ from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from ...core.planner_types import NANO, Observation
+from ...core.planner_types import NANO, Observation, PathPlanner
 from ...planning.algorithm_1 import Algorithm1, generate_paths_together
 from ...planning.planner_params import Swarm
 from ...planning.planner_registry import find_factory
+from ...planning.predictive_planner import Predictive
+from ...planning.supervised_planner import SupervisedPlanner
 from ...simulation.episode import Episode, Outcome
+from ...simulation.lidar_perception import LIDAR_ROBOTS
 from ...simulation.planner_observations import Observe, observe_sectors
 from ...simulation.run_episode import always_continue, episode_generator, run_to_end
 from .planner_sandbox import HungError, PlannerFault, PlannerSandbox
@@ -70,7 +73,7 @@ def _tick_by_tick(runs: Sequence[Run], setting: Setting) -> list[CompletedRun]:
             except StopIteration as end:
                 found[i] = end.value
         running = {i: running[i] for i in observations}
-        planners = [cast(Algorithm1, sandboxes[i].planner) for i in observations]
+        planners = [cast(Algorithm1, _inner(sandboxes[i].planner)) for i in observations]
         generate_paths_together(planners, list(observations.values()))
     return [found[i] for i in range(len(runs))]
 
@@ -87,8 +90,9 @@ def _decision_by_decision(
 ) -> Generator[Observation, None, CompletedRun]:
     """A run as a generator: yields the observation before every decision."""
     scenario, fault = setting.scenario(run), ""
+    setting = replace(setting, params=scenario.planner_params(setting.params))
     try:
-        path_planner = sandbox.make_planner(lambda: setting.make_planner(run))
+        path_planner = sandbox.make_planner(lambda: _as_on_a_robot(run, setting))
         episode = yield from episode_generator(
             scenario,
             setting.params,
@@ -96,7 +100,7 @@ def _decision_by_decision(
             run.seed,
             always_continue,
             sandbox,
-            _observer(path_planner, run, setting, whole),
+            _observer(_inner(path_planner), run, setting, whole),
         )
     except (PlannerFault, HungError) as error:
         fault = str(error)
@@ -112,6 +116,18 @@ def _decision_by_decision(
     if run.planner != "paper":
         episode = replace(episode, planner_name=run.planner)
     return CompletedRun(episode=episode, fault=fault)
+
+
+def _as_on_a_robot(run: Run, setting: Setting) -> PathPlanner:
+    """The planner; from a lidar one that can drive a robot is supervised, as in `mfba sim`."""
+    path_planner = setting.make_planner(run)
+    if setting.perception in LIDAR_ROBOTS and isinstance(path_planner, (Algorithm1, Predictive)):
+        return SupervisedPlanner(path_planner)
+    return path_planner
+
+
+def _inner(path_planner: PathPlanner | None) -> PathPlanner | None:
+    return path_planner.inner if isinstance(path_planner, SupervisedPlanner) else path_planner
 
 
 def _observer(path_planner: object, run: Run, setting: Setting, whole: bool) -> Observe:

@@ -11,17 +11,22 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ...core.errors import ConfigError
-from ...core.option_specs import flatten
+from ...core.option_specs import did_you_mean, flatten
 from ...core.planner_types import PathPlanner
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ...planning.planner_registry import Factory, find_factory, preset_of
-from ...simulation.planner_observations import INPUTS, Perception
+from ...simulation.lidar_perception import LIDAR_ROBOTS, LidarPerception, with_lidar
+from ...simulation.planner_observations import INPUTS, Observe, Perception
 from ...simulation.scenario import Scenario
 from ..suites import suite
 from ..suites.named_suites import SPEED_MPS
 
 PATIENCE_S, LONGEST_S = 60.0, 86_400.0
+DEFAULT_PERCEPTION = "lidar"
+# What a planner can be given instead of its input, as listed in reports and in --help.
+PERCEIVED = dict.fromkeys(LIDAR_ROBOTS, "scan") | INPUTS
+PERCEPTIONS = tuple(PERCEIVED)
 
 
 class Run(NamedTuple):
@@ -40,13 +45,14 @@ class Run(NamedTuple):
 class Setting:
     """All that determines a run, except its Run.
 
-    patience_s is the wall time after which a run counts as hung; nothing else in a run depends
-    on a clock.
+    perception: a robot of simulation.lidar_perception, or a name of
+    simulation.planner_observations.Perception. patience_s is the wall time after which a run
+    counts as hung; nothing else in a run depends on a clock.
     """
 
     params: PlannerParams = field(default_factory=lambda: PlannerParams(speed_mps=SPEED_MPS))
     sensor: SensorParams = field(default_factory=SensorParams)
-    perception: str = "known"
+    perception: str = DEFAULT_PERCEPTION
     noise_m: float = 0.0
     latency_ticks: int = 0
     suite_seed: int = 0
@@ -54,18 +60,27 @@ class Setting:
 
     def __post_init__(self) -> None:
         """Raise ConfigError for an invalid value."""
-        self.observer(0)
+        if self.perception not in PERCEIVED:
+            known = did_you_mean(self.perception, list(PERCEPTIONS))
+            raise ConfigError(f"perception {self.perception!r}: unknown; {known}")
+        # Also of lidars: the same limits of noise and latency.
+        Perception("sectors", noise_m=self.noise_m, latency_ticks=self.latency_ticks)
         if not 0.0 < self.patience_s <= LONGEST_S:
             raise ConfigError(
                 f"--patience={self.patience_s:g}: out of range; give 0 to {LONGEST_S:g} s"
             )
 
     def scenario(self, run: Run) -> Scenario:
-        """The world of a run."""
-        return suite(run.suite, self.suite_seed).world(run.world, self.params.speed_mps)
+        """The world of a run, with the robot of the perception."""
+        world = suite(run.suite, self.suite_seed).world(run.world, self.params.speed_mps)
+        if self.perception not in LIDAR_ROBOTS:
+            return world
+        return with_lidar(world, self.perception, self.noise_m)
 
-    def observer(self, seed: int, *, sectors: bool = True) -> Perception:
-        """The perception of a run with this seed."""
+    def observer(self, seed: int, *, sectors: bool = True) -> Observe:
+        """The perception of a run with this seed; a lidar's always computes the sectors."""
+        if self.perception in LIDAR_ROBOTS:
+            return LidarPerception(self.perception, self.latency_ticks)
         return Perception(
             self.perception,
             noise_m=self.noise_m,
@@ -85,6 +100,11 @@ class Setting:
             "params": flatten(self.params),
             "sensor": flatten(self.sensor),
         }
+
+
+def default_setting(suite_name: str) -> Setting:
+    """The setting of a suite without any option: its robot's speed. Raises ConfigError."""
+    return Setting(params=PlannerParams(speed_mps=suite(suite_name).speed_mps))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,9 +175,9 @@ class SweepSpec:
 
 def _check_inputs(planner: str, inputs: Sequence[str], perception: str) -> None:
     """Raise ConfigError for a planner that could not observe any obstacle."""
-    if not inputs or "sectors" in inputs or INPUTS[perception] in inputs:
+    if not inputs or "sectors" in inputs or PERCEIVED[perception] in inputs:
         return
-    usable = [name for name, given in INPUTS.items() if given in inputs]
+    usable = [name for name, given in PERCEIVED.items() if given in inputs]
     raise ConfigError(
         f"--perception {perception}: planner {planner} uses none of it; "
         f"give --perception {' or '.join(usable)}"

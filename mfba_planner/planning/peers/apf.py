@@ -9,23 +9,20 @@ import numpy as np
 
 from ...core.geometry import Point
 from ...core.planner_types import Observation
-from ..base_planner import BasePlanner, Move
-from ..circles_from_observation import circle_rows
+from ..base_planner import Move
 from ..mode_transitions import Event
+from .circle_planner import CirclePlanner
 
 REPULSION = 0.3  # relative to the attraction, which has length 1
 NEAREST_M = 0.02  # the repulsion does not grow below this distance
 
 
-class PotentialField(BasePlanner):
+class PotentialField(CirclePlanner):
     """Full speed along the sum of the forces; no escape from local minima.
 
     Force: unit vector to the goal, plus REPULSION (1/d - 1/SR) / d^2 away from each enlarged
     edge at distance d < SR.
     """
-
-    reads_sectors = False
-    inputs = ("circles", "scan")
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """Follow the force."""
@@ -33,7 +30,7 @@ class PotentialField(BasePlanner):
         gx, gy = goal[0] - px, goal[1] - py
         distance_m = math.hypot(gx, gy)
         fx, fy = gx / distance_m, gy / distance_m
-        rows = circle_rows(obs)
+        rows = self.circle_rows(obs)
         if not rows.size:
             velocity = self.straight(obs.pose.position, goal, self.params.speed_mps)
             return Move(velocity=velocity, reason="nothing within SR")

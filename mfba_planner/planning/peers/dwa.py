@@ -9,9 +9,9 @@ import numpy as np
 
 from ...core.geometry import Point
 from ...core.planner_types import NANO, Observation
-from ..base_planner import BasePlanner, Move
-from ..circles_from_observation import circle_rows
+from ..base_planner import Move
 from ..mode_transitions import Event
+from .circle_planner import CirclePlanner
 
 HEADINGS, SPEEDS = 36, (1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0)
 HORIZON_S = 2.0
@@ -19,15 +19,12 @@ PROGRESS, CLEARANCE = 1.0, 0.005  # weights of metres towards the goal and of 1 
 NEAREST_M = 0.05  # clearance below which a velocity is admissible only if nothing is better
 
 
-class DynamicWindow(BasePlanner):
+class DynamicWindow(CirclePlanner):
     """Velocities of an omnidirectional robot, held for HORIZON_S, circles at constant velocity.
 
     The window is the whole disc of velocities, as this robot has no acceleration limit.
     Objective: PROGRESS times the approach to the goal, minus CLEARANCE over the smallest gap.
     """
-
-    reads_sectors = False
-    inputs = ("circles", "scan")
 
     def __init__(self, *args: object) -> None:
         """Prepare the samples."""
@@ -41,7 +38,7 @@ class DynamicWindow(BasePlanner):
     def move(self, obs: Observation, goal: Point) -> Move:
         """The sample with the best objective."""
         ahead = self.straight(obs.pose.position, goal, self.params.speed_mps)
-        rows = circle_rows(obs)
+        rows = self.circle_rows(obs)
         if not rows.size:
             return Move(velocity=ahead, reason="nothing within SR")
         samples = np.concatenate([self._samples, [ahead]])

@@ -9,9 +9,10 @@ from ...core.errors import ConfigError
 from ...core.geometry import Point
 from ...core.planner_types import NANO, Observation
 from ...perception.sensory_vector import SensorParams
-from ..base_planner import BasePlanner, Move
+from ..base_planner import Move
 from ..mode_transitions import Event
 from ..planner_params import PlannerParams
+from .circle_planner import CirclePlanner
 
 HORIZON_S = 3.0
 MARGIN_M = 0.06
@@ -20,11 +21,8 @@ MARGIN_M = 0.06
 ROUNDS = 4
 
 
-class Orca(BasePlanner):
-    """One ORCA agent among agents at constant velocity; needs known circles."""
-
-    reads_sectors = False
-    inputs = ("circles",)
+class Orca(CirclePlanner):
+    """One ORCA agent among agents at constant velocity."""
 
     def __init__(self, params: PlannerParams, sensor: SensorParams, seed: int) -> None:
         """Raise ConfigError where pyrvo is not installed."""
@@ -38,13 +36,14 @@ class Orca(BasePlanner):
         super().__init__(params, sensor, seed)
 
     def forget(self) -> None:
-        """Start from velocity 0."""
+        """Start from velocity 0, without tracks."""
+        super().forget()
         self._velocity: Point = (0.0, 0.0)
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """The velocity of ORCA; straight to the goal if no circle is within SR."""
         wanted = self.straight(obs.pose.position, goal, self.params.speed_mps)
-        circles = obs.circles or ()
+        circles = self.circles(obs)
         if not circles:
             self._velocity = wanted
             return Move(velocity=wanted, reason="nothing within SR")

@@ -9,37 +9,37 @@ import numpy as np
 
 from ...core.geometry import Point, bearing
 from ...core.planner_types import Observation
-from ..base_planner import BasePlanner, Move
-from ..circles_from_observation import circle_rows
+from ..base_planner import Move
 from ..mode_transitions import Event
+from .circle_planner import CirclePlanner
 
 HEADINGS = 72
+ACTIVE_M = 0.8  # circles whose edge is farther away mask nothing: VFH+'s active window
 MARGIN_M = 0.3  # added to every radius, as circles move while the robot passes
 TO_GOAL, TO_LAST = 5.0, 2.0  # weights of the turn away from the goal and from the last heading
 
 
-class VectorFieldHistogram(BasePlanner):
+class VectorFieldHistogram(CirclePlanner):
     """Chooses among free headings; a heading between the tangents of a circle is masked.
 
-    Circles count as at rest, as in VFH+. Cost: TO_GOAL times the turn from the goal's heading,
-    plus TO_LAST times the turn from the last heading.
+    Circles count as at rest, as in VFH+, and only within the active window. Cost: TO_GOAL times
+    the turn from the goal's heading, plus TO_LAST times the turn from the last heading.
     """
 
-    reads_sectors = False
-    inputs = ("circles", "scan")
-
     def forget(self) -> None:
-        """Drop the last heading."""
+        """Drop the last heading and the tracks."""
+        super().forget()
         self._last: float | None = None
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """Full speed along the cheapest free heading."""
         target = bearing(obs.pose.position, goal)
-        rows = circle_rows(obs)
+        rows = self.circle_rows(obs)
+        rows = rows[np.hypot(rows[:, 0], rows[:, 1]) - rows[:, 4] <= ACTIVE_M]
         if not rows.size:
             self._last = target
             velocity = self.straight(obs.pose.position, goal, self.params.speed_mps)
-            return Move(velocity=velocity, reason="nothing within SR")
+            return Move(velocity=velocity, reason="nothing within the active window")
         headings = np.append(np.arange(HEADINGS) * (2.0 * math.pi / HEADINGS), target)
         away = np.hypot(rows[:, 0], rows[:, 1])
         directions = np.arctan2(rows[:, 1], rows[:, 0])
