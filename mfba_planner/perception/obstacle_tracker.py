@@ -228,11 +228,13 @@ class Tracker:
     def _use(self, beams: Beams, found: Segments, track: Array, origin: Array) -> None:
         """Fit the groups, and update, start and drop tracks by them."""
         bank, p = self._bank, self.params
-        known = np.unique(track[track != NONE])
-        new = np.flatnonzero(track == NONE)
-        group_of_track = np.full(bank.count, NONE)
-        group_of_track[known] = np.arange(known.size)
-        group = np.where(track == NONE, 0, group_of_track[track]) if bank.count else track.copy()
+        matched = track != NONE
+        is_matched = np.zeros(bank.count, dtype=bool)
+        is_matched[track[matched]] = True
+        known, new = is_matched.nonzero()[0], (~matched).nonzero()[0]
+        group_of_track = np.cumsum(is_matched) - 1
+        group = np.empty(track.size, dtype=np.int64)
+        group[matched] = group_of_track[track[matched]]
         group[new] = known.size + np.arange(new.size)
         groups = known.size + new.size
         self._walls = []

@@ -85,7 +85,7 @@ def segments(
         surely = known[np.maximum(one, other)]  # of the obstacle, if the other is none
         cut |= (one != other) & ((np.minimum(one, other) >= 0) | surely)
     _cut_at_humps(r, cut, hump_m)
-    last = np.concatenate((np.flatnonzero(cut), [r.size - 1]))
+    last = np.concatenate((cut.nonzero()[0], [r.size - 1]))
     first = np.concatenate(([0], last[:-1] + 1))
     segment = np.zeros(r.size, dtype=np.int64)
     segment[first[1:]] = 1
@@ -111,7 +111,7 @@ def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
         before = np.minimum.accumulate(smooth - offset) + offset
         after = (np.minimum.accumulate((smooth + offset)[::-1]))[::-1] - offset
         height = smooth - np.maximum(before, after)
-        high = np.flatnonzero(height > hump_m)
+        high = (height > hump_m).nonzero()[0]
         if not high.size:
             return
         # The highest of each segment: sorted by segment, then by height, the last one.
@@ -129,20 +129,20 @@ def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
 
 def _edges(beams: Beams, taken: Array, first: Array, last: Array) -> tuple[Array, Array]:
     """Angles from the outermost returns to the beams beside them; 0 where that is no edge."""
-    size = beams.range_m.size
-    gaps = []
-    for index, step in ((taken[first], -1), (taken[last], 1)):
-        beside = index + step
-        inside = (beside >= 0) & (beside < size)
-        beside = beside % size
-        r = beams.range_m[index]
-        gap = ((beams.number[beside] - beams.number[index]) * step) % beams.count
-        if not beams.turns:
-            gap = np.where(inside, gap, 0)
-        sure = (beams.range_m[beside] > r + _EDGE_STEP_M) & (r < beams.longest_m - _LIMIT_M)
-        sure &= gap * beams.spacing_rad < 0.5 * math.pi
-        gaps.append(np.where(sure, gap * beams.spacing_rad, 0.0))
-    return gaps[0], gaps[1]
+    size, n = beams.range_m.size, first.size
+    index = taken[np.concatenate((first, last))]
+    step = np.concatenate((np.full(n, -1), np.full(n, 1)))
+    beside = index + step
+    r = beams.range_m[index]
+    wrapped = beside % size
+    gap = ((beams.number[wrapped] - beams.number[index]) * step) % beams.count
+    angle = gap * beams.spacing_rad
+    sure = (beams.range_m[wrapped] > r + _EDGE_STEP_M) & (r < beams.longest_m - _LIMIT_M)
+    sure &= angle < 0.5 * math.pi
+    if not beams.turns:
+        sure &= beside == wrapped
+    angle[~sure] = 0.0
+    return angle[:n], angle[n:]
 
 
 def taken_from_a_gap(beams: Beams) -> Array:
@@ -152,7 +152,7 @@ def taken_from_a_gap(beams: Beams) -> Array:
     largest step: no surface may begin at the end of the arrays and go on at their start.
     """
     hit = np.isfinite(beams.range_m)
-    taken = np.flatnonzero(hit)
+    taken = hit.nonzero()[0]
     if not beams.turns or taken.size < 2:
         return taken
     if taken.size < hit.size:

@@ -209,19 +209,21 @@ def _corrected(
     Of the difference, N S (l - L x_z) is that error. The lengths are squared Mahalanobis ones.
     """
     columns = covariance[:, :, _Z]
-    block = columns[:, _Z, :]
-    total = sm.product(information, block + noise)
+    total = sm.product(information, columns[:, _Z, :] + noise)
     total += _EYE
-    shared = sm.inverse(total)
-    innovation = vector - sm.applied(information, state[:, _Z])
-    y = sm.applied(shared, innovation)
-    changed = state + sm.applied(columns, y)
+    weighted = np.empty((state.shape[0], 3, 4))  # L and l - L x_z side by side
+    weighted[:, :, :3] = information
+    weighted[:, :, 3] = vector - sm.applied(information, state[:, _Z])
+    weighted = sm.product(sm.inverse(total), weighted)
+    y = weighted[:, :, 3]
+    gain = sm.product(columns, weighted)
+    shift = gain[:, :, 3]
+    changed = state + shift
     np.maximum(changed[:, RADIUS], 0.01, out=changed[:, RADIUS])
-    moved = sm.applied(block, y)
-    moved *= y
+    moved = shift[:, _Z] * y
     surprise: Array = moved[:, 0] + moved[:, 1] + moved[:, 2]
-    gain = sm.product(columns, sm.product(shared, information))
-    reduced = covariance - sm.product(gain, columns.transpose(0, 2, 1))
+    reduced = covariance - sm.product(gain[:, :, :3], columns.transpose(0, 2, 1))
     reduced += reduced.transpose(0, 2, 1).copy()
     reduced *= 0.5
-    return changed, reduced, sm.applied(noise, y)[:, :2], surprise
+    error = noise[:, :2, 0] * y[:, 0, None] + noise[:, :2, 1] * y[:, 1, None]
+    return changed, reduced, error, surprise
