@@ -169,12 +169,13 @@ class Tracker:
             )
             x = bank.state[:, 0] + shift_x + bank.shift_m[:, 0] + velocity[:, 0] * ahead
             y = bank.state[:, 1] + shift_y + bank.shift_m[:, 1] + velocity[:, 1] * ahead
-            speed_sd = bank.speed_sd_mps
+            speed_sd, noise_m = bank.speed_sd_mps, math.sqrt(self._range_variance)
             enlargement = (
                 p.allowance_m
+                + p.noise_factor * noise_m
                 + p.position_sd_factor * bank.position_sd_m
                 + p.speed_sd_factor_s * np.minimum(speed_sd, _MOST_SPEED_SD)
-                + np.maximum(bank.rms_m - math.sqrt(self._range_variance), 0.0)
+                + np.maximum(bank.rms_m - noise_m, 0.0)
             )
             r = bank.state[:, RADIUS] + np.minimum(enlargement, _MAX_ENLARGEMENT_M)
             circles = [
