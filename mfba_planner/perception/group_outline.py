@@ -26,6 +26,7 @@ class Outline:
     width_m: Array  # (g,) between the outermost returns
     whole: Array  # (g,) both edges are sure
     half: Array  # (g,) at least one is
+    alone: Array  # (g,) nothing is near behind both
     time_s: Array  # (g,) after the stamp
 
 
@@ -78,6 +79,7 @@ def outline_of(
         start=start_of(origin, nearest, right, left, whole, radius_m),
         width_m=np.sqrt(dx * dx + dy * dy),
         whole=whole,
+        alone=found.alone[lowest] & found.alone[highest],
         half=sure[:groups] | sure[groups:],
         time_s=0.5 * (time_s[:groups] + time_s[groups:]),
     )

@@ -15,6 +15,7 @@ Array = np.ndarray
 _JOIN_SPACINGS = 3.0  # neighbours of one surface are nearer than so many spacings of the beams
 _JOIN_MOST_M = 0.6
 _EDGE_STEP_M = 0.1  # the beam beside an edge ends at least so much farther
+_ALONE_M = 0.4
 _LIMIT_M = 0.2  # surfaces so near to the longest range may continue beyond it
 _MOST_MISSING = 3  # beam numbers between neighbours of one segment
 _PASSES = 4  # cuts at humps within one segment, each halving it
@@ -38,6 +39,7 @@ class Segments:
     last: Array
     right_gap_rad: Array  # (n,) angle to the beam beside the edge; 0 if the edge is not sure
     left_gap_rad: Array
+    alone: Array  # (n,) the beams on both sides went on for at least 0.4 m
 
     @property
     def count(self) -> int:
@@ -48,7 +50,7 @@ class Segments:
 def no_segments() -> Segments:
     """Of a scan without returns."""
     none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    return Segments(empty, empty, none, empty, none, none, none, empty, empty)
+    return Segments(empty, empty, none, empty, none, none, none, empty, empty, none > 0)
 
 
 def segments(
@@ -90,8 +92,8 @@ def segments(
     segment = np.zeros(r.size, dtype=np.int64)
     segment[first[1:]] = 1
     segment = np.cumsum(segment)
-    right, left = _edges(beams, taken, first, last)
-    return Segments(x, y, taken, r, segment, first, last, right, left)
+    right, left, alone = _edges(beams, taken, first, last)
+    return Segments(x, y, taken, r, segment, first, last, right, left, alone)
 
 
 def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
@@ -127,8 +129,11 @@ def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
         cut[np.where(with_next, top - 1, top)] = True
 
 
-def _edges(beams: Beams, taken: Array, first: Array, last: Array) -> tuple[Array, Array]:
-    """Angles from the outermost returns to the beams beside them; 0 where that is no edge."""
+def _edges(beams: Beams, taken: Array, first: Array, last: Array) -> tuple[Array, Array, Array]:
+    """Angles from the outermost returns to the beams beside them; 0 where that is no edge.
+
+    And whether both of these beams went on far behind.
+    """
     size, n = beams.range_m.size, first.size
     index = taken[np.concatenate((first, last))]
     step = np.concatenate((np.full(n, -1), np.full(n, 1)))
@@ -137,12 +142,14 @@ def _edges(beams: Beams, taken: Array, first: Array, last: Array) -> tuple[Array
     wrapped = beside % size
     gap = ((beams.number[wrapped] - beams.number[index]) * step) % beams.count
     angle = gap * beams.spacing_rad
-    sure = (beams.range_m[wrapped] > r + _EDGE_STEP_M) & (r < beams.longest_m - _LIMIT_M)
+    behind = beams.range_m[wrapped] - r
+    sure = (behind > _EDGE_STEP_M) & (r < beams.longest_m - _LIMIT_M)
     sure &= angle < 0.5 * math.pi
     if not beams.turns:
         sure &= beside == wrapped
     angle[~sure] = 0.0
-    return angle[:n], angle[n:]
+    far = sure & (behind > _ALONE_M)
+    return angle[:n], angle[n:], far[:n] & far[n:]
 
 
 def taken_from_a_gap(beams: Beams) -> Array:

@@ -44,6 +44,7 @@ class TrackBank:
         "scans",
         "rms_m",
         "missed",
+        "streak",
         "shift_m",
     )
 
@@ -60,6 +61,7 @@ class TrackBank:
         self.scans = np.empty(0, dtype=np.int64)
         self.rms_m = np.empty(0)
         self.missed = np.empty(0, dtype=np.int64)  # scans in a row that saw through it
+        self.streak = np.empty(0, dtype=np.int64)  # of a significant velocity, in scans
         self.shift_m = np.empty((0, 2))  # of the centre by the odometry's error, as far as known
 
     @property
@@ -156,6 +158,7 @@ class TrackBank:
         )
         turned = (surprise > _TURNED).nonzero()[0]
         if turned.size:
+            self.streak[index[turned]] = 0
             variance, step = speed_sd * speed_sd, self.predicted_s[index[turned]]
             P = covariance[turned]
             for k in (0, 1):
@@ -192,6 +195,7 @@ class TrackBank:
             "scans": np.ones(j, dtype=np.int64),
             "rms_m": rms_m,
             "missed": np.zeros(j, dtype=np.int64),
+            "streak": np.zeros(j, dtype=np.int64),
             "shift_m": np.zeros((j, 2)),
         }
         for name in self._ARRAYS:
