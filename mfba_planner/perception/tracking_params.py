@@ -54,7 +54,7 @@ class TrackingParams:
         1.3, "radius above which a segment is a wall", unit="m", minimum=0.01, maximum=100.0
     )
     position_sd_factor: float = option(
-        0.5,
+        1.0,
         "standard deviations of the centre by which a circle is enlarged",
         minimum=0.0,
         maximum=10.0,
