@@ -13,13 +13,18 @@ from __future__ import annotations
 
 import argparse
 import math
+import statistics
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.planner_types import Circle, Observation
 from mfba_planner.perception.obstacle_tracker import Tracker
 from mfba_planner.perception.scan_to_sectors import aligned
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.predictive_planner import Predictive, preset
 from mfba_planner.simulation.robot_model import Lidar
 from mfba_planner.simulation.simulated_lidar import cast_rays, scan_at
 
@@ -141,7 +146,7 @@ def compare(
     now: np.ndarray,
     pose: Pose2D,
     given: Pose2D,
-    circles: tuple,
+    circles: tuple[Circle, ...],
     returns: np.ndarray,
     scans: np.ndarray,
     known: np.ndarray,
@@ -211,13 +216,61 @@ def table(seeds: int, only: str) -> None:
         )
 
 
+def timing(rounds: int) -> None:
+    """Print the time of a scan, of a decision on it, and of the floor, measured in turn."""
+    rng, row = np.random.default_rng(0), Row(scan_m=0.01, speed=(0.1, 0.5), radius=(0.3, 0.3))
+    truth, lidar = discs(row, rng), Lidar(beams=360, range_max_m=REACH_M)
+    away = np.hypot(truth[:, 0], truth[:, 1])
+    truth[:, 2:4] = np.column_stack((-truth[:, 1], truth[:, 0])) * (0.3 / away)[:, None]
+    scans = []
+    for k in range(40):
+        turn = 0.3 * k * TICK_S / away  # on circles around the robot
+        c, s = np.cos(turn), np.sin(turn)
+        x, y = c * truth[:, 0] - s * truth[:, 1], s * truth[:, 0] + c * truth[:, 1]
+        places = list(zip(x.tolist(), y.tolist(), truth[:, 4].tolist()))
+        scan = scan_at(Pose2D(0.0, 0.0), lidar, places, None)
+        noise = rng.normal(size=360) * row.scan_m
+        scans.append(replace(scan, ranges_m=scan.ranges_m + noise))
+    times: dict[str, list[float]] = {"floor": [], "tracking": [], "decision": []}
+    x, y = rng.random(360), rng.random(360)
+    pose, goal = Pose2D(0.0, 0.0), (8.0, 6.0)
+    for _ in range(rounds):
+        tracker = Tracker()
+        planner = Predictive(preset(), SensorParams(), 0)
+        for k, scan in enumerate(scans, start=1):
+            stamp = k * TICK_NS
+            start = time.perf_counter()
+            np.hypot(x, y)
+            hypot = time.perf_counter()
+            tracker.update(stamp, pose, scan)
+            tracker.circles(stamp, 0.3)
+            tracked = time.perf_counter()
+            planner.plan(
+                Observation(
+                    stamp_ns=stamp, pose=pose, ranges_m=(), goal=goal, now_ns=stamp, scan=scan
+                )
+            )
+            decided = time.perf_counter()
+            for name, span in zip(times, (hypot - start, tracked - hypot, decided - tracked)):
+                times[name].append(span)
+    floor = statistics.median(times["floor"])
+    print("\n| 360 beams, ten discs | median, us | 99 %, us | median / floor |\n|---|---|---|---|")
+    names = ("floor: np.hypot of 360", "tracking: update and circles", "decision with tracking")
+    for name, spans in zip(names, times.values()):
+        median, late = statistics.median(spans), percentile(spans, 0.99)
+        print(f"| {name} | {1e6 * median:.1f} | {1e6 * late:.1f} | {median / floor:.0f} |")
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seeds", type=int, default=40)
     parser.add_argument("--only", default="", help="rows whose name holds this")
+    parser.add_argument("--rounds", type=int, default=20, help="of the timing; 0: none")
     found = parser.parse_args()
     table(found.seeds, found.only)
+    if found.rounds:
+        timing(found.rounds)
 
 
 if __name__ == "__main__":

@@ -140,18 +140,16 @@ def start_of(
     """First guess (g, 3) from directions (g, 2) to both edges and the range of the nearest return.
 
     Where both edges are sure, the tangents give the radius: r = (d + r) sin(alpha) with half the
-    angle between them; otherwise it is radius_m (g,).
+    angle between them; otherwise it is radius_m (g,). A group of more than half a turn is no
+    circle, whatever the start.
     """
     middle = right + left
-    length = np.sqrt(middle[:, 0] ** 2 + middle[:, 1] ** 2)
-    middle = middle / np.maximum(length, _TINY)[:, None]
-    across = right[:, 0] * left[:, 1] - right[:, 1] * left[:, 0]
+    length = np.sqrt(middle[:, 0] * middle[:, 0] + middle[:, 1] * middle[:, 1]) + _TINY
     along = right[:, 0] * left[:, 0] + right[:, 1] * left[:, 1]
-    # sin of half the angle, from its cosine
-    half = np.sqrt(np.maximum(0.5 * (1.0 - along), 0.0))
-    wide = (across <= 0.0) & (along < 0.5)  # more than half a turn: the robot is within its hull
-    half = np.where(wide, 1.0, np.minimum(half, 0.95))
-    shown = nearest_m * half / (1.0 - np.minimum(half, 0.95))
-    r = np.where(sure & ~wide, np.clip(shown, LEAST_RADIUS_M, 3.0), radius_m)
-    reach = nearest_m + r
-    return np.column_stack((origin + middle * reach[:, None], r))
+    half = np.sqrt(np.maximum(0.5 - 0.5 * along, 0.0))  # sine of half the angle
+    np.minimum(half, 0.95, out=half)
+    tangent = np.clip(nearest_m * half / (1.0 - half), LEAST_RADIUS_M, 3.0)
+    start = np.empty((nearest_m.size, 3))
+    r = start[:, 2] = np.where(sure, tangent, radius_m)
+    start[:, :2] = origin + middle * ((nearest_m + r) / length)[:, None]
+    return start

@@ -26,6 +26,7 @@ class Outline:
     width_m: Array  # (g,) between the outermost returns
     whole: Array  # (g,) both edges are sure
     half: Array  # (g,) at least one is
+    alone: Array  # (g,) nothing is near behind both
     time_s: Array  # (g,) after the stamp
 
 
@@ -33,65 +34,55 @@ def outline_of(
     beams: Beams, found: Segments, group: Array, groups: int, radius_m: Array
 ) -> Outline:
     """Returns and edges by group; the edges are those of a group's outermost segments."""
+    # Of a group's segments the one assigned last remains.
     order = np.arange(found.count)
-    lowest, highest = np.full(groups, found.count), np.full(groups, -1)
-    np.minimum.at(lowest, group, order)
-    np.maximum.at(highest, group, order)
-    first, last = found.first[lowest], found.last[highest]
-    right_gap, left_gap = found.right_gap_rad[lowest], found.left_gap_rad[highest]
+    lowest, highest = np.empty(groups, dtype=np.int64), np.empty(groups, dtype=np.int64)
+    lowest[group[::-1]] = order[::-1]
+    highest[group] = order
+    ends = np.concatenate((found.first[lowest], found.last[highest]))
+    gap = np.concatenate((found.right_gap_rad[lowest], found.left_gap_rad[highest]))
+    side = np.concatenate((np.full(groups, -1.0), np.full(groups, 1.0)))  # right, left
+    beam = found.beam[ends]
+    x, y = beams.origin_x[beam], beams.origin_y[beam]
+    # The tangent lies in the middle of the gap; turned exactly, by half the tangent of the half.
+    t = 0.25 * side * gap
+    scale = 1.0 / (1.0 + t * t)
+    turn_cos, turn_sin = (1.0 - t * t) * scale, 2.0 * t * scale
+    cos, sin = beams.cos[beam], beams.sin[beam]
+    cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
+    sure = gap > 0.0
+    edges = sure.nonzero()[0]
     of_return = group[found.segment]
-    count = np.bincount(of_return, minlength=groups).astype(np.float64)
-    b_first, b_last = found.beam[first], found.beam[last]
-    right = _turned(beams.cos[b_first], beams.sin[b_first], -0.5 * right_gap)
-    left = _turned(beams.cos[b_last], beams.sin[b_last], 0.5 * left_gap)
-    sure_right, sure_left = right_gap > 0.0, left_gap > 0.0
-    edge_group = np.concatenate((np.flatnonzero(sure_right), np.flatnonzero(sure_left)))
+    outward = side[edges]
     returns = Returns(
         x=found.x,
         y=found.y,
         group=of_return,
-        edge_x=np.concatenate(
-            (beams.origin_x[b_first][sure_right], beams.origin_x[b_last][sure_left])
-        ),
-        edge_y=np.concatenate(
-            (beams.origin_y[b_first][sure_right], beams.origin_y[b_last][sure_left])
-        ),
-        normal_x=np.concatenate((right[sure_right, 1], -left[sure_left, 1])),
-        normal_y=np.concatenate((-right[sure_right, 0], left[sure_left, 0])),
-        edge_gap_m=np.concatenate(
-            (
-                (right_gap * found.range_m[first])[sure_right],
-                (left_gap * found.range_m[last])[sure_left],
-            )
-        ),
-        edge_group=edge_group,
-        count=count,
+        edge_x=x[edges],
+        edge_y=y[edges],
+        normal_x=-outward * sin[edges],
+        normal_y=outward * cos[edges],
+        edge_gap_m=(gap * found.range_m[ends])[edges],
+        edge_group=edges % groups,
+        count=np.bincount(of_return, minlength=groups).astype(np.float64),
     )
     nearest = np.full(groups, np.inf)
-    np.minimum.at(nearest, of_return, found.range_m)
-    origin = 0.5 * np.column_stack(
-        (
-            beams.origin_x[b_first] + beams.origin_x[b_last],
-            beams.origin_y[b_first] + beams.origin_y[b_last],
-        )
-    )
-    whole = sure_right & sure_left
-    dx, dy = found.x[last] - found.x[first], found.y[last] - found.y[first]
+    np.minimum.at(nearest, group, np.minimum.reduceat(found.range_m, found.first))
+    directions = np.array((cos, sin)).T
+    origin = 0.5 * np.array((x[:groups] + x[groups:], y[:groups] + y[groups:])).T
+    whole = sure[:groups] & sure[groups:]
+    end_x, end_y, time_s = found.x[ends], found.y[ends], beams.time_s[beam]
+    dx, dy = end_x[groups:] - end_x[:groups], end_y[groups:] - end_y[:groups]
+    right, left = directions[:groups], directions[groups:]
     return Outline(
         returns=returns,
         start=start_of(origin, nearest, right, left, whole, radius_m),
         width_m=np.sqrt(dx * dx + dy * dy),
         whole=whole,
-        half=sure_right | sure_left,
-        time_s=0.5 * (beams.time_s[b_first] + beams.time_s[b_last]),
+        alone=found.alone[lowest] & found.alone[highest],
+        half=sure[:groups] | sure[groups:],
+        time_s=0.5 * (time_s[:groups] + time_s[groups:]),
     )
-
-
-def _turned(cos: Array, sin: Array, angle: Array) -> Array:
-    """Directions (g, 2) turned by small angles, to third order and exactly of unit length."""
-    t = 0.5 * angle
-    c, s = (1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t)
-    return np.column_stack((cos * c - sin * s, sin * c + cos * s))
 
 
 def thinned(found: Segments, wall: Array) -> list[Point]:

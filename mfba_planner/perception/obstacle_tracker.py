@@ -169,12 +169,13 @@ class Tracker:
             )
             x = bank.state[:, 0] + shift_x + bank.shift_m[:, 0] + velocity[:, 0] * ahead
             y = bank.state[:, 1] + shift_y + bank.shift_m[:, 1] + velocity[:, 1] * ahead
-            speed_sd = bank.speed_sd_mps
+            speed_sd, noise_m = bank.speed_sd_mps, math.sqrt(self._range_variance)
             enlargement = (
                 p.allowance_m
+                + p.noise_factor * noise_m
                 + p.position_sd_factor * bank.position_sd_m
                 + p.speed_sd_factor_s * np.minimum(speed_sd, _MOST_SPEED_SD)
-                + np.maximum(bank.rms_m - math.sqrt(self._range_variance), 0.0)
+                + np.maximum(bank.rms_m - noise_m, 0.0)
             )
             r = bank.state[:, RADIUS] + np.minimum(enlargement, _MAX_ENLARGEMENT_M)
             circles = [
@@ -228,11 +229,13 @@ class Tracker:
     def _use(self, beams: Beams, found: Segments, track: Array, origin: Array) -> None:
         """Fit the groups, and update, start and drop tracks by them."""
         bank, p = self._bank, self.params
-        known = np.unique(track[track != NONE])
-        new = np.flatnonzero(track == NONE)
-        group_of_track = np.full(bank.count, NONE)
-        group_of_track[known] = np.arange(known.size)
-        group = np.where(track == NONE, 0, group_of_track[track]) if bank.count else track.copy()
+        matched = track != NONE
+        is_matched = np.zeros(bank.count, dtype=bool)
+        is_matched[track[matched]] = True
+        known, new = is_matched.nonzero()[0], (~matched).nonzero()[0]
+        group_of_track = np.cumsum(is_matched) - 1
+        group = np.empty(track.size, dtype=np.int64)
+        group[matched] = group_of_track[track[matched]]
         group[new] = known.size + np.arange(new.size)
         groups = known.size + new.size
         self._walls = []

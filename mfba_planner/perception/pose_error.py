@@ -12,9 +12,8 @@ import math
 
 import numpy as np
 
-from . import small_matrices as sm
-
 Array = np.ndarray
+Covariance = tuple[float, float, float, float, float, float]  # xx, xy, xr, yy, yr, rr
 
 _LEARNING = 0.1  # weight of one scan in the variances
 _LEAST_SD, _MOST_SD = 1e-3, 0.06  # m and rad
@@ -59,10 +58,10 @@ class PoseError:
         return ex - turn * (y - origin[1]), ey + turn * (x - origin[0])
 
     @staticmethod
-    def noise(measured: Array, left: Array, origin: Array) -> Array:
+    def noise(measured: Array, left: Covariance, origin: Array) -> Array:
         """Covariances (j, 3, 3) of (x, y, r) at centres (j, 2) by what is left of the error."""
         px, py = origin[1] - measured[:, 1], measured[:, 0] - origin[0]
-        (xx, xy, xr), (_, yy, yr), (_, _, rr) = left.tolist()
+        xx, xy, xr, yy, yr, rr = left
         noise = np.zeros((measured.shape[0], 3, 3))
         noise[:, 0, 0] = xx + px * (2.0 * xr + rr * px)
         noise[:, 1, 1] = yy + py * (2.0 * yr + rr * py)
@@ -71,15 +70,16 @@ class PoseError:
 
     def estimate(
         self, measured: Array, predicted: Array, covariance: Array, settled: Array, origin: Array
-    ) -> Array:
+    ) -> Covariance:
         """Estimate the error from centres (j, 2) and their covariances (j, 2, 2).
 
         Outliers are left out. If fewer than three or fewer than half of the tracks agree, the
         error stays 0: one or two that move look like an odometry that errs. The variances are
-        learnt from settled tracks (j,) only. Returns the covariance (3, 3) that is left.
+        learnt from settled tracks (j,) only. Returns the covariance that is left.
         """
         self.error = (0.0, 0.0, 0.0)
-        left = np.diag([self.variance_m2, self.variance_m2, self.variance_rad2])
+        vm, vr = self.variance_m2, self.variance_rad2
+        left = (vm, 0.0, 0.0, vm, 0.0, vr)
         if not measured.shape[0]:
             return left
         equations = _Equations(measured, predicted, covariance, origin)
@@ -92,7 +92,7 @@ class PoseError:
         self._learn(equations, agree, left)
         return left
 
-    def _solve(self, equations: _Equations) -> tuple[Array, Array] | None:
+    def _solve(self, equations: _Equations) -> tuple[Covariance, Array] | None:
         """Set the error; what is left of its covariance, and which tracks agree (j,)."""
         vm, vr = self.variance_m2, self.variance_rad2
         fits = equations.length(vm, vr) < _OUTLIER
@@ -113,7 +113,7 @@ class PoseError:
         self.error = error
         return left, agree
 
-    def _learn(self, equations: _Equations, tracks: Array, left: Array) -> None:
+    def _learn(self, equations: _Equations, tracks: Array, left: Covariance) -> None:
         """Learn the variances: their size from the lengths, their ratio from the error.
 
         Squared Mahalanobis lengths have the median 1.39 where the variances are right. The mean
@@ -129,9 +129,9 @@ class PoseError:
         vm, vr = factor * vm, factor * vr
         if self.error != (0.0, 0.0, 0.0):
             ex, ey, turn = (e - m for e, m in zip(self.error, self._mean))
-            second = 0.5 * (ex * ex + ey * ey + float(left[0, 0] + left[1, 1]))
+            second = 0.5 * (ex * ex + ey * ey + left[0] + left[3])
             vm += _LEARNING * (second - vm)
-            vr += _LEARNING * (turn * turn + float(left[2, 2]) - vr)
+            vr += _LEARNING * (turn * turn + left[5] - vr)
         self.variance_m2, self.variance_rad2 = _limited(vm), _limited(vr)
         mx, my, mt = (m + _MEAN_SHARE * (e - m) for e, m in zip(self.error, self._mean))
         self._mean = (mx, my, mt)
@@ -180,14 +180,15 @@ class _Equations:
 
     def solution(
         self, vm: float, vr: float, weight: Array
-    ) -> tuple[Array, tuple[float, float, float]]:
-        """Covariance (3, 3) and error by weighted least squares with the prior variances."""
+    ) -> tuple[Covariance, tuple[float, float, float]]:
+        """Covariance and error by weighted least squares with the prior variances."""
         # accumulate adds in order on every machine
         total = np.add.accumulate(self.rows * weight, axis=1)[:, -1].tolist()
         xx, xy, xr, yy, yr, rr, bx, by, br = total
-        information = np.array(
-            [[xx + 1.0 / vm, xy, xr], [xy, yy + 1.0 / vm, yr], [xr, yr, rr + 1.0 / vr]]
-        )
-        left: Array = sm.inverse(information[None])[0]
-        (a, b, c), (_, d, e), (_, _, f) = left.tolist()
-        return left, (a * bx + b * by + c * br, b * bx + d * by + e * br, c * bx + e * by + f * br)
+        xx, yy, rr = xx + 1.0 / vm, yy + 1.0 / vm, rr + 1.0 / vr
+        a, b, c = yy * rr - yr * yr, xr * yr - xy * rr, xy * yr - xr * yy
+        d, e, f = xx * rr - xr * xr, xy * xr - xx * yr, xx * yy - xy * xy
+        scale = 1.0 / (xx * a + xy * b + xr * c)
+        a, b, c, d, e, f = (scale * value for value in (a, b, c, d, e, f))
+        error = (a * bx + b * by + c * br, b * bx + d * by + e * br, c * bx + e * by + f * br)
+        return (a, b, c, d, e, f), error

@@ -15,6 +15,7 @@ Array = np.ndarray
 _JOIN_SPACINGS = 3.0  # neighbours of one surface are nearer than so many spacings of the beams
 _JOIN_MOST_M = 0.6
 _EDGE_STEP_M = 0.1  # the beam beside an edge ends at least so much farther
+_ALONE_M = 0.4
 _LIMIT_M = 0.2  # surfaces so near to the longest range may continue beyond it
 _MOST_MISSING = 3  # beam numbers between neighbours of one segment
 _PASSES = 4  # cuts at humps within one segment, each halving it
@@ -38,6 +39,7 @@ class Segments:
     last: Array
     right_gap_rad: Array  # (n,) angle to the beam beside the edge; 0 if the edge is not sure
     left_gap_rad: Array
+    alone: Array  # (n,) the beams on both sides went on for at least 0.4 m
 
     @property
     def count(self) -> int:
@@ -48,7 +50,7 @@ class Segments:
 def no_segments() -> Segments:
     """Of a scan without returns."""
     none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    return Segments(empty, empty, none, empty, none, none, none, empty, empty)
+    return Segments(empty, empty, none, empty, none, none, none, empty, empty, none > 0)
 
 
 def segments(
@@ -85,13 +87,13 @@ def segments(
         surely = known[np.maximum(one, other)]  # of the obstacle, if the other is none
         cut |= (one != other) & ((np.minimum(one, other) >= 0) | surely)
     _cut_at_humps(r, cut, hump_m)
-    last = np.concatenate((np.flatnonzero(cut), [r.size - 1]))
+    last = np.concatenate((cut.nonzero()[0], [r.size - 1]))
     first = np.concatenate(([0], last[:-1] + 1))
     segment = np.zeros(r.size, dtype=np.int64)
     segment[first[1:]] = 1
     segment = np.cumsum(segment)
-    right, left = _edges(beams, taken, first, last)
-    return Segments(x, y, taken, r, segment, first, last, right, left)
+    right, left, alone = _edges(beams, taken, first, last)
+    return Segments(x, y, taken, r, segment, first, last, right, left, alone)
 
 
 def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
@@ -111,7 +113,7 @@ def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
         before = np.minimum.accumulate(smooth - offset) + offset
         after = (np.minimum.accumulate((smooth + offset)[::-1]))[::-1] - offset
         height = smooth - np.maximum(before, after)
-        high = np.flatnonzero(height > hump_m)
+        high = (height > hump_m).nonzero()[0]
         if not high.size:
             return
         # The highest of each segment: sorted by segment, then by height, the last one.
@@ -127,22 +129,27 @@ def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
         cut[np.where(with_next, top - 1, top)] = True
 
 
-def _edges(beams: Beams, taken: Array, first: Array, last: Array) -> tuple[Array, Array]:
-    """Angles from the outermost returns to the beams beside them; 0 where that is no edge."""
-    size = beams.range_m.size
-    gaps = []
-    for index, step in ((taken[first], -1), (taken[last], 1)):
-        beside = index + step
-        inside = (beside >= 0) & (beside < size)
-        beside = beside % size
-        r = beams.range_m[index]
-        gap = ((beams.number[beside] - beams.number[index]) * step) % beams.count
-        if not beams.turns:
-            gap = np.where(inside, gap, 0)
-        sure = (beams.range_m[beside] > r + _EDGE_STEP_M) & (r < beams.longest_m - _LIMIT_M)
-        sure &= gap * beams.spacing_rad < 0.5 * math.pi
-        gaps.append(np.where(sure, gap * beams.spacing_rad, 0.0))
-    return gaps[0], gaps[1]
+def _edges(beams: Beams, taken: Array, first: Array, last: Array) -> tuple[Array, Array, Array]:
+    """Angles from the outermost returns to the beams beside them; 0 where that is no edge.
+
+    And whether both of these beams went on far behind.
+    """
+    size, n = beams.range_m.size, first.size
+    index = taken[np.concatenate((first, last))]
+    step = np.concatenate((np.full(n, -1), np.full(n, 1)))
+    beside = index + step
+    r = beams.range_m[index]
+    wrapped = beside % size
+    gap = ((beams.number[wrapped] - beams.number[index]) * step) % beams.count
+    angle = gap * beams.spacing_rad
+    behind = beams.range_m[wrapped] - r
+    sure = (behind > _EDGE_STEP_M) & (r < beams.longest_m - _LIMIT_M)
+    sure &= angle < 0.5 * math.pi
+    if not beams.turns:
+        sure &= beside == wrapped
+    angle[~sure] = 0.0
+    far = sure & (behind > _ALONE_M)
+    return angle[:n], angle[n:], far[:n] & far[n:]
 
 
 def taken_from_a_gap(beams: Beams) -> Array:
@@ -152,7 +159,7 @@ def taken_from_a_gap(beams: Beams) -> Array:
     largest step: no surface may begin at the end of the arrays and go on at their start.
     """
     hit = np.isfinite(beams.range_m)
-    taken = np.flatnonzero(hit)
+    taken = hit.nonzero()[0]
     if not beams.turns or taken.size < 2:
         return taken
     if taken.size < hit.size:

@@ -44,6 +44,7 @@ class TrackBank:
         "scans",
         "rms_m",
         "missed",
+        "streak",
         "shift_m",
     )
 
@@ -60,6 +61,7 @@ class TrackBank:
         self.scans = np.empty(0, dtype=np.int64)
         self.rms_m = np.empty(0)
         self.missed = np.empty(0, dtype=np.int64)  # scans in a row that saw through it
+        self.streak = np.empty(0, dtype=np.int64)  # of a significant velocity, in scans
         self.shift_m = np.empty((0, 2))  # of the centre by the odometry's error, as far as known
 
     @property
@@ -156,6 +158,7 @@ class TrackBank:
         )
         turned = (surprise > _TURNED).nonzero()[0]
         if turned.size:
+            self.streak[index[turned]] = 0
             variance, step = speed_sd * speed_sd, self.predicted_s[index[turned]]
             P = covariance[turned]
             for k in (0, 1):
@@ -192,6 +195,7 @@ class TrackBank:
             "scans": np.ones(j, dtype=np.int64),
             "rms_m": rms_m,
             "missed": np.zeros(j, dtype=np.int64),
+            "streak": np.zeros(j, dtype=np.int64),
             "shift_m": np.zeros((j, 2)),
         }
         for name in self._ARRAYS:
@@ -209,19 +213,21 @@ def _corrected(
     Of the difference, N S (l - L x_z) is that error. The lengths are squared Mahalanobis ones.
     """
     columns = covariance[:, :, _Z]
-    block = columns[:, _Z, :]
-    total = sm.product(information, block + noise)
+    total = sm.product(information, columns[:, _Z, :] + noise)
     total += _EYE
-    shared = sm.inverse(total)
-    innovation = vector - sm.applied(information, state[:, _Z])
-    y = sm.applied(shared, innovation)
-    changed = state + sm.applied(columns, y)
+    weighted = np.empty((state.shape[0], 3, 4))  # L and l - L x_z side by side
+    weighted[:, :, :3] = information
+    weighted[:, :, 3] = vector - sm.applied(information, state[:, _Z])
+    weighted = sm.product(sm.inverse(total), weighted)
+    y = weighted[:, :, 3]
+    gain = sm.product(columns, weighted)
+    shift = gain[:, :, 3]
+    changed = state + shift
     np.maximum(changed[:, RADIUS], 0.01, out=changed[:, RADIUS])
-    moved = sm.applied(block, y)
-    moved *= y
+    moved = shift[:, _Z] * y
     surprise: Array = moved[:, 0] + moved[:, 1] + moved[:, 2]
-    gain = sm.product(columns, sm.product(shared, information))
-    reduced = covariance - sm.product(gain, columns.transpose(0, 2, 1))
+    reduced = covariance - sm.product(gain[:, :, :3], columns.transpose(0, 2, 1))
     reduced += reduced.transpose(0, 2, 1).copy()
     reduced *= 0.5
-    return changed, reduced, sm.applied(noise, y)[:, :2], surprise
+    error = noise[:, :2, 0] * y[:, 0, None] + noise[:, :2, 1] * y[:, 1, None]
+    return changed, reduced, error, surprise

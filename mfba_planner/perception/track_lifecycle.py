@@ -19,7 +19,10 @@ Array = np.ndarray
 Appeared = Callable[[Array, Array], Array]
 
 _MOVES, _RESTS = 12.0, 4.0  # squared significances of a velocity: begins to move, is at rest
-_SURELY_MOVES, _SURE_SCANS = 100.0, 4  # where one edge only is seen
+_SURELY_MOVES = 100.0  # where one edge only is known
+_STREAK = 4  # scans in a row with a significant velocity, without returns in free space
+_STREAK_ALONE = 2  # where nothing is near
+_MOST_SPEED = 4.0  # m/s; what seems faster is another surface
 _UNKNOWN_SPEED_SD = 0.15  # m/s
 _LEAST_SPEED = 0.03  # m/s; slower counts as at rest
 _APPEARED_S = 1.0  # for so long after returns in free space a velocity is believed
@@ -53,17 +56,19 @@ def judge_motion(
     significance = speed2 / variance
     moving = bank.moving[index]
     fast = speed2 > _LEAST_SPEED**2
-    begins = ~moving & (significance > _MOVES) & fast
+    begins = ~moving & (significance > _MOVES) & fast & (speed2 < _MOST_SPEED**2)
     round_ = fitted.rms_m[group] < 0.02 + 2.0 * noise_m
-    surely = (significance > _SURELY_MOVES) & (bank.scans[index] >= _SURE_SCANS)
-    clean = round_ & (outline.whole[group] | (outline.half[group] & surely))
-    unclear = (begins & ~clean).nonzero()[0]
-    if unclear.size:
-        _look_for_free_space(bank, index[unclear], group[unclear], outline, appeared)
-    believed = clean | (bank.appeared_s[index] < _APPEARED_S)
+    surely = (significance > _SURELY_MOVES) & outline.half[group]
+    clean = round_ & (outline.whole[group] | surely)
+    candidate = begins.nonzero()[0]
+    if candidate.size:
+        _look_for_free_space(bank, index[candidate], group[candidate], outline, appeared)
+    streak = bank.streak[index] = np.where(begins, bank.streak[index] + 1, 0)
+    lasts = clean & (streak >= np.where(outline.alone[group], _STREAK_ALONE, _STREAK))
+    believed = lasts | (bank.appeared_s[index] < _APPEARED_S)
     # What has just turned moves on, though its velocity is not known well.
     still = (significance > _RESTS) | (variance > _UNKNOWN_SPEED_SD**2)
-    moving = np.where(moving, still & fast, begins & believed)
+    moving = np.where(moving, still & fast & (speed2 < _MOST_SPEED**2), begins & believed)
     bank.moving[index] = moving
 
 

@@ -54,7 +54,7 @@ class TrackingParams:
         1.3, "radius above which a segment is a wall", unit="m", minimum=0.01, maximum=100.0
     )
     position_sd_factor: float = option(
-        0.5,
+        1.0,
         "standard deviations of the centre by which a circle is enlarged",
         minimum=0.0,
         maximum=10.0,
@@ -64,7 +64,13 @@ class TrackingParams:
         maximum=10.0,
     )  # fmt: skip
     allowance_m: float = option(
-        0.01, "enlargement of every tracked circle", unit="m", minimum=0.0, maximum=1.0
+        0.005, "enlargement of every tracked circle", unit="m", minimum=0.0, maximum=1.0
+    )
+    noise_factor: float = option(
+        1.0,
+        "standard deviations of a range by which a circle is enlarged",
+        minimum=0.0,
+        maximum=10.0,
     )
     forget_s: float = option(
         2.0, "time without a return after which a moving track is dropped", unit="s", minimum=0.0,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Point, Pose2D
 from mfba_planner.core.planner_types import Circle, Scan
-from mfba_planner.perception.obstacle_tracker import Tracker, TrackingParams
+from mfba_planner.perception.obstacle_tracker import Track, Tracker, TrackingParams
 from mfba_planner.simulation.simulated_lidar import cast_rays
 
 TICK_NS = 100_000_000
@@ -127,7 +127,7 @@ def test_a_wall_gives_points_at_rest() -> None:
     assert len(circles) > 10
     for circle in circles:
         assert circle.center_m[0] == pytest.approx(1.5)
-        assert (circle.radius_m, circle.velocity_mps) == (0.31, (0.0, 0.0))
+        assert (circle.radius_m, circle.velocity_mps) == (0.305, (0.0, 0.0))
 
 
 def test_a_track_without_returns_is_dropped() -> None:
@@ -175,3 +175,176 @@ def test_nan_and_too_long_ranges_are_no_returns() -> None:
 def test_options_are_checked() -> None:
     with pytest.raises(ConfigError, match=r"range_sd_m=0\.0: out of range"):
         TrackingParams(range_sd_m=0.0)
+
+
+Moving = tuple[float, float, float, float, float]  # x, y, vx, vy, r
+
+
+def run_tracker(
+    obstacles: list[Moving],
+    ticks: int,
+    *,
+    beams: int = 360,
+    frame: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    scan_m: float = 0.0,
+    odom: tuple[float, float] = (0.0, 0.0),
+    seed: int = 0,
+    before: int = 0,
+) -> Tracker:
+    """Track discs from the origin of a frame (x, y, yaw) in odom; 10 m, a scan every 0.1 s.
+
+    The first disc is not there during the first `before` scans.
+    """
+    tracker, rng, increment = Tracker(), np.random.default_rng(seed), 2.0 * math.pi / beams
+    for k in range(ticks):
+        t = 0.1 * (k - before)
+        there = obstacles[1:] if k < before else obstacles
+        discs = [(x + vx * t, y + vy * t, r) for x, y, vx, vy, r in there]
+        dx, dy = rng.normal(0.0, odom[0], 2) if odom[0] else (0.0, 0.0)
+        turn = rng.normal(0.0, odom[1]) if odom[1] else 0.0
+        noise = rng.normal(0.0, scan_m, beams) if scan_m else 0.0
+        scan = Scan(
+            ranges_m=cast_rays((0.0, 0.0), discs, beams, 10.0) + noise,
+            angle_min_rad=0.5 * increment + frame[2] + turn,
+            angle_increment_rad=increment,
+            range_min_m=0.0,
+            range_max_m=10.5,
+        )
+        tracker.update((k + 1) * TICK_NS, Pose2D(frame[0] + dx, frame[1] + dy, frame[2]), scan)
+    return tracker
+
+
+def track_at(tracker: Tracker, place: Point) -> Track:
+    """The track nearest to a place."""
+    return min(tracker.tracks, key=lambda track: math.dist(track.center_m, place))
+
+
+@given(radius=st.floats(0.05, 1.0), bearing=st.floats(-math.pi, math.pi))
+@settings(max_examples=40, deadline=None)
+def test_radii_from_a_pole_to_a_column_are_found(radius: float, bearing: float) -> None:
+    d = 1.5 + radius
+    place = (d * math.cos(bearing), d * math.sin(bearing))
+    track = track_at(run_tracker([(*place, 0.0, 0.0, radius)], 4), place)
+    assert track.radius_m == pytest.approx(radius, abs=0.03)
+    assert math.dist(track.center_m, place) < 0.04
+
+
+@given(
+    discs=st.lists(st.tuples(st.floats(1.2, 4.0), st.floats(0.05, 0.5)), min_size=1, max_size=4),
+    seed=st.integers(0, 1000),
+)
+@settings(max_examples=25, deadline=None)
+def test_what_stands_has_the_velocity_zero(discs: list[tuple[float, float]], seed: int) -> None:
+    obstacles: list[Moving] = []
+    for k, (away, r) in enumerate(discs):
+        angle, d = 0.5 * math.pi * k + 0.3, away + r
+        obstacles.append((d * math.cos(angle), d * math.sin(angle), 0.0, 0.0, r))
+    tracker = run_tracker(obstacles, 12, scan_m=0.01, seed=seed)
+    assert {circle.velocity_mps for circle in tracker.circles(12 * TICK_NS, 0.3)} == {(0.0, 0.0)}
+
+
+def test_what_stands_has_the_velocity_zero_beside_an_odometry_that_errs() -> None:
+    places = [(2.0, 0.5), (-1.0, 2.5), (-2.0, -1.0), (0.5, -3.0), (3.0, 3.0)]
+    obstacles = [(x, y, 0.0, 0.0, 0.25) for x, y in places]
+    for seed in range(5):
+        tracker = run_tracker(obstacles, 25, scan_m=0.02, odom=(0.02, 0.02), seed=seed)
+        assert not any(track.moving for track in tracker.tracks)
+
+
+@pytest.mark.parametrize(("speed", "scans"), [(0.3, 5), (1.0, 3), (2.5, 3)])
+def test_a_new_obstacle_has_its_velocity_after_three_scans(speed: float, scans: int) -> None:
+    columns = [(-2.0, 0.0, 0.0, 0.0, 0.3), (0.0, -2.0, 0.0, 0.0, 0.2), (-1.0, 3.0, 0.0, 0.0, 0.1)]
+    for bearing in np.linspace(-3.0, 3.0, 7).tolist():
+        vx, vy = speed * math.cos(bearing), speed * math.sin(bearing)
+        tracker = run_tracker([(3.0, 1.0, vx, vy, 0.25), *columns], 12 + scans, before=12)
+        t = 0.1 * (scans - 1)
+        track = track_at(tracker, (3.0 + vx * t, 1.0 + vy * t))
+        assert track.moving
+        off = math.dist(track.velocity_mps, (vx, vy))
+        assert off < max(0.15, 0.15 * speed)
+        assert off < 4.0 * track.velocity_sd_mps
+
+
+def test_two_people_abreast_stay_two() -> None:
+    for gap in (0.0, 0.1, 0.3):
+        half = 0.25 + 0.5 * gap
+        people = [(3.5, half, -1.2, 0.0, 0.25), (3.5, -half, -1.2, 0.0, 0.25)]
+        for ticks in (4, 8, 15):
+            tracker = run_tracker(people, ticks)
+            x = 3.5 - 0.12 * (ticks - 1)
+            one, other = track_at(tracker, (x, half)), track_at(tracker, (x, -half))
+            assert one.center_m != other.center_m
+            for track in (one, other):
+                assert track.radius_m < 0.33
+                assert math.dist(track.velocity_mps, (-1.2, 0.0)) < 0.25
+
+
+def test_a_turned_and_moved_frame_gives_turned_and_moved_tracks() -> None:
+    obstacles = [
+        (2.0, 0.5, 0.4, -0.3, 0.3),
+        (-1.0, 2.0, 0.0, 0.0, 0.1),
+        (-3.0, -1.0, 0.0, 1.0, 0.5),
+    ]
+    plain = run_tracker(obstacles, 8).tracks
+    x, y, yaw = 3.0, -2.0, 0.7
+    turned = run_tracker(obstacles, 8, frame=(x, y, yaw)).tracks
+    assert len(plain) == len(turned)
+    c, s = math.cos(yaw), math.sin(yaw)
+    for before, after in zip(plain, turned):
+        (px, py), (vx, vy) = before.center_m, before.velocity_mps
+        assert after.center_m == pytest.approx(
+            (x + c * px - s * py, y + s * px + c * py), abs=1e-6
+        )
+        assert after.velocity_mps == pytest.approx((c * vx - s * vy, s * vx + c * vy), abs=1e-5)
+        assert after.radius_m == pytest.approx(before.radius_m, abs=1e-6)
+
+
+def test_the_same_scans_give_the_same_tracks_bit_for_bit() -> None:
+    obstacles = [(2.0, 0.5, 0.4, -0.3, 0.3), (-1.0, 2.0, 0.0, 0.0, 0.1)]
+    one, other = (run_tracker(obstacles, 9, scan_m=0.02, seed=3).tracks for _ in range(2))
+    assert one == other
+
+
+def test_every_return_lies_within_a_circle() -> None:
+    rng = np.random.default_rng(8)
+    ranges = np.where(rng.random(360) < 0.3, np.inf, rng.uniform(0.3, 5.0, 360))
+    tracker, increment = Tracker(), 2.0 * math.pi / 360
+    scan = Scan(
+        ranges_m=ranges,
+        angle_min_rad=0.0,
+        angle_increment_rad=increment,
+        range_min_m=0.1,
+        range_max_m=10.0,
+    )
+    tracker.update(TICK_NS, Pose2D(0.0, 0.0), scan)
+    circles = tracker.circles(TICK_NS, 0.3)
+    for k, r in enumerate(ranges.tolist()):
+        if math.isfinite(r):
+            point = (r * math.cos(k * increment), r * math.sin(k * increment))
+            assert min(math.dist(point, c.center_m) - c.radius_m for c in circles) < 0.0
+
+
+def test_a_scan_that_takes_time_gives_the_place_at_its_stamp() -> None:
+    speed, per_beam_s, increment = 2.0, 2e-4, 2.0 * math.pi / 360
+    errors = []
+    for stated in (per_beam_s, 0.0):
+        tracker = Tracker()
+        for k in range(8):
+            ranges = np.full(360, np.inf)
+            for beam in range(360):  # each beam meets the disc where it is then
+                t = 0.1 * k + beam * per_beam_s
+                disc = (-1.0 + speed * t, -2.0, 0.3)
+                ranges[beam] = cast_rays((0.0, 0.0), [disc], 360, 10.0)[beam]
+            scan = Scan(
+                ranges_m=ranges,
+                angle_min_rad=0.5 * increment,
+                angle_increment_rad=increment,
+                range_min_m=0.0,
+                range_max_m=10.5,
+                time_increment_s=stated,
+            )
+            tracker.update((k + 1) * TICK_NS, Pose2D(0.0, 0.0), scan)
+        (circle,) = tracker.circles(8 * TICK_NS, 0.0)
+        errors.append(math.dist(circle.center_m, (-1.0 + speed * 0.7, -2.0)))
+    assert errors[0] < 0.03
+    assert errors[1] > 0.05
