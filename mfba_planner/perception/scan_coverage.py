@@ -11,6 +11,8 @@ from ..core.planner_types import NANO, Scan
 
 TWO_PI = 2.0 * math.pi
 WIDEST_BEAM_RAD = math.radians(31.0)  # of 12 beams; fewer beams leave directions between them
+BODY_RAD = math.radians(60.0)
+NARROW_RAD = math.radians(15.0)
 _WITHIN = 1.0 - 1e-6  # a beam in the middle of a sector does not touch the next one
 
 
@@ -64,6 +66,25 @@ class ScanCoverage:
             self._last_ns = np.full(self._n, -1, dtype=np.int64)
         half_width = math.pi / self._n  # around heading 1
         self._last_ns[covered_sectors(scan, known, self._n, half_width)] = stamp_ns
+
+    def unsafe(self, now_ns: int) -> np.ndarray | None:
+        """Whether driving along each heading leads into what is not covered, (n,); None: nowhere.
+
+        The front of the robot's body sweeps all directions within a right angle of the heading.
+        Those within BODY_RAD must be covered; beside that, contact is a graze. Directions left out
+        that are narrower than NARROW_RAD hide nothing but thin posts: on the robot, mostly.
+        """
+        missing = self.uncovered(now_ns)
+        if missing is None:
+            return None
+        narrow = round(NARROW_RAD / TWO_PI * self._n)
+        wide = np.logical_and.reduce([np.roll(missing, -k) for k in range(narrow + 1)])
+        if not wide.any():
+            return None
+        body = round(BODY_RAD / TWO_PI * self._n)
+        shifts = range(-body, narrow + 1 + body)
+        closed: np.ndarray = np.logical_or.reduce([np.roll(wide, k) for k in shifts])
+        return closed
 
     def uncovered(self, now_ns: int) -> np.ndarray | None:
         """Whether each heading was not covered within the memory, (n,); None if all were."""

@@ -40,6 +40,7 @@ SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a directio
 HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
 # A differential drive cannot step aside when an obstacle beside it turns towards it.
 TURNING_MARGIN_M = 0.1
+TOWARDS = math.cos(math.radians(80.0))
 _FREE_M = 1e-9
 _LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
 
@@ -133,7 +134,7 @@ class Predictive(BasePlanner):
         last_waypoint, self._waypoint = self._waypoint, None
         self._perceived = circles = self._circles(obs)
         self._by_sectors = obs.circles is None and obs.scan is None
-        self._unobserved = None if obs.scan is None else self._coverage.uncovered(obs.stamp_ns)
+        self._unobserved = None if obs.scan is None else self._coverage.unsafe(obs.pose_ns)
         if not circles and self._is_observed((goal[0] - position[0], goal[1] - position[1])):
             self._changes.not_enclosed()
             straight = self.straight(position, goal, self.params.speed_mps)
@@ -175,6 +176,9 @@ class Predictive(BasePlanner):
         enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
         if enclosure and self._changes.at_rest(obs):
             return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
+        if self._unobserved is not None and not self._is_towards(to_goal):
+            reason = "no direction that the lidar has covered leads on"
+            return Move(velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=vs, vg=vs)
         gaps = self._nearest_free(vs, to_goal)
         if drive is not None:  # where the bits, which know the turn but not the arc, are wrong
             gaps = sorted({*gaps, *range(0, len(vs), len(vs) // HEADINGS_IF_CLOSED)})
@@ -306,6 +310,13 @@ class Predictive(BasePlanner):
             return None
         speed = self.params.speed_mps
         return DriveRollout(self.params, obs.pose.yaw, self._speeds, speed, self.tick_s)
+
+    def _is_towards(self, to_goal: Point) -> bool:
+        """Whether an observed heading leads nearer to the goal; if not, it would lead astray."""
+        assert self._unobserved is not None
+        angle = math.atan2(to_goal[1], to_goal[0])
+        nearer = self._cos * math.cos(angle) + self._sin * math.sin(angle) > TOWARDS
+        return bool((nearer & ~self._unobserved).any())
 
     def _nearest_free(self, closed: Bits, to_goal: Point) -> list[int]:
         """The free headings nearest to the goal's on both sides; every sixth if none is free."""

@@ -103,3 +103,27 @@ def test_how_a_driver_reports_free_space(convention: str, expected: list[float])
     found = rep_117(given_m, 5.0, NoReturn(convention))
     np.testing.assert_array_equal(found, expected)
     assert given_m[3] == 0.0, "the input is not changed"
+
+
+def unsafe_degrees(coverage: ScanCoverage) -> list[int]:
+    closed = coverage.unsafe(0)
+    return [] if closed is None else [5 * (k + 1) for k in np.flatnonzero(closed).tolist()]
+
+
+def test_the_robot_is_wider_than_its_heading() -> None:
+    """Of a lidar that sees 270 degrees, the body would sweep the rest from 75 degrees on."""
+    coverage = ScanCoverage(72, 1.0)
+    coverage.update(0, scan([INF] * 271, -0.75 * math.pi, math.pi / 180.0))
+    assert uncovered_degrees(coverage, 0) == list(range(140, 225, 5))
+    assert unsafe_degrees(coverage) == list(range(80, 285, 5))
+
+
+def test_narrow_masks_close_no_heading() -> None:
+    ranges = [INF] * 360
+    for post in (45, 135, 225, 315):
+        ranges[post - 4 : post + 5] = [NAN] * 9
+    coverage = ScanCoverage(72, 1.0)
+    coverage.update(0, scan(ranges, 0.0, math.pi / 180.0))
+    assert uncovered_degrees(coverage, 0) == [45, 135, 225, 315]
+    assert unsafe_degrees(coverage) == []
+    assert ScanCoverage(72, 1.0).unsafe(0) is not None, "without a scan nothing is safe"
