@@ -138,9 +138,9 @@ class Tracker:
         of a least-squares line through the errors of the last scans.
         """
         self._scans += 1
-        if dt <= 0.0:
-            return
         bank, error = self._bank, self._pose_error
+        if dt <= 0.0 or not bank.count or error.error == (0.0, 0.0, 0.0):
+            return
         anchors = int(np.count_nonzero(~bank.moving & (bank.scans >= _SETTLED)))
         # After n scans the rate of turn is known to 3.5 sd / (dt n^1.5).
         noise = 3.5 * max(error.sd_m / _FAR_M, error.sd_rad) * _FAR_M / (dt * _DRIFT_MPS)
