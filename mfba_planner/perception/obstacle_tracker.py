@@ -32,6 +32,7 @@ _FEWEST_SCANS, _MOST_SCANS = 6, 30  # whose errors tell a common motion of all t
 _SETTLED = 2  # scans of a track that may be an anchor
 _ROUND_SCANS, _ROUND_SD_M = 5, 0.03  # from which a track's circle is known
 _TURN_SHARE = 0.8  # of a step, by which an obstacle that turns back is found elsewhere
+_NEAR_M, _NEAR_ROUND_M = 0.1, 0.04  # returns so near to a predicted circle are its own
 _KNOWN = 3  # scans after which a track's velocity is known
 _ANCHORS = 3  # such tracks tell that there is no common motion
 
@@ -138,9 +139,9 @@ class Tracker:
         of a least-squares line through the errors of the last scans.
         """
         self._scans += 1
-        if dt <= 0.0:
-            return
         bank, error = self._bank, self._pose_error
+        if dt <= 0.0 or not bank.count or error.error == (0.0, 0.0, 0.0):
+            return
         anchors = int(np.count_nonzero(~bank.moving & (bank.scans >= _SETTLED)))
         # After n scans the rate of turn is known to 3.5 sd / (dt n^1.5).
         noise = 3.5 * max(error.sd_m / _FAR_M, error.sd_rad) * _FAR_M / (dt * _DRIFT_MPS)
@@ -218,12 +219,13 @@ class Tracker:
         r = beams.range_m[taken]
         x = beams.origin_x[taken] + r * beams.cos[taken]
         y = beams.origin_y[taken] + r * beams.sin[taken]
-        label, off = expected_labels(x, y, self._bank.state, np.minimum(sd, 0.2))
-        noise = math.sqrt(self._range_variance)
+        bank, noise = self._bank, math.sqrt(self._range_variance)
         join, hump = self.params.join_m + 3.0 * noise, self.params.hump_m + 2.5 * noise
-        bank = self._bank
         radius_sd = np.sqrt(bank.covariance[:, RADIUS, RADIUS])
         round_ = (bank.scans >= _ROUND_SCANS) & (radius_sd < _ROUND_SD_M)
+        # What comes out from behind a known circle must not be taken for its growth.
+        near = np.where(round_, _NEAR_ROUND_M + 2.0 * noise + sd, _NEAR_M)
+        label, off = expected_labels(x, y, bank.state, near + np.minimum(sd, 0.2))
         return segments(beams, taken, x, y, label, round_, join, hump), off
 
     def _use(self, beams: Beams, found: Segments, track: Array, origin: Array) -> None:

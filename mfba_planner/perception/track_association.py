@@ -23,7 +23,7 @@ def expected_labels(x: Array, y: Array, state: Array, tolerance_m: Array) -> tup
     off = np.abs(np.sqrt(dx * dx + dy * dy) - state[:, 4])
     label = off.argmin(axis=1)
     least = off[np.arange(x.size), label]
-    return np.where(least <= _ON_CIRCLE_M + tolerance_m[label], label, NONE), off
+    return np.where(least <= tolerance_m[label], label, NONE), off
 
 
 def associate(

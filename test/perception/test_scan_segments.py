@@ -63,7 +63,7 @@ def test_beams_without_knowledge_are_left_out() -> None:
     assert beams.range_m[3] == 0.0  # nearer than the shortest range, taken there
 
 
-def test_a_scan_that_takes_time_is_seen_from_where_the_robot_was() -> None:
+def test_beams_of_a_scan_that_takes_time_start_where_the_robot_was() -> None:
     scan = scan_of([(2.0, 1.0, 0.3)], time_increment_s=1e-4)
     beams = BeamReader().read(Pose2D(1.0, 2.0), (0.5, -1.0, 0.8), scan)
     t = 1e-4 * beams.number
@@ -114,7 +114,7 @@ def test_an_edge_at_the_longest_range_is_not_sure() -> None:
     assert found.right_gap_rad[0] == found.left_gap_rad[0] == 0.0
 
 
-def test_a_point_in_space_seen_free_has_appeared_and_a_surface_has_not() -> None:
+def test_a_point_in_free_space_has_appeared_and_a_surface_has_not() -> None:
     free = FreeSpace()
     beams = BeamReader().read(ORIGIN, AT_REST, scan_of([(3.0, 0.0, 0.5)]))
     free.add(beams, (0.0, 0.0, 0.0), 0.0)
