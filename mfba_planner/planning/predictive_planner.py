@@ -38,8 +38,9 @@ LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a direction is needed
 HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
-# A differential drive cannot step aside when an obstacle beside it turns towards it.
-TURNING_MARGIN_M = 0.1
+# A differential drive cannot step aside when an obstacle beside it turns towards it: it passes
+# at a distance, and rather drives on than into the margin.
+TURNING_MARGIN_M, TURNING_CLOSE = 0.15, 7.0
 TOWARDS = math.cos(math.radians(80.0))
 _FREE_M = 1e-9
 _LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
@@ -163,7 +164,11 @@ class Predictive(BasePlanner):
         drive = self._drive_rollout(obs)
         risk = self.options.risk
         if drive is not None:
-            risk = replace(risk, margin_m=risk.margin_m + TURNING_MARGIN_M)
+            risk = replace(
+                risk,
+                margin_m=risk.margin_m + TURNING_MARGIN_M,
+                close_m=TURNING_CLOSE * risk.close_m,
+            )
         costs = TrajectoryCost(position, circles, risk, tick_s, speed, drive)
         share = min(1.0, speed * tick_s / goal_distance)
         waypoint, t1 = (to_goal[0] * share, to_goal[1] * share), share * goal_distance / speed

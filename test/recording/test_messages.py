@@ -425,12 +425,12 @@ def test_a_scan_that_contradicts_itself_is_refused_in_one_line(
 
 
 def test_a_scan_s_time_between_beams_is_kept() -> None:
-    message = LaserScan(ranges=[1.0] * 360, time_increment=1e-4, range_max=10.0)
+    message = a_scan(time_increment=1e-4)
     assert from_messages.laser_scan(message).time_increment_s == pytest.approx(1e-4)
 
 
 @pytest.mark.parametrize("increment", [-1e-4, math.nan, math.inf, 1.0])
 def test_a_time_increment_that_is_none_is_refused(increment: float) -> None:
-    message = LaserScan(ranges=[1.0] * 360, time_increment=increment, range_max=10.0)
+    message = a_scan(time_increment=increment)
     with pytest.raises(InputError, match=r"time_increment=.*check the lidar driver"):
         from_messages.laser_scan(message)
