@@ -75,6 +75,7 @@ def test_commands_are_found_and_every_reduced_one_is_shown() -> None:
             "arrived 1 of 1, without contact 1, noticed 1; graph: 1 of 1 ",
         ),
         ("python bench/fleet.py", "1 of 1"),
+        ("python bench/tracking.py --seeds 30", "| decision with tracking |"),
     ],
 )
 def test_scripts_behind_tables_of_pages_run(line: str, expected: str, tmp_path: Path) -> None:

@@ -29,6 +29,9 @@ REDUCED = {
     ),
     "python bench/robots.py": "python bench/robots.py --worlds 1 --only sectors",
     "python bench/kidnapped.py --graph 5": "python bench/kidnapped.py --graph 1 --count 1",
+    "python bench/tracking.py --seeds 30": (
+        "python bench/tracking.py --seeds 1 --only 1.5 --rounds 1"
+    ),
     "python bench/fleet.py": "python bench/fleet.py --seeds 1 --robots 3 --radius 3",
 }
 # Lines of a page with the name of the file for a block of YAML.
