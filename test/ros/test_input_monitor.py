@@ -327,7 +327,7 @@ def test_a_slow_planner_that_reads_scans_itself_decides_on_the_newest(graph: Gra
     graph.settle()
     assert driving() == [stamp_ns(robot.sectors[-1].header.stamp)]
     assert robot.drive() == DRIVES
-    assert int(robot.value("planner", "sectors: dropped")) == 3 * PAIRED - 1
+    graph.until(lambda: int(robot.value("planner", "sectors: dropped")) == 3 * PAIRED - 1)
 
 
 BAD_SCANS: dict[str, tuple[dict[str, Any], str]] = {
