@@ -69,12 +69,16 @@ class InputSubscriptions:
         self._monitor.reset()
 
     def subscribe(self) -> None:
-        """Subscribe to odom and sectors, and to scan where it is needed."""
+        """Subscribe to odom and sectors, and to scan where it is needed.
+
+        Scan comes first: a node that has discovered a later subscription has discovered it too,
+        so that no first scan is lost.
+        """
+        self._is_subscribed, self._is_subscribed_to_scan = True, False
+        self.set_reads_scan(self._params)
         frame = self._settings.odom_frame
         self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
         self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
-        self._is_subscribed, self._is_subscribed_to_scan = True, False
-        self.set_reads_scan(self._params)
 
     def set_reads_scan(self, params: PlannerParams) -> None:
         """Use scans, or not, from now on; params are the planner's."""

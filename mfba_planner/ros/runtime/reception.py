@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-REMEMBERED_S = 2.0  # without a message for so long, a publisher's sequence is forgotten
+REMEMBERED_S = 10.0  # a node that stalls counts what it missed; then a sequence is forgotten
 OVERTAKEN = 3  # messages by which two subscriptions to one topic may be apart
 HELD_S = 1.0  # how long a change of frame, or a second publisher, is a fault
 
