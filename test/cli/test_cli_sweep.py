@@ -316,8 +316,10 @@ def test_a_failed_run_becomes_text_pictures_and_a_bag(
     ).read_text()
 
 
-def test_a_bag_of_the_paper_s_planner_can_be_verified(tmp_path: Path, capsys: Capture) -> None:
-    assert mfba("show", "random-10/1/paper/0", "--out", str(tmp_path / "a")) == 0
+@pytest.mark.parametrize("planner", ["paper", "predictive"])
+def test_a_bag_of_a_run_can_be_verified(tmp_path: Path, capsys: Capture, planner: str) -> None:
+    """Of predictive, with the scans that it tracked obstacles in."""
+    assert mfba("show", f"random-10/1/{planner}/0", "--out", str(tmp_path / "a")) == 0
     assert "goal reached without collision" in capsys.readouterr().out
     assert mfba("verify", str(tmp_path / "a"), "--closed-loop") == 0
     assert "closed loop: identical" in capsys.readouterr().out

@@ -4,39 +4,46 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rclpy.serialization import serialize_message
 
-from ...core.planner_types import Decision
+from ...core.planner_types import Decision, Scan
 from ...perception.sensory_vector import sense_circles, sensory_vector
+from ...planning.planner_params import Method
 from ...recording.bag_writer import BagWriter
 from ...recording.configuration_attachment import attach_configuration
 from ...scenarios.run_config import Driver, RunConfig, node_parameters, run_facts
 from ...scenarios.scenario_json import scenario_to_json
 from ...simulation.episode import Episode, Outcome
+from ...simulation.world import World
 from . import to_messages, topics
 from .qos_conversion import offered
 from .serialized_message import type_name
 
-_FRAME, _BASE = "odom", "base_link"
+_FRAME, _BASE, _SCAN_FRAME = "odom", "base_link", "base_scan"
 _TOPICS = (
-    topics.CLOCK, topics.ODOM, topics.OBSTACLES, topics.SECTORS, topics.SENSORY_VECTOR,
-    topics.GOAL_POSE, topics.GOAL_STEP, topics.PLAN, topics.CMD_VEL, topics.DECISION,
-    topics.OUTCOME,
+    topics.CLOCK, topics.ODOM, topics.OBSTACLES, topics.SCAN, topics.SECTORS,
+    topics.SENSORY_VECTOR, topics.GOAL_POSE, topics.GOAL_STEP, topics.PLAN, topics.CMD_VEL,
+    topics.DECISION, topics.OUTCOME,
 )  # fmt: skip
 
 
 def write_episode_bag(episode: Episode, directory: Path, facts: Mapping[str, Any] = {}) -> None:
     """Write a bag with every tick's messages; facts are added to the run's configuration.
 
-    Where a planner read no sectors, the bag holds those that the sensor would have measured.
+    Where a planner read no sectors, the bag holds those that the sensor would have measured. Of a
+    robot with a lidar it holds the scans, measured again: the noise depends on seed and stamp.
     Raises OutputError where nothing can be written; an incomplete bag is deleted.
     """
+    planner = episode.planner
+    if episode.planner_name == Method.PREDICTIVE.value:  # a sweep selects planners by name
+        planner = replace(planner, method=Method.PREDICTIVE)
     config = RunConfig(
         scenario=episode.scenario,
-        planner=episode.planner,
+        planner=planner,
         sensor=episode.sensor,
         seed=episode.seed,
         driver=Driver.CORE,
@@ -69,12 +76,28 @@ def _messages(episode: Episode) -> Iterator[tuple[int, topics.Topic, Any]]:
     yield first, topics.GOAL_POSE, goal
     yield first, topics.OUTCOME, to_messages.outcome_msg(None, 0)
     velocity = (0.0, 0.0)
-    for tick in episode.ticks:
+    for tick, scan in zip(episode.ticks, _scans(episode)):
         for topic, message in _tick_messages(episode, tick, velocity):
             yield tick.stamp_ns, topic, message
+        if scan is not None:
+            yield (
+                tick.stamp_ns,
+                topics.SCAN,
+                to_messages.scan_msg(scan, tick.stamp_ns, _SCAN_FRAME),
+            )
         velocity = tick.velocity
     if episode.outcome is not Outcome.INTERRUPTED:
         yield last, topics.OUTCOME, to_messages.outcome_msg(episode.outcome, len(episode.ticks))
+
+
+def _scans(episode: Episode) -> Iterator[Scan | None]:
+    """The scan of every tick, None without a lidar."""
+    params = episode.planner
+    world = World(episode.scenario, params.tick_ns, params.goal_tolerance_m, episode.seed)
+    for number, tick in enumerate(episode.ticks):
+        world.tick = number
+        world.pose = episode.truth[number] if episode.truth else tick.pose
+        yield world.read().scan
 
 
 def _tick_messages(
