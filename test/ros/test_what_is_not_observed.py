@@ -5,6 +5,8 @@ import math
 from typing import Any
 
 import pytest
+from planner_talk import LOCKSTEP, PlannerHarness, fields, mode, odom, sectors
+from rclpy.parameter import Parameter
 from real_time_robot import BEAMS, DRIVES, FREE, STOPS, TRACKING, RealTimeRobot, scan_of, stamp
 from ros_graph import Graph
 
@@ -21,7 +23,7 @@ def velocity(robot: RealTimeRobot) -> tuple[float, float]:
 
 @pytest.mark.parametrize("planner", [PAPER, TRACKING], ids=["paper", "predictive"])
 @pytest.mark.parametrize(
-    ("convention", "reading", "mode"),
+    ("convention", "reading", "expected"),
     [
         ("inf", math.inf, DRIVES),
         ("inf", 0.0, STOPS),
@@ -33,13 +35,13 @@ def velocity(robot: RealTimeRobot) -> tuple[float, float]:
     ],
 )
 def test_what_a_driver_reports_for_nothing(
-    graph: Graph, planner: dict[str, str], convention: str, reading: float, mode: str
+    graph: Graph, planner: dict[str, str], convention: str, reading: float, expected: str
 ) -> None:
     robot = RealTimeRobot(graph, planner=planner, scan_no_return=convention)
     ranges = (reading,) * BEAMS
     robot.drive(ranges=ranges)
-    assert robot.drive(ranges=ranges) == mode
-    if mode == STOPS:
+    assert robot.drive(ranges=ranges) == expected
+    if expected == STOPS:
         assert "scan_no_return" in robot.inputs("virtual_sensor").message
 
 
@@ -47,13 +49,13 @@ def test_what_a_driver_reports_for_nothing(
 def test_a_goal_in_a_direction_that_no_beam_covers(graph: Graph, planner: dict[str, str]) -> None:
     robot = RealTimeRobot(graph, planner=planner)
     for _ in range(3):
-        mode = robot.drive(ranges=FRONT)
+        driven = robot.drive(ranges=FRONT)
         vx, vy = velocity(robot)
         if planner is PAPER:
-            assert mode == Mode.OBSTACLE_AVOIDANCE.value
+            assert driven == Mode.OBSTACLE_AVOIDANCE.value
             assert abs(math.atan2(vy, vx)) > math.radians(40.0)
         else:
-            assert (mode, vx, vy) == (Mode.BLOCKED.value, 0.0, 0.0)
+            assert (driven, vx, vy) == (Mode.BLOCKED.value, 0.0, 0.0)
             assert robot.reason == "no direction that the lidar has covered leads on"
     for _ in range(3):
         robot.drive()
@@ -71,3 +73,23 @@ def test_a_direction_stays_observed_for_a_moment(graph: Graph) -> None:
         speeds.append(math.hypot(*velocity(robot)))
     assert min(speeds[:12]) > 0.5
     assert speeds[12:] == [0.0] * 4
+
+
+def test_a_planner_set_to_predictive_while_it_runs_reads_the_scan(graph: Graph) -> None:
+    robot = RealTimeRobot(graph, planner=PAPER)
+    perceptions = []
+    for name, value in (("method", "paper"), ("method", "predictive"), ("perception", "sectors")):
+        (result,) = robot.planner.set_parameters([Parameter(name, value=value)])
+        assert result.successful, result.reason
+        graph.settle()
+        for _ in range(3):
+            robot.drive()
+        perceptions.append(fields(robot.decisions[-1])["perception"])
+    assert perceptions == ["sectors", "scan", "sectors"]
+
+
+def test_without_a_lidar_the_sectors_are_all_there_is(graph: Graph) -> None:
+    harness = PlannerHarness(graph, {**LOCKSTEP, **TRACKING})
+    decision_message = harness.decide(odom(1), sectors(1))
+    assert fields(decision_message)["perception"] == "sectors"
+    assert mode(decision_message) is Mode.PATH_GENERATION
