@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.geometry import Pose2D
 from ..core.planner_types import Scan
+from .scan_coverage import usable_beams
 
 Array = np.ndarray
 
@@ -66,10 +67,8 @@ class BeamReader:
             self._cos = np.array([math.cos(a) for a in angles])
             self._sin = np.array([math.sin(a) for a in angles])
             self._key = (count, step)
-        near = np.isneginf(r)
-        known = near | np.isposinf(r) | ((r >= scan.range_min_m) & (r <= scan.range_max_m))
-        number = np.flatnonzero(known)
-        reach = np.where(near, scan.range_min_m, r)[number]
+        number = np.flatnonzero(usable_beams(scan))
+        reach = np.where(np.isneginf(r), scan.range_min_m, r)[number]
         c0, s0 = math.cos(scan.angle_min_rad), math.sin(scan.angle_min_rad)
         base_c, base_s = self._cos[number], self._sin[number]
         c, s = c0 * base_c - s0 * base_s, s0 * base_c + c0 * base_s

@@ -21,7 +21,7 @@ def usable_beams(scan: Scan) -> np.ndarray:
 
     NaN and finite values outside [range_min, range_max] tell nothing.
     """
-    r = scan.ranges_m
+    r = np.asarray(scan.ranges_m, dtype=np.float64)
     known: np.ndarray = np.isinf(r) | ((r >= scan.range_min_m) & (r <= scan.range_max_m))
     return known
 

@@ -57,7 +57,6 @@ class DriveRollout:
         yaw = self._yaw
         (qx, qy), (gx, gy) = goal if wait_s else waypoint, goal
         found: list[Stretch] = []
-        held = tick_s * tick_s
         while driven < horizon_s and t < LONGEST * horizon_s:
             h = tick_s if len(found) < FINE_STEPS else COARSE_TICKS * tick_s
             dx, dy = qx - x, qy - y
@@ -72,8 +71,7 @@ class DriveRollout:
             if reverse and abs(error) > 0.5 * math.pi:
                 error, sign = math.remainder(error + math.pi, 2.0 * math.pi), -1.0
             off = abs(error)
-            turn = alpha * (math.sqrt(held + 2.0 * off / alpha) - tick_s)
-            turn = math.copysign(turn if turn < fastest else fastest, error)
+            turn = math.copysign(min(brake(off, alpha, tick_s), fastest), error)
             wanted = full * share if t < wait_s else full
             wanted = min(wanted, brake(math.hypot(gx - x, gy - y), accel, tick_s))
             wanted = sign * wanted * (1.0 - off / first_rad) if off < first_rad else 0.0

@@ -42,6 +42,7 @@ HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
 # at a distance, and rather drives on than into the margin.
 TURNING_MARGIN_M, TURNING_CLOSE = 0.15, 7.0
 TOWARDS = math.cos(math.radians(80.0))
+UNOBSERVED = "no direction that the lidar has covered leads on"
 _FREE_M = 1e-9
 _LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
 
@@ -143,7 +144,7 @@ class Predictive(BasePlanner):
         at_rest = ObstaclesAtRest(position, circles)
         misplaced = at_rest.misplaced()
         if misplaced:
-            return Move(velocity=(0.0, 0.0), reason=misplaced, event=Event.NO_GAP)
+            return _blocked(misplaced)
         move = self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
         if not all(move.vs or (0,)):
             self._changes.not_enclosed()
@@ -180,10 +181,9 @@ class Predictive(BasePlanner):
         vs = self._closed_headings(costs)
         enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
         if enclosure and self._changes.at_rest(obs):
-            return Move(velocity=(0.0, 0.0), reason=enclosure, event=Event.NO_GAP, vs=vs, vg=vs)
+            return _blocked(enclosure, vs)
         if self._unobserved is not None and not self._is_towards(to_goal):
-            reason = "no direction that the lidar has covered leads on"
-            return Move(velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=vs, vg=vs)
+            return _blocked(UNOBSERVED, vs)
         gaps = self._nearest_free(vs, to_goal)
         if drive is not None:  # where the bits, which know the turn but not the arc, are wrong
             gaps = sorted({*gaps, *range(0, len(vs), len(vs) // HEADINGS_IF_CLOSED)})
@@ -200,8 +200,7 @@ class Predictive(BasePlanner):
             waypoint, t1, least = found
         swarm = self._refine(costs, waypoint, to_goal, least, obs.stamp_ns)
         if not min(swarm.best_value, least) < math.inf:
-            reason = "no direction that the lidar has covered leads on"
-            return Move(velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=vs, vg=vs)
+            return _blocked(UNOBSERVED, vs)
         if swarm.best_value < least:
             (qx, qy), least = swarm.best_x, swarm.best_value
             waypoint = (qx, qy)
@@ -376,3 +375,8 @@ class Predictive(BasePlanner):
             swarm.tell(values)
             bound = min(bound, swarm.best_value)
         return swarm
+
+
+def _blocked(reason: str, vs: Bits = ()) -> Move:
+    """Stand still; the mode becomes BLOCKED."""
+    return Move(velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=vs, vg=vs)

@@ -9,8 +9,6 @@ import numpy as np
 
 from ..core.robot_base import Base
 
-HALF_TURN_RAD = math.pi
-
 
 class TurnDelay:
     """The time lost by turning first, against a base that drives in any direction at once.
@@ -33,7 +31,7 @@ class TurnDelay:
         """Seconds lost before driving in the direction (ux, uy)."""
         error = math.remainder(math.atan2(uy, ux) - self._yaw, 2.0 * math.pi)
         if self._reverse and abs(error) > 0.5 * math.pi:
-            error = math.remainder(error + HALF_TURN_RAD, 2.0 * math.pi)
+            error = math.remainder(error + math.pi, 2.0 * math.pi)
         rate = self._turn if error >= 0.0 else -self._turn
         return self._lost_s(abs(error), rate)
 
@@ -45,7 +43,7 @@ class TurnDelay:
         """Seconds lost between driving in the direction (ux, uy) and in (vx, vy)."""
         error = abs(math.atan2(ux * vy - uy * vx, ux * vx + uy * vy))
         if self._reverse and error > 0.5 * math.pi:
-            error = HALF_TURN_RAD - error
+            error = math.pi - error
         return self._lost_s(error, 0.0)
 
     def _lost_s(self, error: float, rate: float) -> float:
