@@ -50,13 +50,17 @@ def test_the_allowed_share_brings_no_contact_and_is_not_too_small(
         x, y = (h + part * DURATION_S * v for h, v in zip(HERE, velocity))
         return distance((x, y), c.center_m) - c.radius_m
 
+    def approach(c: Circle, part: float) -> float:
+        """The velocity's component towards the centre, times the distance from it."""
+        offsets = (m - h - part * DURATION_S * v for m, h, v in zip(c.center_m, HERE, velocity))
+        return sum(offset * v for offset, v in zip(offsets, velocity))
+
     for c in found:
         start = min(edge(c, 0.0), 0.0)  # in contact already: not deeper
         for k in range(1, 9):
             assert edge(c, share * k / 8.0) >= start - 1e-7
-    if share < 1.0:  # a little more would touch
-        more = min(share + 1e-3, 1.0)
-        assert any(edge(c, more) < edge(c, 0.0) and edge(c, more) < 1e-3 for c in found)
+    if share < 1.0:  # there it touches a circle, and more would lead nearer
+        assert any(edge(c, share) < 1e-6 and approach(c, share) > -1e-9 for c in found)
 
 
 def test_from_contact_a_robot_may_move_away_or_along_but_not_nearer() -> None:
