@@ -12,29 +12,29 @@ import re
 from typing import Annotated, Any
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from ..core.errors import ConfigError
 from ..core.option_specs import did_you_mean
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
-from .scenario_json import EXAMPLE, LIMIT, parse_robot
+from .place_schema import MEANINGS as _PLACE_MEANINGS
+from .place_schema import SHAPES as _PLACE_SHAPES
+from .place_schema import Place
+from .scenario_json import EXAMPLE, parse_robot
+from .schema_types import STRICT
+from .schema_types import NotNegative as _NotNegative
+from .schema_types import Number as _Number
+from .schema_types import Point as _Point
+from .schema_types import Positive as _Positive
+from .schema_types import default as _default
 
-_Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
-_Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=LIMIT)]
-_NotNegative = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=0.0, le=LIMIT)]
-_Point = tuple[_Number, _Number]
 # Names appear in messages and file names.
 _Name = Annotated[str, Field(max_length=100, pattern=r"^\w[\w .+-]*$")]
 
 
-def _default(kind: type, name: str) -> Any:
-    """The default of a dataclass field, so that it is defined only once."""
-    return kind.__dataclass_fields__[name].default  # type: ignore[attr-defined]
-
-
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+    model_config = STRICT
 
 
 class _Heading(_Strict):
@@ -98,7 +98,7 @@ class _Member(_Strict):
         return FleetRobot(name=self.name, start_m=self.start_m, goal_m=self.goal_m)
 
 
-class _Scenario(_Strict):
+class _Scenario(Place, _Strict):
     name: _Name
     description: str = _default(Scenario, "description")
     start_m: _Point
@@ -125,6 +125,7 @@ class _Scenario(_Strict):
             robot=parse_robot(self.robot),
             kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
             robots=tuple(member.build() for member in self.robots),
+            segments_m=self.segments(),
         )
 
 
@@ -150,6 +151,7 @@ _MEANINGS = {
     "to_m": "position it is moved to, m",
     "lower_m": "corner with the smaller x and y, m",
     "upper_m": "corner with the larger x and y, m",
+    **_PLACE_MEANINGS,
 }
 
 
@@ -246,6 +248,8 @@ def _explain(error: ValidationError) -> str:
     if kind == "missing":
         return f"{path}: missing; {_REMEDIES[kind]}"
     remedy = _REMEDIES.get(kind) or fault["msg"].replace("Input should be", "give a number")
+    if location[0] in _PLACE_SHAPES and kind in ("tuple_type", "too_long"):
+        remedy = _PLACE_SHAPES[location[0]]
     value = repr(fault["input"])
     shown = value if len(value) <= 60 else f"{value[:57]}..."
     return f"{path}={shown}: refused; {remedy}"

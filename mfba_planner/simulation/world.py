@@ -44,7 +44,7 @@ class World:
         self.tick = 0
         self.pose = Pose2D(*scenario.start_m)
         self.speeds = Speeds()  # of a differential drive
-        self._instruments = NoisySensors(scenario.robot, scenario.walls, tick_ns, seed)
+        self._instruments = NoisySensors(scenario, tick_ns, seed)
         self._read: tuple[int, Reading] | None = None
         self._nearby = NearbyObstacles(Motion(scenario), tick_ns)
 
