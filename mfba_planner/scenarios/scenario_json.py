@@ -99,6 +99,29 @@ def as_written(data: dict[str, Any]) -> Scenario:
     )
 
 
+def parse_segments(text: str) -> tuple[Segment, ...]:
+    """Wall segments from a text, [[x0, y0, x1, y1], ...]; none from an empty one.
+
+    Raises ConfigError for anything else.
+    """
+    if not text.strip():
+        return ()
+    try:
+        return tuple(
+            _segment([float(x) for x in _list(entry)]) for entry in _list(json.loads(text))
+        )
+    except (ValueError, TypeError, RecursionError, UnusualError):
+        shown = text if len(text) <= 60 else f"{text[:57]}..."
+        raise ConfigError(
+            f"segments_m={shown!r}: not a list of segments; give [[x0, y0, x1, y1], ...], m"
+        ) from None
+
+
+def segments_text(segments: tuple[Segment, ...]) -> str:
+    """The text from which parse_segments() makes these segments."""
+    return json.dumps(segments)
+
+
 def _segment(data: Any) -> Segment:
     if len(_list(data)) != 4:
         raise UnusualError

@@ -39,6 +39,7 @@ class World:
                 "one; use simulation.fleet"
             )
         self.scenario = scenario
+        self.segments = scenario.segments
         self.tick_ns = tick_ns
         self.goal_tolerance_m = goal_tolerance_m
         self.tick = 0
