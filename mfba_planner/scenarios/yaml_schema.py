@@ -8,10 +8,9 @@ do not need them.
 from __future__ import annotations
 
 import math
-import re
+from pathlib import Path
 from typing import Annotated, Any
 
-import yaml
 from pydantic import BaseModel, Field, ValidationError
 
 from ..core.errors import ConfigError
@@ -20,7 +19,7 @@ from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
 from .place_schema import MEANINGS as _PLACE_MEANINGS
 from .place_schema import SHAPES as _PLACE_SHAPES
-from .place_schema import Place
+from .place_schema import Box, Place
 from .scenario_json import EXAMPLE, parse_robot
 from .schema_types import STRICT
 from .schema_types import NotNegative as _NotNegative
@@ -111,7 +110,16 @@ class _Scenario(Place, _Strict):
     kidnappings: list[_Kidnapping] = []
     robots: list[_Member] = []
 
-    def build(self) -> Scenario:
+    def positions(self) -> list[tuple[str, Any]]:
+        """Where a robot is to be: key and point."""
+        found: list[tuple[str, Any]] = [("start_m", self.start_m), ("goal_m", self.goal_m)]
+        found += [("kidnapping to_m", kidnapping.to_m) for kidnapping in self.kidnappings]
+        for member in self.robots:
+            found += [(f"robot {member.name} start_m", member.start_m)]
+            found += [(f"robot {member.name} goal_m", member.goal_m)]
+        return found
+
+    def build(self, directory: Path) -> Scenario:
         walls = self.walls
         return Scenario(
             name=self.name,
@@ -125,7 +133,7 @@ class _Scenario(Place, _Strict):
             robot=parse_robot(self.robot),
             kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
             robots=tuple(member.build() for member in self.robots),
-            segments_m=self.segments(),
+            segments_m=self.segments(directory, self.positions()),
         )
 
 
@@ -164,10 +172,13 @@ def schema() -> dict[str, Any]:
     return found
 
 
-def checked(data: dict[Any, Any]) -> Scenario:
-    """The scenario from plain data. Raises ConfigError: key, value, reason, remedy."""
+def checked(data: dict[Any, Any], directory: Path = Path()) -> Scenario:
+    """The scenario from plain data; a map's path is relative to the directory.
+
+    Raises ConfigError: key, value, reason, remedy.
+    """
     try:
-        return _Scenario.model_validate(_with_ends(data)).build()
+        return _Scenario.model_validate(_with_ends(data)).build(directory)
     except ValidationError as error:
         raise ConfigError(_explain(error)) from None
 
@@ -179,42 +190,6 @@ def _with_ends(data: dict[Any, Any]) -> dict[Any, Any]:
         return data
     ends = {key: robots[0][key] for key in ("start_m", "goal_m") if key in robots[0]}
     return ends | data
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML with two fixes: 1e-3 is a number, and a key given twice is an error."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
-        """Refuse duplicate keys; SafeLoader would keep the last one silently."""
-        keys = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode):
-                if key.value in keys:
-                    problem = f"{key.value!r} given twice"
-                    raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
-                keys.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
-    list("-+.0123456789"),
-)
-
-
-def from_yaml(text: str, origin: str) -> Any:
-    """The parsed YAML text. Raises ConfigError naming origin, line and reason."""
-    try:
-        return yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f" line {mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or "unreadable characters"
-        raise ConfigError(f"{origin}{where}: not YAML ({problem}); {EXAMPLE}") from None
-    except (ValueError, LookupError, AttributeError, RecursionError):
-        # raised by PyYAML for an invalid date, a misused tag, too deep nesting
-        raise ConfigError(f"{origin}: not YAML (unreadable value); {EXAMPLE}") from None
 
 
 _REMEDIES = {
@@ -262,6 +237,7 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
         "kidnappings": _Kidnapping,
         "robots": _Member,
         "walls": _Walls,
+        "boxes": Box,
     }
     within = [models[item] for item in location[:-1] if item in models]
     return list((within or [_Scenario])[-1].model_fields)
