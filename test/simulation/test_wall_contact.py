@@ -121,7 +121,7 @@ def test_a_single_tick_is_a_robot_at_rest() -> None:
     assert (result.collisions, motion.first_contact_with) == (1, WALL)
 
 
-def test_the_lidar_detects_segments_without_being_told_to() -> None:
+def test_the_lidar_detects_segments_without_an_option() -> None:
     lidar = Lidar(beams=360, range_min_m=0.0)
     wall = Segments.of([(2.0, -9.0, 2.0, 9.0)])
     found = scan_at(Pose2D(0.0, 0.0), lidar, [], None, wall).ranges_m
