@@ -4,8 +4,8 @@
 From Dijkstra's algorithm on a grid of eight neighbours, whose distances exceed those in the plane
 by at most the factor 1 / cos(22.5 degrees); so divided by it, and never below the straight line.
 A cell is free unless it surely is within the robot's radius of a wall: the distance is estimated
-low rather than high. For a path that a robot can follow, cells are free only if their middles
-surely are farther away.
+low rather than high. For a path that a robot can follow, more distance is asked of the middles of
+cells, except near start and goal.
 """
 
 from __future__ import annotations
@@ -21,16 +21,19 @@ from ...simulation.scenario import Scenario
 _STRETCH = 1.0 / math.cos(math.pi / 8.0)
 _CELL_M = 0.1
 _MOST_CELLS = 400_000
+# Every point of a wall is at most 0.75 cells from a marked middle, and a point of a cell 0.71 from
+# its own: with so many cells less than the radius a cell is free unless it surely is not.
+LOW_CELLS = 1.5
 _BORDER_M = 2.0  # beyond start, goal and walls
 
 
 class DistanceToGo:
     """Distance (m) to the goal of a scenario, at most by rounding above the shortest path."""
 
-    def __init__(self, scenario: Scenario, *, surely_free: bool = False) -> None:
-        """Search the grid once; surely_free: for rough_path()."""
+    def __init__(self, scenario: Scenario, *, spare_cells: float = -LOW_CELLS) -> None:
+        """Search the grid once; spare_cells: beyond the radius, of a free cell's middle."""
         self.goal: Point = scenario.goal_m
-        self._surely_free = surely_free
+        self._spare_cells = spare_cells
         self._grid: np.ndarray | None = None
         if scenario.segments_m:
             self._search(scenario)
@@ -63,11 +66,14 @@ class DistanceToGo:
         wall = np.zeros(shape, dtype=bool)
         x, y = _points_along(s, 0.5 * self._cell_m)
         wall[self._cells(y, 1), self._cells(x, 0)] = True
-        # Every point of a wall is at most 0.75 cells from a marked middle, and a point of a cell
-        # 0.71 from its own.
         distance_m = distance_transform_edt(~wall) * self._cell_m
-        spare_m = (0.8 if self._surely_free else -1.5) * self._cell_m
-        free = distance_m >= radius_m + spare_m
+        free = distance_m >= radius_m + self._spare_cells * self._cell_m
+        if self._spare_cells > -LOW_CELLS:
+            for point in (scenario.start_m, scenario.goal_m):
+                i, j = (int(self._cells(np.array([v]), axis)[0]) for axis, v in enumerate(point))
+                ends = math.ceil(radius_m / self._cell_m)
+                near = np.s_[max(0, j - ends) : j + ends, max(0, i - ends) : i + ends]
+                free[near] |= distance_m[near] >= radius_m - LOW_CELLS * self._cell_m
         gx, gy = self._cells(np.array(self.goal[:1]), 0), self._cells(np.array(self.goal[1:]), 1)
         graph = _neighbours(free, self._cell_m)
         goal = int(gy[0]) * shape[1] + int(gx[0])

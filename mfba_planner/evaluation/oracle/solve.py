@@ -24,6 +24,7 @@ from .static_walls import StaticWalls, WallEnds
 from .tangent_search import CLEAR_M, Search, SearchParams
 
 _LONG, _VERY_LONG = 1.05, 1.08  # times the straight line
+_MOST_ACTIVE, _MOST_ACTIVE_UNKNOWN = 150, 400  # the time grows with the square of their number
 _FINE = LatticeParams(step_s=0.6, headings=48, cell_m=0.1)
 _COARSE = LatticeParams()
 
@@ -111,7 +112,9 @@ class _Task:
         if self._is_free(self.straight, segments):
             yield self.straight
             return
-        self._activate(self.straight, segments)
+        self.active |= self._touched(self.straight, uniform_segments(self.scenario, horizon_s))
+        if self.past_walls is None:
+            self._activate(self.straight, segments)
         if found := self._refined(self._by_tangents(segments), segments):
             yield from self._compared_with_lattice(found, segments)
             return
@@ -137,11 +140,13 @@ class _Task:
     def _look_past_walls(self) -> None:
         """Find a short path past the walls alone; those near it become active."""
         start = self.scenario.start_m
-        rough = DistanceToGo(self.scenario, surely_free=True).rough_path(start)
-        pulled = self.walls.pulled(rough, CLEAR_M)
-        if self.walls.clear_path(pulled) and within(self.inside, *pulled.T).all():
-            self.past_walls, self.least_m = pulled, _length(pulled)
-        self._activate_walls(self.walls.touched(pulled, 0.5 * self.walls.radius_m))
+        for spare_cells in (0.8, 0.0):
+            rough = DistanceToGo(self.scenario, spare_cells=spare_cells).rough_path(start)
+            pulled = self.walls.pulled(rough, CLEAR_M)
+            if self.walls.clear_path(pulled) and within(self.inside, *pulled.T).all():
+                self.past_walls, self.least_m = pulled, _length(pulled)
+                self._activate_walls(self.walls.touched(pulled, 0.5 * self.walls.radius_m))
+                return
 
     def _activate_walls(self, walls: set[int]) -> None:
         self.active_walls |= walls
@@ -188,14 +193,16 @@ class _Task:
     def _by_tangents(self, segments: UniformSegments) -> list[np.ndarray]:
         """Shortest paths among active obstacles; obstacles the best one touches become active.
 
-        A path shortest among some obstacles and free of all is shortest among all.
+        A path shortest among some obstacles and free of all is shortest among all. With too many
+        walls near the path the one known is all there is.
         """
         start, goal = self.scenario.start_m, self.scenario.goal_m
         known = []
         if self.past_walls is not None and self._is_free(self.past_walls, segments):
             known.append(self.past_walls)
         bound_s = _length(known[0]) / self.v if known else math.inf
-        while True:
+        most = _MOST_ACTIVE if known else _MOST_ACTIVE_UNKNOWN
+        while len(self.active) <= most:
             paths = Search(
                 start,
                 goal,
@@ -211,6 +218,7 @@ class _Task:
                 return known
             if not self._activate(paths[0], segments):
                 return [path for path in paths if self._is_free(path, segments)] or known
+        return known
 
     def _by_lattice(
         self, segments: UniformSegments, limit_s: float, params: LatticeParams

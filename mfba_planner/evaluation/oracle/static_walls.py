@@ -8,7 +8,7 @@ scenario, and test every edge against the walls themselves.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.scenario import Scenario
 
 _PAIRS = 200_000  # (edge, wall) pairs evaluated at once
+_BLOCK_M = 2.0  # side of the squares in which points are taken together
 _SLACK_M = 1e-6  # added to the reach, for rounding
 
 
@@ -100,21 +101,31 @@ class StaticWalls:
         requested = np.zeros_like(touched)
         requested[which] = True
         reach_m = float(np.hypot(*steps[0])) + self.radius_m + margin_m + _SLACK_M
-        rows = max(1, _PAIRS // self.segments.x.size)
-        for k in range(0, len(points), rows):
-            block = points[k : k + rows]
-            distance = self.segments.distances(block[:, :1], block[:, 1:])
+        for members, near_walls in self._blocks(points, reach_m):
+            block = points[members]
+            distance = near_walls.distances(block[:, :1], block[:, 1:])
             origin, wall = np.nonzero(distance <= reach_m)
             for j in range(0, len(origin), _PAIRS // len(steps)):
                 pair = slice(j, j + _PAIRS // len(steps))
-                start, near = origin[pair], self.segments.select(wall[pair])
+                start, near = origin[pair], near_walls.select(wall[pair])
                 near = Segments(*(column[:, None] for column in near))
                 x, y = block[start, :1], block[start, 1:]
                 gap = near.swept_distances(x, y, steps[:, 0], steps[:, 1])
-                number = ((k + start)[:, None] * len(steps)) + np.arange(len(steps))
+                number = members[start][:, None] * len(steps) + np.arange(len(steps))
                 touched[number[gap < self.radius_m + margin_m]] = True
         free: np.ndarray = ~touched[which]
         return free
+
+    def _blocks(self, points: np.ndarray, reach_m: float) -> Iterator[tuple[np.ndarray, Segments]]:
+        """Numbers of points (n, 2) that are near each other, and the walls in reach of them."""
+        cells = np.floor(points / _BLOCK_M).astype(np.int64)
+        order = np.lexsort(cells.T)
+        changes = np.flatnonzero(np.any(np.diff(cells[order], axis=0) != 0, axis=1)) + 1
+        for members in np.split(order, changes):
+            x, y = ((cells[members[0]] + 0.5) * _BLOCK_M).tolist()
+            near = self.segments.near((x, y), reach_m + _BLOCK_M)
+            if near.x.size:
+                yield members, near
 
 
 NO_WALLS = StaticWalls(Segments.of([]), 0.0)
