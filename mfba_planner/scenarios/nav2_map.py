@@ -22,6 +22,7 @@ from .map_outline import outline
 
 MOST_CELLS = 25_000_000  # 250 m x 250 m of 5 cm
 FINEST_M, COARSEST_M = 0.001, 10.0  # of a cell
+_LEVEL_RAD = 1e-6  # a yaw that is rounding
 MODES = ("trinary", "scale")
 MAP_REMEDY = "give the .yaml file that nav2's map_saver wrote, beside its image"
 
@@ -103,7 +104,7 @@ def _origin(name: str, origin: Any) -> Point:
     is_list = isinstance(origin, list) and len(origin) in (2, 3)
     if not (is_list and all(type(v) in (int, float) and abs(v) <= 1e6 for v in origin)):
         raise ConfigError(f"{name}: origin={origin!r}: give [x, y, 0], m")
-    if len(origin) == 3 and origin[2] != 0:
+    if len(origin) == 3 and abs(origin[2]) > _LEVEL_RAD:
         raise ConfigError(
             f"{name}: origin={origin!r}: rotated by {origin[2]:g} rad, which is not supported; "
             "save the map with yaw 0"

@@ -146,7 +146,7 @@ _MEANINGS = {
     "obstacles": "circles at rest or moving",
     "walls": "a rectangle that reflects obstacles; the robot may cross it",
     "time_limit_s": "simulated time after which the run fails, s",
-    "center_m": "centre at t = 0, m",
+    "center_m": "centre, of an obstacle at t = 0, m",
     "radius_m": "radius, m",
     "speed_mps": "speed, m/s",
     "heading_deg": "heading, degrees from +x, counter-clockwise",

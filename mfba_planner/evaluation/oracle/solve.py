@@ -92,7 +92,7 @@ class _Task:
         self.active: set[int] = set()  # numbers of obstacles, ends of walls among them
         self.walls, self.active_walls = StaticWalls.of(scenario), set[int]()
         self.ends = WallEnds(scenario) if self.walls else None
-        self.to_go = DistanceToGo(scenario)
+        self.to_go: DistanceToGo | None = None  # past the walls; None: the straight line
         self.least_m = self.straight_m  # a bit above the shortest path past the walls alone
         self.past_walls: np.ndarray | None = None  # that path
         self.proof = ""
@@ -104,17 +104,17 @@ class _Task:
         if straight_s > limit_s:
             self.proof = f"the straight path alone takes {straight_s:g} s of {limit_s:g} s"
             return
-        if self.walls:
-            self._look_past_walls()
-        least_s = self.least_m / self.v
-        horizon_s = min(limit_s, 1.5 * least_s + 5.0)
+        horizon_s = min(limit_s, 1.5 * straight_s + 5.0)
         segments = self._segments(horizon_s)
-        if self._is_free(self.straight, segments):
+        touched = self._touched(self.straight, segments)
+        if not (touched or self.walls.touched(self.straight, CLEAR_M / 2.0)):
             yield self.straight
             return
-        self.active |= self._touched(self.straight, uniform_segments(self.scenario, horizon_s))
-        if self.past_walls is None:
-            self._activate(self.straight, segments)
+        self.active |= {number for number in touched if number < len(self.scenario.obstacles)}
+        if self.walls:
+            self._look_past_walls()
+            horizon_s = min(limit_s, 1.5 * self.least_m / self.v + 5.0)
+            segments = self._segments(horizon_s)
         if found := self._refined(self._by_tangents(segments), segments):
             yield from self._compared_with_lattice(found, segments)
             return
@@ -127,7 +127,7 @@ class _Task:
             yield from self._compared_with_lattice(found, segments)
             return
         for times in (1.25, 2.5, 5.0):
-            until_s = min(limit_s, times * least_s)
+            until_s = min(limit_s, times * self.least_m / self.v)
             if found := self._refined(self._by_lattice(segments, until_s, _COARSE), segments):
                 yield from found
                 return
@@ -138,8 +138,12 @@ class _Task:
         return self.ends.added_to(segments, until_s) if self.ends else segments
 
     def _look_past_walls(self) -> None:
-        """Find a short path past the walls alone; those near it become active."""
+        """Find a short path past the walls alone; those near it become active.
+
+        Without one those that the straight line touches become active.
+        """
         start = self.scenario.start_m
+        self.to_go = DistanceToGo(self.scenario)
         for spare_cells in (0.8, 0.0):
             rough = DistanceToGo(self.scenario, spare_cells=spare_cells).rough_path(start)
             pulled = self.walls.pulled(rough, CLEAR_M)
@@ -147,6 +151,7 @@ class _Task:
                 self.past_walls, self.least_m = pulled, _length(pulled)
                 self._activate_walls(self.walls.touched(pulled, 0.5 * self.walls.radius_m))
                 return
+        self._activate_walls(self.walls.touched(self.straight, CLEAR_M / 2.0))
 
     def _activate_walls(self, walls: set[int]) -> None:
         self.active_walls |= walls

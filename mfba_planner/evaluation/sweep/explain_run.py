@@ -81,10 +81,8 @@ def explain(completed: CompletedRun) -> list[str]:
 
 def _contact_step(episode: Episode, index: int, number: int) -> str:
     """The step of the first contact, with an obstacle or the walls."""
-    time_s, ttc = (
-        episode.time_s(episode.ticks[index].stamp_ns),
-        _time_to_contact(episode, index, number),
-    )
+    time_s = episode.time_s(episode.ticks[index].stamp_ns)
+    ttc = _time_to_contact(episode, index, number)
     return (
         f"contact: in the step after tick {index} ({time_s:.2f} s)"
         + (f", {ttc:.2f} s into it" if math.isfinite(ttc) else "")
