@@ -14,6 +14,7 @@ from ..core.option_specs import did_you_mean
 from ..core.shipped_files import scenario_names, scenario_path
 from ..simulation.scenario import Scenario
 from .scenario_json import EXAMPLE, UnusualError, as_written
+from .trajectory_file import with_trajectory_files
 
 
 def load_scenario(source: str) -> Scenario:
@@ -24,12 +25,12 @@ def load_scenario(source: str) -> Scenario:
     if source.lstrip().startswith("{"):
         return parse_scenario(source, "inline scenario")
     if source.endswith((".yaml", ".yml", ".json")):
-        return parse_scenario(_read(Path(source)), source)
+        return parse_scenario(_read(Path(source)), source, Path(source).parent)
     known = scenario_names()
     if source in known:
         return parse_scenario(_read(scenario_path(source)), source)
     if os.path.isfile(source):
-        return parse_scenario(_read(Path(source)), source)
+        return parse_scenario(_read(Path(source)), source, Path(source).parent)
     raise ConfigError(
         f"{source!r}: no such scenario; {did_you_mean(source, known)} (or give a .yaml file)"
     )
@@ -43,8 +44,8 @@ def _read(path: Path) -> str:
         raise ConfigError(f"{path}: {reason}; give a readable scenario .yaml") from None
 
 
-def parse_scenario(text: str, origin: str) -> Scenario:
-    """Turn YAML or JSON text into a Scenario.
+def parse_scenario(text: str, origin: str, folder: Path = Path()) -> Scenario:
+    """Turn YAML or JSON text into a Scenario; files that it names are searched in folder.
 
     Raises ConfigError naming origin, value, reason and remedy.
     """
@@ -54,6 +55,7 @@ def parse_scenario(text: str, origin: str) -> Scenario:
     if not isinstance(data, dict):
         raise ConfigError(f"{origin}: a {type(data).__name__}, not a mapping; {EXAMPLE}")
     try:
+        data = with_trajectory_files(data, folder)
         with suppress(UnusualError):
             return as_written(data)
         from .yaml_schema import checked
