@@ -206,10 +206,17 @@ def _with_centers(data: dict[Any, Any]) -> dict[Any, Any]:
 
 
 def _with_center(entry: Any) -> Any:
-    points = entry.get("trajectory") if isinstance(entry, dict) else None
-    if not (isinstance(points, list) and points and isinstance(points[0], list)):
+    if not isinstance(entry, dict) or not entry.get("trajectory") or "center_m" in entry:
         return entry
-    return {"center_m": points[0][1:]} | entry if len(points[0]) == 3 else entry
+    first = entry["trajectory"][0] if isinstance(entry["trajectory"], list) else None
+    is_point = isinstance(first, list) and len(first) == 3
+    # What is no point is refused as such.
+    center = (
+        first[1:]
+        if is_point and all(isinstance(v, int | float) and v == v for v in first)
+        else [0.0, 0.0]
+    )
+    return entry | {"center_m": center}
 
 
 class _Loader(yaml.SafeLoader):
