@@ -19,11 +19,14 @@ from ...core.option_specs import did_you_mean
 from ..scenario_files import parse_scenario
 from .gazebo_world import read_world
 from .imported import MOST_BYTES, Imported, ImportOptions, Plain, Source
+from .people_recording import read_csv, read_eth_ucy
 
 Reader = Callable[[Source, ImportOptions], Imported]
 # name: (how its files end, what it is, its reader)
 FORMATS: dict[str, tuple[tuple[str, ...], str, Reader]] = {
     "gazebo": ((".world", ".sdf"), "Gazebo worlds, such as BARN's", read_world),
+    "csv": ((".csv",), "recorded people: t_s, person, x_m, y_m", read_csv),
+    "eth-ucy": ((".txt",), "recorded people of ETH and UCY: frame, person, x, y", read_eth_ucy),
 }
 _ENDINGS = tuple(ending for endings, _, _ in FORMATS.values() for ending in endings)
 
