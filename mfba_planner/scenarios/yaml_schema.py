@@ -208,15 +208,13 @@ def _with_centers(data: dict[Any, Any]) -> dict[Any, Any]:
 def _with_center(entry: Any) -> Any:
     if not isinstance(entry, dict) or not entry.get("trajectory") or "center_m" in entry:
         return entry
-    first = entry["trajectory"][0] if isinstance(entry["trajectory"], list) else None
-    is_point = isinstance(first, list) and len(first) == 3
-    # What is no point is refused as such.
-    center = (
-        first[1:]
-        if is_point and all(isinstance(v, int | float) and v == v for v in first)
-        else [0.0, 0.0]
-    )
-    return entry | {"center_m": center}
+    points = entry["trajectory"]
+    first = points[0] if isinstance(points, list) else None
+    is_knot = isinstance(first, list) and len(first) == 3
+    numbers = first[1:] if is_knot and isinstance(first, list) else []
+    are_finite = bool(numbers) and all(isinstance(v, int | float) and v - v == 0 for v in numbers)
+    # Points that are none are refused as such.
+    return entry | {"center_m": numbers if are_finite else [0.0, 0.0]}
 
 
 class _Loader(yaml.SafeLoader):

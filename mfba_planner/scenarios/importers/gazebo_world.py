@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gazebo .world and .sdf files: cylinders, spheres and boxes that stand, as in BARN's worlds.
 
+Models that a plugin moves along keyframes are those of DynaBARN, with its task (dynabarn.py).
+
 Start, goal, robot and time limit of such a file are those of the BARN challenge (Perille et al.,
 SSRR 2020; Xiao et al. 2022): a Jackal that starts at (-2.25, 3), heading +y, and drives 10 m along
 +y within 100 s. Its radius is that of a circle as wide as the robot.
@@ -13,10 +15,12 @@ import re
 from collections import Counter
 from dataclasses import dataclass, field
 from itertools import islice
+from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from ...core.errors import ConfigError
+from .dynabarn import LOST, motion_of_plugin, task
 from .imported import (
     MOST_OBSTACLES,
     Imported,
@@ -62,7 +66,9 @@ class Pose(NamedTuple):
 class _Found:
     """What a world holds."""
 
+    folder: Path  # of the file, for sources of plugins
     circles: list[Plain] = field(default_factory=list)
+    moving: bool = False
     boxes: list[Plain] = field(default_factory=list)
     lost: Counter[str] = field(default_factory=Counter)
 
@@ -72,7 +78,7 @@ def read_world(source: Source, options: ImportOptions) -> Imported:
     world = _world(source.text)
     models = list(islice(world.iter("model"), _MODELS))
     check_count("models", sum(1 for model in models if model.find("link") is not None))
-    found, moved = _Found(), _state(world)
+    found, moved = _Found(folder=source.folder), _state(world)
     for model in world.findall("model"):
         _add_model(model, Pose(), moved, found)
     for kind in ("include", "actor", "population"):
@@ -82,7 +88,11 @@ def read_world(source: Source, options: ImportOptions) -> Imported:
     if not found.circles and not found.boxes:
         lost = f" (lost: {_sentence(found.lost)})" if found.lost else ""
         raise ConfigError(f"no cylinder, sphere or box in it{lost}; give a world of such models")
-    scenario: Plain = {
+    if found.moving:
+        found.lost[LOST] += 1
+        scenario = {**task(source.name, found.circles, options), **static_shapes(found.boxes)}
+        return Imported(scenarios=[scenario], lost=_lines(found.lost))
+    scenario = {
         "name": source.name,
         "description": "imported from a Gazebo world",
         "start_m": list(options.start_m or START_M),
@@ -143,8 +153,10 @@ def _add_model(
     model: ElementTree.Element, frame: Pose, moved: dict[str, Pose], found: _Found
 ) -> None:
     pose = moved.get(model.get("name", "")) or frame * _pose(model)
-    if any("actor" in (plugin.get("name") or "") for plugin in model.findall("plugin")):
-        found.lost["model that a plugin moves"] += 1
+    plugin = model.find("plugin")
+    if plugin is not None:
+        _add_moving(model, plugin.get("filename", ""), found)
+        return
     for link in model.findall("link"):
         at = pose * _pose(link)
         for collision in link.findall("collision"):
@@ -153,6 +165,18 @@ def _add_model(
                 _add_shape(geometry, at * _pose(collision), found)
     for inner in model.findall("model"):
         _add_model(inner, pose, {}, found)
+
+
+def _add_moving(model: ElementTree.Element, file_name: str, found: _Found) -> None:
+    """A model that a plugin moves: its keyframes are in the plugin's source."""
+    motion = motion_of_plugin(file_name, found.folder)
+    radius = model.findtext("link/collision/geometry/cylinder/radius")
+    if motion is None or radius is None:
+        found.lost["model that a plugin moves, without its source NAME.cc in a folder here"] += 1
+        return
+    size = _above_zero(number(radius, "radius"), "radius")
+    found.circles.append({"radius_m": size, **motion})
+    found.moving = True
 
 
 def _add_shape(geometry: ElementTree.Element, at: Pose, found: _Found) -> None:

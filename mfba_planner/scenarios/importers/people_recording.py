@@ -42,7 +42,12 @@ def csv_tracks(text: str) -> list[Track]:
         if missing := [name for name in COLUMNS if name not in names]:
             raise ConfigError(f"no column {missing[0]}; give {', '.join(COLUMNS)}")
         return tracks_of(
-            (row["person"], *(_value(row[name], line) for name in ("t_s", "x_m", "y_m")))
+            (
+                row["person"],
+                _value(row["t_s"], line),
+                _value(row["x_m"], line),
+                _value(row["y_m"], line),
+            )
             for line, row in enumerate(reader, start=2)
         )
     except csv.Error as error:
