@@ -5,6 +5,7 @@ import copy
 import json
 import math
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -408,9 +409,8 @@ def test_whatever_a_file_holds_it_is_imported_or_refused(
     name: str, data: Any, tmp_path: Path
 ) -> None:
     path, refused, total = tmp_path / name, 0, 0
-    for changed in mutations(data):
-        text = json.dumps(changed) if name.endswith("json") else yaml.safe_dump(changed)
-        path.write_text(text, encoding="utf-8")
+    for changed in islice(mutations(data), 0, None, 2 if name.endswith("json") else 7):
+        path.write_text(json.dumps(changed), encoding="utf-8")  # JSON is YAML too
         (result,) = import_files([path], ImportOptions())
         assert bool(result.error) != bool(result.texts)
         assert "\n" not in result.error

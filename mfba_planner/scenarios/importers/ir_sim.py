@@ -75,8 +75,9 @@ def static_shapes(
 
 
 def _yaml(text: str) -> Plain:
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in C where it is built
     try:
-        data = yaml.safe_load(text)
+        data = yaml.load(text, Loader=loader)
     except (yaml.YAMLError, ValueError, RecursionError, AttributeError, LookupError) as error:
         reason = " ".join(str(error).split())[:80]
         raise ConfigError(f"not YAML ({reason}); give an IR-SIM world") from None
