@@ -86,6 +86,11 @@ def _set_of(name: str, texts: Sequence[str], sources: Iterable[str]) -> Scenario
     )
 
 
+def single_scenario(scenario: Scenario) -> ScenarioSet:
+    """The suite of one scenario."""
+    return _set_of(FILES, [scenario_to_json(scenario)], [])
+
+
 def are_files(arguments: Sequence[str]) -> bool:
     """Whether the arguments name scenario files or a directory, and not a built-in suite."""
     if len(arguments) > 1:
