@@ -64,7 +64,7 @@ def test_a_recording_becomes_crossings_among_its_people() -> None:
         t0 = float(plain["description"].split()[-3])
         there = 0
         for t in np.arange(0.0, 59.0, 1.7).tolist():
-            seen = [
+            sensed = [
                 center_at(o, t) for o in scenario.obstacles if is_present(o, t)
             ]  # fmt: skip
             recorded = [
@@ -73,7 +73,7 @@ def test_a_recording_becomes_crossings_among_its_people() -> None:
                 if times[0] + 1e-3 <= t0 + t <= times[-1] - 1e-3
             ]
             there += len(recorded)
-            assert np.allclose(sorted(seen), sorted(recorded), atol=2e-3)
+            assert np.allclose(sorted(sensed), sorted(recorded), atol=2e-3)
         assert there > 20
 
 

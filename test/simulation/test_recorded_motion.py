@@ -194,15 +194,15 @@ def test_what_is_absent_is_not_near(count: int) -> None:
 def test_no_sensor_sees_what_is_absent() -> None:
     one = recorded(appears_s=1.5)
     robot = Robot(lidar=Lidar(beams=90, range_max_m=9.0))
-    for tick, seen in ((10, False), (16, True), (40, True), (41, False)):
+    for tick, sensed in ((10, False), (16, True), (40, True), (41, False)):
         world = World(scenario(one, robot=robot), 10**8, 0.02)
         world.tick = tick
         reading = world.read()
         assert reading.scan is not None
-        assert np.isfinite(reading.scan.ranges_m).any() == seen
-        assert len(world.centers()) == seen
+        assert np.isfinite(reading.scan.ranges_m).any() == sensed
+        assert len(world.centers()) == sensed
         known = Perception("known")(world, SensorParams(sensing_range_m=9.0))
-        assert len(known.circles or ()) == seen
+        assert len(known.circles or ()) == sensed
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -220,7 +220,7 @@ def test_the_oracle_s_own_formula_follows_the_same_motion(seed: int) -> None:
             assert before[1] == pytest.approx(after[0])
 
 
-def test_the_oracle_waits_for_nobody_who_is_gone() -> None:
+def test_the_oracle_does_not_wait_for_what_has_vanished() -> None:
     blocking = Obstacle(center_m=(4.0, 0.0), radius_m=2.0)
     straight = solve(scenario(replace(blocking, vanishes_s=0.5)), 1.0)
     assert (straight.certificate, straight.length_m) == (Certificate.FEASIBLE, 9.0)
@@ -245,8 +245,8 @@ def test_a_run_meets_them_only_while_they_are_there() -> None:
         episode = run(world, planner=params, path_planner=Straight(params, SensorParams(), 0))
         result = evaluate(episode)
         assert result.collisions == hits
-        seen = {n for tick in episode.ticks for n in within_range(episode, tick)}
-        assert seen == set(result.encounters)
+        sensed = {n for tick in episode.ticks for n in within_range(episode, tick)}
+        assert sensed == set(result.encounters)
 
 
 def test_the_start_may_be_where_somebody_comes_later() -> None:

@@ -121,18 +121,18 @@ def _walker(agent: Plain, options: ImportOptions) -> Plain:
         points = [[x + start[0], y + start[1]] for x, y in points]
     radius = number(agent.get("obstacle_radius", options.person_radius_m), "obstacle_radius")
     speed = number(agent.get("vmax", agent.get("linear_velocity", _SPEED_MPS)), "vmax")
-    way = [start, *points]
-    way += reversed(way[:-1]) if agent.get("mode") == "yoyo" else [start]
-    knots = _timed(way, speed)
+    corners = [start, *points]
+    corners += reversed(corners[:-1]) if agent.get("mode") == "yoyo" else [start]
+    knots = _timed(corners, speed)
     if len(knots) < 2:
         return {"center_m": rounded(*start), "radius_m": radius}
     return {"radius_m": radius, "trajectory": knots, "loop": True}
 
 
-def _timed(way: list[list[float]], speed: float) -> list[list[float]]:
-    """Knots along a way at one speed; without a speed, or for a point, the first only."""
-    knots, t = [rounded(0.0, *way[0])], 0.0
-    for (ax, ay), (bx, by) in zip(way, way[1:]):
+def _timed(corners: list[list[float]], speed: float) -> list[list[float]]:
+    """Knots along a line of corners at one speed; without a speed, or for a point, the first only."""
+    knots, t = [rounded(0.0, *corners[0])], 0.0
+    for (ax, ay), (bx, by) in zip(corners, corners[1:]):
         step = math.hypot(bx - ax, by - ay)
         if step > 1e-6 and speed > 0.0:
             t += step / speed

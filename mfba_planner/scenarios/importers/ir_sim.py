@@ -224,8 +224,8 @@ def _motion(entry: Plain, start: tuple[float, float], goal: object, found: _Foun
     limits: Any = entry.get("vel_max", [_SPEED_MPS])
     speed = number(limits[0] if isinstance(limits, list) and limits else limits, "vel_max")
     x, y = numbers(goal, 2, "obstacle goal")
-    way_m = math.dist(start, (x, y))
-    if speed <= 0.0 or way_m < 1e-6:
+    length_m = math.dist(start, (x, y))
+    if speed <= 0.0 or length_m < 1e-6:
         return None
-    knots = [rounded(0.0, *start), rounded(way_m / speed, x, y)]
+    knots = [rounded(0.0, *start), rounded(length_m / speed, x, y)]
     return {"trajectory": knots, "stays": True}
