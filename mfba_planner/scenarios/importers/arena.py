@@ -130,7 +130,7 @@ def _walker(agent: Plain, options: ImportOptions) -> Plain:
 
 
 def _timed(corners: list[list[float]], speed: float) -> list[list[float]]:
-    """Knots along a line of corners at one speed; without a speed, or for a point, the first only."""
+    """Knots along a line of corners at one speed; without a speed the first only."""
     knots, t = [rounded(0.0, *corners[0])], 0.0
     for (ax, ay), (bx, by) in zip(corners, corners[1:]):
         step = math.hypot(bx - ax, by - ay)
