@@ -386,7 +386,8 @@ def mutations(data: Any) -> Iterator[Any]:
                 yield from paths(inner, (*path, key))
 
     for path in paths(data):
-        for other in (None, "x", [], {"a": 1}, -1.0, float("nan")):
+        others: list[Any] = [None, "x", [], {"a": 1}, -1.0, float("nan")]
+        for other in others:
             changed = copy.deepcopy(data)
             holder = changed
             for key in path[:-1]:
