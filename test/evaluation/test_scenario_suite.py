@@ -2,6 +2,8 @@
 """The user's own suite: which files are its worlds, and that their content is what counts."""
 
 import json
+import pickle
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -194,6 +196,21 @@ def test_chunks_carry_their_own_worlds_only(folder: Path, monkeypatch: pytest.Mo
         held.append(list(found.worlds))
     assert held == [[0], [1], [2]] * 2
     assert sweep(spec, workers=2).rows == sweep(spec).rows
+
+
+def test_a_chunk_needs_no_file(folder: Path) -> None:
+    """As on another machine, to which an executor such as dask sends it."""
+    scenarios, _ = read_scenario_files([str(folder)])
+    chunks = chunks_of(spec_of(scenarios, "straight"))
+    sent = [pickle.dumps(chunk) for chunk in chunks]
+    expected = [chunk.run() for chunk in chunks]
+    shutil.rmtree(folder)
+    for data, columns in zip(sent, expected, strict=True):
+        found = pickle.loads(data).run()
+        timings = ("decision_us", "decision_max_us", "wall_ms")
+        assert {k: v for k, v in found.items() if k not in timings} == {
+            k: v for k, v in columns.items() if k not in timings
+        }
 
 
 def test_a_changed_file_is_noticed_and_the_old_content_is_still_explained(
