@@ -30,16 +30,20 @@ def main(args: list[str]) -> int:
     if out.exists() and not (out.is_dir() and not any(out.iterdir())):
         raise OutputError(f"{out}: exists and is not empty; choose another --out")
     written = refused = 0
+    lost: dict[str, list[Path]] = {}
     for result in import_files(paths, options, parsed.format):
         if result.error:
             refused += 1
             print(f"refused: {result.error}", file=sys.stderr, flush=True)
         for line in result.lost:
-            print(f"{result.path}: lost: {line}")
+            lost.setdefault(line, []).append(result.path)
         for name, text in result.texts.items():
             _make(out)
             write_new(out / f"{name}.yaml", text.encode())
             written += 1
+    for line, files in lost.items():
+        more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+        print(f"{files[0]}{more}: lost: {line}")
     if not written:
         raise MfbaError(f"none of {len(paths)} files was imported, see above; nothing is written")
     print(f"wrote {out}: {written} scenarios of {len(paths) - refused} files")

@@ -33,7 +33,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_folder_becomes_scenarios(folder: Path, capsys: Capture) -> None:
     assert mfba("import", "worlds", "--out", "out", "--robot-radius", "0.3") == 0
     out = capsys.readouterr().out.splitlines()
-    assert out[0] == "worlds/world_0.world: lost: 1 x <actor> of a, which is not in the file"
+    assert [line.removeprefix("worlds/world_0.world and 2 more: lost: ") for line in out[:2]] == [
+        "the heading +y at the start: scenarios begin with +x",
+        "1 x <actor> of a, which is not in the file",
+    ]
     assert out[-1] == "wrote out: 3 scenarios of 3 files"
     scenario = load_scenario("out/world_2.yaml")
     assert (scenario.name, scenario.robot_radius_m) == ("world_2", 0.3)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.scenarios.importers.gazebo_world import read_world
+from mfba_planner.scenarios.importers.gazebo_world import LOST_HEADING, read_world
 from mfba_planner.scenarios.importers.imported import Imported, ImportOptions, Source
 
 
@@ -35,7 +35,7 @@ def test_a_world_of_cylinders_has_the_task_of_barn() -> None:
     ground = model("<plane><normal>0 0 1</normal></plane>", "0 0 0 0 0 0", "ground_plane")
     sun = "<include><uri>model://sun</uri></include>"
     found = read(world(sun, ground, cylinder("-0.075 0.075 0.5 0 -0 0"), cylinder("1 2 0 0 0 3")))
-    assert found.lost == []
+    assert found.lost == [LOST_HEADING]
     assert found.scenarios == [
         {
             "name": "w",
@@ -111,6 +111,7 @@ def test_what_is_lost_is_named_and_counted() -> None:
     )
     assert len(found.scenarios[0]["obstacles"]) == 1
     assert found.lost == [
+        LOST_HEADING,
         "1 x cylinder that lies or leans",
         "2 x <mesh> as a shape",
         "1 x shape that ends below 0.05 m, as a floor does",

@@ -25,7 +25,7 @@ def write(folder: Path, name: str, text: str = GOOD) -> Path:
 def test_an_imported_file_is_a_scenario(tmp_path: Path) -> None:
     path = write(tmp_path, "world_7.world")
     (found,) = import_files([path], ImportOptions())
-    assert (found.error, found.lost, list(found.texts)) == ("", [], ["world_7"])
+    assert (found.error, len(found.lost), list(found.texts)) == ("", 1, ["world_7"])
     scenario = parse_scenario(found.texts["world_7"], "x")
     assert scenario.name == "world_7"
     assert scenario.obstacles[0].center_m == (1.0, 5.0)

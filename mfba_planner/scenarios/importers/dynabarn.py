@@ -21,7 +21,10 @@ START_M, GOAL_M = (11.0, 0.0), (-9.0, 0.0)
 ROBOT_RADIUS_M = 0.22
 TIME_LIMIT_S = 100.0
 DISC_RADIUS_M = 0.5
-LOST = "the splines that Gazebo lays through keyframes: discs move straight between them"
+LOST = (
+    "the splines that Gazebo lays through keyframes: discs move straight between them",
+    "the heading -x at the start: scenarios begin with +x",
+)
 
 _LENGTH = re.compile(r"PoseAnimation\s*\(\s*\"[^\"]*\"\s*,\s*([^,\s]+)\s*,\s*(true|false)")
 _KEY = re.compile(
@@ -47,7 +50,7 @@ def read_dynabarn(source: Source, options: ImportOptions) -> Imported:
             raise ConfigError(f"world {world}: no keyframes of {missing[0]}; mend the file")
         discs = [_disc(moving[name]) for name in names]
         scenarios.append(task(f"{source.name}-{world}", discs, options))
-    return Imported(scenarios=scenarios, lost=[LOST])
+    return Imported(scenarios=scenarios, lost=list(LOST))
 
 
 def task(name: str, obstacles: list[Plain], options: ImportOptions) -> Plain:

@@ -30,11 +30,13 @@ from .imported import (
     check_count,
     number,
     rounded,
+    static_shapes,
 )
 
 START_M, GOAL_M = (-2.25, 3.0), (-2.25, 13.0)
 ROBOT_RADIUS_M = 0.22
 TIME_LIMIT_S = 100.0
+LOST_HEADING = "the heading +y at the start: scenarios begin with +x"
 LEAST_HEIGHT_M = 0.05  # what ends lower is floor
 TILT_RAD = 0.01  # a cylinder leaning further has no circle as its footprint
 _GROUND = {"model://sun", "model://ground_plane"}
@@ -89,9 +91,8 @@ def read_world(source: Source, options: ImportOptions) -> Imported:
         lost = f" (lost: {_sentence(found.lost)})" if found.lost else ""
         raise ConfigError(f"no cylinder, sphere or box in it{lost}; give a world of such models")
     if found.moving:
-        found.lost[LOST] += 1
         scenario = {**task(source.name, found.circles, options), **static_shapes(found.boxes)}
-        return Imported(scenarios=[scenario], lost=_lines(found.lost))
+        return Imported(scenarios=[scenario], lost=[*LOST, *_lines(found.lost)])
     scenario = {
         "name": source.name,
         "description": "imported from a Gazebo world",
@@ -102,12 +103,8 @@ def read_world(source: Source, options: ImportOptions) -> Imported:
         "obstacles": found.circles,
         **static_shapes(found.boxes),
     }
-    return Imported(scenarios=[scenario], lost=_lines(found.lost))
-
-
-def static_shapes(boxes: list[Plain]) -> Plain:
-    """The keys of a scenario for what stands and is no circle."""
-    return {"boxes": boxes} if boxes else {}
+    lost = [] if options.start_m else [LOST_HEADING]
+    return Imported(scenarios=[scenario], lost=[*lost, *_lines(found.lost)])
 
 
 def _world(text: str) -> ElementTree.Element:

@@ -72,6 +72,16 @@ class Imported:
     lost: list[str] = field(default_factory=list)
 
 
+def static_shapes(
+    boxes: list[Plain],
+    polygons: list[list[list[float]]] | None = None,
+    segments: list[list[float]] | None = None,
+) -> Plain:
+    """The keys of a scenario for what stands and is no circle; those that are used."""
+    shapes = {"boxes": boxes, "polygons_m": polygons, "segments_m": segments}
+    return {key: given for key, given in shapes.items() if given}
+
+
 def rounded(*values: float) -> list[float]:
     """Numbers as written into a scenario file; -0.0 becomes 0.0."""
     return [round(value, DIGITS) + 0.0 for value in values]

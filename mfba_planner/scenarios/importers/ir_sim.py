@@ -12,7 +12,17 @@ from typing import Any
 import yaml
 
 from ...core.errors import ConfigError
-from .imported import Imported, ImportOptions, Plain, Source, check_count, number, numbers, rounded
+from .imported import (
+    Imported,
+    ImportOptions,
+    Plain,
+    Source,
+    check_count,
+    number,
+    numbers,
+    rounded,
+    static_shapes,
+)
 
 TIME_LIMIT_S = 120.0
 _SPEED_MPS = 1.0  # IR-SIM's default of vel_max
@@ -64,14 +74,6 @@ def read_ir_sim(source: Source, options: ImportOptions) -> Imported:
         **static_shapes(found.boxes, found.polygons, found.segments),
     }
     return Imported(scenarios=[scenario], lost=[f"{n} x {what}" for what, n in found.lost.items()])
-
-
-def static_shapes(
-    boxes: list[Plain], polygons: list[list[list[float]]], segments: list[list[float]]
-) -> Plain:
-    """The keys of a scenario for what stands and is no circle."""
-    shapes = {"boxes": boxes, "polygons_m": polygons, "segments_m": segments}
-    return {key: given for key, given in shapes.items() if given}
 
 
 def _yaml(text: str) -> Plain:
