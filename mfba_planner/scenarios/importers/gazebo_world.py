@@ -103,8 +103,8 @@ def read_world(source: Source, options: ImportOptions) -> Imported:
         "obstacles": found.circles,
         **static_shapes(found.boxes),
     }
-    lost = [] if options.start_m else [LOST_HEADING]
-    return Imported(scenarios=[scenario], lost=[*lost, *_lines(found.lost)])
+    heading = [] if options.start_m else [LOST_HEADING]
+    return Imported(scenarios=[scenario], lost=[*heading, *_lines(found.lost)])
 
 
 def _world(text: str) -> ElementTree.Element:
