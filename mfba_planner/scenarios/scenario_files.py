@@ -15,6 +15,7 @@ from ..core.shipped_files import scenario_names, scenario_path
 from ..simulation.scenario import Scenario
 from .scenario_json import EXAMPLE, UnusualError, as_written
 from .text_files import read_text
+from .trajectory_file import with_trajectory_files
 
 
 def load_scenario(source: str) -> Scenario:
@@ -41,8 +42,8 @@ def _parse_file(path: Path, origin: str) -> Scenario:
     return parse_scenario(text, origin, path.parent)
 
 
-def parse_scenario(text: str, origin: str, directory: Path = Path()) -> Scenario:
-    """Turn YAML or JSON text into a Scenario; a map's path is relative to the directory.
+def parse_scenario(text: str, origin: str, folder: Path = Path()) -> Scenario:
+    """Turn YAML or JSON text into a Scenario; files that it names are searched in folder.
 
     Raises ConfigError naming origin, value, reason and remedy.
     """
@@ -52,11 +53,12 @@ def parse_scenario(text: str, origin: str, directory: Path = Path()) -> Scenario
     if not isinstance(data, dict):
         raise ConfigError(f"{origin}: a {type(data).__name__}, not a mapping; {EXAMPLE}")
     try:
+        data = with_trajectory_files(data, folder)
         with suppress(UnusualError):
             return as_written(data)
         from .yaml_schema import checked
 
-        return checked(data, directory)
+        return checked(data, folder)
     except ConfigError as error:
         raise ConfigError(f"{origin}: {error}") from None
 

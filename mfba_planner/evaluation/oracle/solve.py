@@ -115,7 +115,7 @@ class _Task:
             self._look_past_walls()
             horizon_s = min(limit_s, 1.5 * self.least_m / self.v + 5.0)
             segments = self._segments(horizon_s)
-        if found := self._refined(self._by_tangents(segments), segments):
+        if found := self._refined(self._by_tangents(segments, horizon_s), segments):
             yield from self._compared_with_lattice(found, segments)
             return
         moving = uniform_segments(self.scenario, limit_s)
@@ -123,7 +123,9 @@ class _Task:
         if self.proof:
             return
         segments = self._segments(limit_s)
-        if horizon_s < limit_s and (found := self._refined(self._by_tangents(segments), segments)):
+        if horizon_s < limit_s and (
+            found := self._refined(self._by_tangents(segments, limit_s), segments)
+        ):
             yield from self._compared_with_lattice(found, segments)
             return
         for times in (1.25, 2.5, 5.0):
@@ -195,7 +197,7 @@ class _Task:
     def _is_free(self, path: np.ndarray, segments: UniformSegments) -> bool:
         return not (self._touched(path, segments) or self.walls.touched(path, CLEAR_M / 2.0))
 
-    def _by_tangents(self, segments: UniformSegments) -> list[np.ndarray]:
+    def _by_tangents(self, segments: UniformSegments, until_s: float) -> list[np.ndarray]:
         """Shortest paths among active obstacles; obstacles the best one touches become active.
 
         A path shortest among some obstacles and free of all is shortest among all. With too many
@@ -215,6 +217,7 @@ class _Task:
                 segments.select(sorted(self.active)),
                 self.params,
                 self.inside,
+                until_s,
                 self.walls.select(self.active_walls),
                 self.to_go,
                 bound_s,

@@ -79,12 +79,14 @@ class Search:
         segments: UniformSegments,
         params: SearchParams,
         inside: Walls | None = None,
+        until_s: float | None = None,
         walls: StaticWalls = NO_WALLS,
         to_go: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
         bound_s: float = math.inf,
     ) -> None:
         """Prepare; speed in m/s; all paths stay within the rectangle inside, if given.
 
+        until_s is until when the segments tell the whole motion; None: until the last one ends.
         The ends of the walls have to be among the segments. to_go is a lower bound of the
         distance to the goal, the straight line by default; bound_s the duration of a known path.
         """
@@ -97,7 +99,7 @@ class Search:
         self.end_y = segments.y + segments.vy * (segments.t1 - segments.t0)
         same = segments.obstacle[1:] == segments.obstacle[:-1]
         self.kinked = np.append(same, False)  # the next segment is of the same obstacle
-        self.horizon = float(segments.t1.max())
+        self.horizon = float(segments.t1.max()) if until_s is None else until_s
         fast = segments.vx**2 + segments.vy**2 >= speed_mps**2
         self.roots = (1.0, -1.0) if fast.any() else (1.0,)
 
