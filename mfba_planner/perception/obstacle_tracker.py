@@ -64,6 +64,7 @@ class Tracker:
         """Start without tracks."""
         self.params = params or TrackingParams()
         self._reader = BeamReader()
+        self.beams: Beams | None = None  # of the last scan
         self._stamp_ns: int | None = None
         self._pose = Pose2D(0.0, 0.0)
         self._clear()
@@ -118,7 +119,7 @@ class Tracker:
                 velocity = ((pose.x - last.x) / dt, (pose.y - last.y) / dt, turn / dt)
         self._stamp_ns, self._pose = stamp_ns, pose
         p, bank = self.params, self._bank
-        beams = self._reader.read(pose, velocity, scan)
+        self.beams = beams = self._reader.read(pose, velocity, scan)
         origin = np.array(pose.position)
         bank.pass_time(dt)
         self._free.pass_time(dt)
@@ -193,6 +194,16 @@ class Tracker:
         radius = robot_radius_m + p.allowance_m
         circles += [Circle(center_m=point, radius_m=radius) for point in self._walls]
         return tuple(circles)
+
+    def moving(self) -> Array:
+        """Rows (x, y, vx, vy, r) of the tracks that move, by the pose of the last scan; (m, 5)."""
+        bank = self._bank
+        rows = bank.state[bank.moving]
+        origin = np.array(self._pose.position)
+        shift_x, shift_y = self._pose_error.shift(rows[:, 0], rows[:, 1], origin)
+        rows[:, 0] += shift_x
+        rows[:, 1] += shift_y
+        return rows
 
     def _expected_times(self, beams: Beams, origin: Array) -> Array:
         """When the beams meet each track, s after the stamp; (m,)."""

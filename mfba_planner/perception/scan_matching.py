@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Error of a scan's pose against the local map: point-to-line scan matching with a prior.
+
+The map stands, so whatever moves all returns of a scan alike is an error of the odometry. The
+prior's variances are learnt, and with an odometry that does not err the error found is nearly 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from . import small_matrices as sm
+
+Array = np.ndarray
+Nearest = Callable[[Array, Array, int], tuple[Array, Array, Array]]
+
+_MOST = 180  # returns that are matched
+_FEWEST = 15
+_ENOUGH = 60.0  # returns that count in full: errors of neighbours are alike
+_LEARNING, _MEAN_SHARE = 0.1, 0.15
+_LEAST_SD, _MOST_SD, _FIRST_SD = 1e-3, 0.06, 0.02  # m and rad
+_LEAST_NOISE, _MOST_NOISE, _FIRST_NOISE = 0.003, 0.05, 0.01  # m
+_QUIET_SD = 4e-3  # below it one pass is enough
+_FAR_M = 3.0
+_MOST_REACH = 3  # cells
+
+
+class ScanMatching:
+    """The error (x, y, turn) of the present pose, relative to the map, and its variances.
+
+    Measured points = true points + (x, y) + turn around the robot, as in pose_error.py.
+    """
+
+    def __init__(self, cell_m: float) -> None:
+        """Start without an error."""
+        self._cell_m = cell_m
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was learnt."""
+        self.error = (0.0, 0.0, 0.0)
+        self.sd_m = self.sd_rad = _FIRST_SD  # of what is left of the error
+        self.noise_m = _FIRST_NOISE  # of a return
+        self._mean = (0.0, 0.0, 0.0)
+        self._variance_m2 = self._variance_rad2 = _FIRST_SD**2
+
+    def estimate(
+        self, x: Array, y: Array, nx: Array, ny: Array, origin: tuple[float, float],
+        nearest: Nearest,
+    ) -> None:  # fmt: skip
+        """Find the error from returns (k,) in odom with their normals.
+
+        nearest(x, y, cells) gives the x and y of the map's nearest points and the distances.
+        """
+        step = max(1, math.ceil(x.size / _MOST))
+        x, y, nx, ny = x[::step] - origin[0], y[::step] - origin[1], nx[::step], ny[::step]
+        self.error = self._mean
+        vm, vr = self._variance_m2, self._variance_rad2
+        wide = math.sqrt(vm) + _FAR_M * math.sqrt(vr)
+        reach = min(max(math.ceil(2.0 * wide / self._cell_m), 1), _MOST_REACH)
+        passes = 1 if max(vm, vr) < _QUIET_SD**2 else 3
+        left: Array | None = None
+        rest = np.empty(0)
+        for k in range(passes):
+            found = self._step(x, y, nx, ny, origin, nearest, reach if k == 0 else 1)
+            if found is None:
+                break
+            left, rest = found
+        if left is None:
+            self.sd_m, self.sd_rad = math.sqrt(vm), math.sqrt(vr)
+            self.error = self._mean
+            return
+        self.sd_m = math.sqrt(0.5 * (left[0, 0] + left[1, 1]))
+        self.sd_rad = math.sqrt(left[2, 2])
+        self._learn(left, rest)
+
+    def _step(
+        self, x: Array, y: Array, nx: Array, ny: Array, origin: tuple[float, float],
+        nearest: Nearest, reach: int,
+    ) -> tuple[Array, Array] | None:  # fmt: skip
+        """One Gauss-Newton step; the covariance that is left, and the distances from lines."""
+        ex, ey, turn = self.error
+        c, s = math.cos(turn), math.sin(turn)
+        rx, ry = c * x + s * y, c * y - s * x
+        nx, ny = c * nx + s * ny, c * ny - s * nx
+        zx, zy = rx + (origin[0] - ex), ry + (origin[1] - ey)
+        qx, qy, d = nearest(zx, zy, reach)
+        near = np.flatnonzero(d <= reach * self._cell_m)
+        if near.size < _FEWEST:
+            return None
+        nx, ny, rx, ry = nx[near], ny[near], rx[near], ry[near]
+        rest = nx * (zx[near] - qx[near]) + ny * (zy[near] - qy[near])
+        soft = max(3.0 * self.noise_m, 0.5 * reach * self._cell_m if reach > 1 else 0.0)
+        w = rest / soft
+        w = 1.0 / (1.0 + w * w)
+        w *= w
+        w *= min(1.0, _ENOUGH / near.size) / (self.noise_m * self.noise_m)
+        lever = nx * ry - ny * rx
+        wx, wy, wr = w * nx, w * ny, w * lever
+        rows = np.array(
+            (wx * nx, wx * ny, -wx * lever, wy * ny, -wy * lever, wr * lever,
+             wx * rest, wy * rest, -wr * rest)
+        )  # fmt: skip
+        # accumulate adds in order on every machine
+        total = np.add.accumulate(rows, axis=1)[:, -1].tolist()
+        xx, xy, xr, yy, yr, rr, bx, by, br = total
+        im, ir = 1.0 / self._variance_m2, 1.0 / self._variance_rad2
+        mx, my, mt = self._mean
+        matrix = np.array([[[xx + im, xy, xr], [xy, yy + im, yr], [xr, yr, rr + ir]]])
+        left: Array = sm.inverse(matrix)[0]
+        bx, by, br = bx + im * (mx - ex), by + im * (my - ey), br + ir * (mt - turn)
+        (a, b, e), (_, f, g), (_, _, h) = left.tolist()
+        self.error = (
+            ex + a * bx + b * by + e * br,
+            ey + b * bx + f * by + g * br,
+            turn + e * bx + g * by + h * br,
+        )
+        return left, rest
+
+    def _learn(self, left: Array, rest: Array) -> None:
+        ex, ey, turn = (e - m for e, m in zip(self.error, self._mean))
+        second = 0.5 * (ex * ex + ey * ey + float(left[0, 0]) + float(left[1, 1]))
+        vm = self._variance_m2 + _LEARNING * (second - self._variance_m2)
+        vr = self._variance_rad2
+        vr += _LEARNING * (turn * turn + float(left[2, 2]) - vr)
+        self._variance_m2, self._variance_rad2 = _limited(vm), _limited(vr)
+        mx, my, mt = (m + _MEAN_SHARE * (e - m) for e, m in zip(self.error, self._mean))
+        self._mean = (mx, my, mt)
+        sample = 1.48 * float(np.sort(np.abs(rest))[rest.size // 2])
+        noise = self.noise_m + _LEARNING * (sample - self.noise_m)
+        self.noise_m = min(max(noise, _LEAST_NOISE), _MOST_NOISE)
+
+    def corrected(self, x: Array, y: Array, origin: tuple[float, float]) -> tuple[Array, Array]:
+        """Points of odom, as the present pose has them, in the map's frame."""
+        ex, ey, turn = self.error
+        c, s = math.cos(turn), math.sin(turn)
+        dx, dy = x - origin[0], y - origin[1]
+        return c * dx + s * dy + (origin[0] - ex), c * dy - s * dx + (origin[1] - ey)
+
+    def measured(self, x: Array, y: Array, origin: tuple[float, float]) -> tuple[Array, Array]:
+        """Points of the map's frame in odom, as the present pose has it."""
+        ex, ey, turn = self.error
+        c, s = math.cos(turn), math.sin(turn)
+        dx, dy = x - (origin[0] - ex), y - (origin[1] - ey)
+        return c * dx - s * dy + origin[0], c * dy + s * dx + origin[1]
+
+
+def _limited(variance: float) -> float:
+    return min(max(variance, _LEAST_SD**2), _MOST_SD**2)
