@@ -6,8 +6,8 @@ suite, driven by `predictive` from the lidar, at most 40 s each. BARN's worlds a
 package: FILE has columns world, x_m, y_m, radius_m of cylinders; the robot of 0.22 m starts at
 (-2.25, 3), its goal is 10 m further.
 
-ghosts: points more than 0.1 m (0.15 m with noise) from everything that stands. on movers: points
-on moving discs. missed: returns from standing discs, in view for 0.5 s, without a point within
+Per scan, from 1 s after the start: points, those on moving discs, and ghosts, which are more than
+0.1 m (0.15 m with noise) from everything that stands and on no moving disc. missed: returns from standing discs, in view for 0.5 s, without a point within
 0.1 m (0.15 m). sharp: distance of the points from the outline, median and 95th percentile.
 """
 
@@ -82,6 +82,7 @@ ROWS = {
 class Errors:
     """Counts over all scans of a row."""
 
+    scans: int = 0
     points: int = 0
     ghosts: int = 0
     on_movers: int = 0
@@ -146,11 +147,13 @@ class Judge:
         off, _ = surface(at, discs[~moves])
         on_mover, _ = surface(at, discs[moves])
         ghost = np.abs(off) > self._near_m
-        e.points += off.size
-        e.most = max(e.most, off.size)
-        e.ghosts += int(ghost.sum())
-        e.on_movers += int((ghost & (on_mover < 0.05)).sum())
-        e.off_m.append(off[~ghost])
+        if world.time_s > 1.0:
+            e.scans += 1
+            e.points += off.size
+            e.most = max(e.most, off.size)
+            e.ghosts += int((ghost & (on_mover >= 0.05)).sum())
+            e.on_movers += int((ghost & (on_mover < 0.05)).sum())
+            e.off_m.append(off[~ghost])
         beams = self._tracker.beams
         assert beams is not None
         hit = beams.range_m * beams.spacing_rad <= self._map.params.spacing_m
@@ -231,8 +234,8 @@ def main() -> None:
         off = off if off.size else np.array([math.nan])
         update, times = 1e3 * np.array(e.update_s), 1e3 * np.array(e.field_s)
         print(
-            f"| {name} | {e.points} | {e.most} | {100.0 * e.ghosts / max(e.points, 1):.3f} % "
-            f"| {e.on_movers} | {100.0 * e.missed / max(e.returns, 1):.2f} % "
+            f"| {name} | {e.points / e.scans:.1f} | {e.most} "
+            f"| {e.on_movers / e.scans:.2f} | {e.ghosts / e.scans:.2f} | {100.0 * e.missed / max(e.returns, 1):.2f} % "
             f"| {np.quantile(off, 0.5):.1f}, {np.quantile(off, 0.95):.1f} "
             f"| {np.quantile(update, 0.5):.2f}, {np.quantile(update, 0.99):.2f} "
             f"| {np.quantile(times, 0.5):.2f}, {np.quantile(times, 0.99):.2f} |",

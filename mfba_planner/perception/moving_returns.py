@@ -71,4 +71,4 @@ class MovingReturns:
         ix = (np.floor(x / _CELL_M).astype(np.int64)[:, None] + step) & self._mask
         iy = (np.floor(y / _CELL_M).astype(np.int64)[:, None] + step) & self._mask
         cells = (iy[:, :, None] << self._bits) + ix[:, None, :]
-        return cells.reshape(x.size, -1)
+        return cells.reshape(x.size, step.size**2)

@@ -13,15 +13,18 @@ from collections.abc import Callable
 import numpy as np
 
 from . import small_matrices as sm
+from .scan_surfaces import Surfaces
 
 Array = np.ndarray
 Nearest = Callable[[Array, Array, int], tuple[Array, Array, Array]]
 
 _MOST = 180  # returns that are matched
 _FEWEST = 15
+_ANCHORS, _ANCHOR_M = 3, 0.5  # surfaces that must agree; each 0.5 m of a wide one counts
+_LEARNING_SCANS = 10  # at the start any error is looked for
 _ENOUGH = 60.0  # returns that count in full: errors of neighbours are alike
-_LEARNING, _MEAN_SHARE = 0.1, 0.15
-_LEAST_SD, _MOST_SD, _FIRST_SD = 1e-3, 0.06, 0.02  # m and rad
+_LEARNING, _MEAN_SHARE = 0.1, 0.05
+_LEAST_SD, _MOST_SD, _FIRST_SD = 1e-3, 0.06, 0.005  # m and rad
 _LEAST_NOISE, _MOST_NOISE, _FIRST_NOISE = 0.003, 0.05, 0.01  # m
 _QUIET_SD = 4e-3  # below it one pass is enough
 _FAR_M = 3.0
@@ -46,30 +49,34 @@ class ScanMatching:
         self.noise_m = _FIRST_NOISE  # of a return
         self._mean = (0.0, 0.0, 0.0)
         self._variance_m2 = self._variance_rad2 = _FIRST_SD**2
+        self._scans = 0
 
     def estimate(
-        self, x: Array, y: Array, nx: Array, ny: Array, origin: tuple[float, float],
-        nearest: Nearest,
-    ) -> None:  # fmt: skip
-        """Find the error from returns (k,) in odom with their normals.
+        self, found: Surfaces, still: Array, origin: tuple[float, float], nearest: Nearest
+    ) -> None:
+        """Find the error from the returns with the indices still (k,); k may be 0.
 
         nearest(x, y, cells) gives the x and y of the map's nearest points and the distances.
         """
-        step = max(1, math.ceil(x.size / _MOST))
-        x, y, nx, ny = x[::step] - origin[0], y[::step] - origin[1], nx[::step], ny[::step]
+        still = still[:: max(1, math.ceil(still.size / _MOST))]
+        x, y = found.x[still] - origin[0], found.y[still] - origin[1]
+        nx, ny, segment = found.nx[still], found.ny[still], found.segment[still]
         self.error = self._mean
         vm, vr = self._variance_m2, self._variance_rad2
         wide = math.sqrt(vm) + _FAR_M * math.sqrt(vr)
         reach = min(max(math.ceil(2.0 * wide / self._cell_m), 1), _MOST_REACH)
         passes = 1 if max(vm, vr) < _QUIET_SD**2 else 3
+        if self._scans < _LEARNING_SCANS:
+            reach, passes = _MOST_REACH, 3
         left: Array | None = None
         rest = np.empty(0)
         for k in range(passes):
-            found = self._step(x, y, nx, ny, origin, nearest, reach if k == 0 else 1)
-            if found is None:
+            step = self._step(x, y, nx, ny, origin, nearest, reach if k == 0 else 1)
+            if step is None:
+                left = None
                 break
-            left, rest = found
-        if left is None:
+            left, rest, near = step
+        if left is None or _anchors(found, segment[near]) < _ANCHORS:
             self.sd_m, self.sd_rad = math.sqrt(vm), math.sqrt(vr)
             self.error = self._mean
             return
@@ -80,8 +87,8 @@ class ScanMatching:
     def _step(
         self, x: Array, y: Array, nx: Array, ny: Array, origin: tuple[float, float],
         nearest: Nearest, reach: int,
-    ) -> tuple[Array, Array] | None:  # fmt: skip
-        """One Gauss-Newton step; the covariance that is left, and the distances from lines."""
+    ) -> tuple[Array, Array, Array] | None:  # fmt: skip
+        """One Gauss-Newton step; the covariance left, distances from lines, and whose they are."""
         ex, ey, turn = self.error
         c, s = math.cos(turn), math.sin(turn)
         rx, ry = c * x + s * y, c * y - s * x
@@ -118,14 +125,16 @@ class ScanMatching:
             ey + b * bx + f * by + g * br,
             turn + e * bx + g * by + h * br,
         )
-        return left, rest
+        return left, rest, near
 
     def _learn(self, left: Array, rest: Array) -> None:
+        self._scans += 1
+        gain = max(_LEARNING, 1.0 / (1.0 + self._scans))
         ex, ey, turn = (e - m for e, m in zip(self.error, self._mean))
         second = 0.5 * (ex * ex + ey * ey + float(left[0, 0]) + float(left[1, 1]))
-        vm = self._variance_m2 + _LEARNING * (second - self._variance_m2)
+        vm = self._variance_m2 + gain * (second - self._variance_m2)
         vr = self._variance_rad2
-        vr += _LEARNING * (turn * turn + float(left[2, 2]) - vr)
+        vr += gain * (turn * turn + float(left[2, 2]) - vr)
         self._variance_m2, self._variance_rad2 = _limited(vm), _limited(vr)
         mx, my, mt = (m + _MEAN_SHARE * (e - m) for e, m in zip(self.error, self._mean))
         self._mean = (mx, my, mt)
@@ -146,6 +155,12 @@ class ScanMatching:
         c, s = math.cos(turn), math.sin(turn)
         dx, dy = x - (origin[0] - ex), y - (origin[1] - ey)
         return c * dx - s * dy + origin[0], c * dy + s * dx + origin[1]
+
+
+def _anchors(found: Surfaces, segment: Array) -> float:
+    """Surfaces with a matched return, the wide ones by their width."""
+    met = np.unique(segment)
+    return float(np.maximum(found.width_m[met] / _ANCHOR_M, 1.0).sum())
 
 
 def _limited(variance: float) -> float:

@@ -39,6 +39,7 @@ __all__ = ["StaticMap", "StaticMapParams"]
 Array = np.ndarray
 
 _YOUNG_S = 2.0  # a moving circle takes younger points with it
+_ESTABLISHED_S = 1.0  # scans are matched to points that are older
 _MOST_HITS = 20.0  # that count in a point's mean
 _SAME_M, _SAME_SD, _MOST_SAME_M = 0.025, 2.5, 0.05  # returns nearer to a point are its own
 _ALONE_M = 0.01  # so near to a beam is a point that is thinner than the beams are apart
@@ -136,10 +137,7 @@ class StaticMap:
         usable &= found.range_m < beams.longest_m - _LIMIT_M
         usable &= found.range_m * beams.spacing_rad <= p.spacing_m
         still = np.flatnonzero(usable & ~in_track)
-        matching.estimate(
-            found.x[still], found.y[still], found.nx[still], found.ny[still], self._origin,
-            self._nearest,
-        )  # fmt: skip
+        matching.estimate(found, still, self._origin, self._nearest)
         x, y = matching.corrected(found.x, found.y, self._origin)
         margin = 3.0 * matching.noise_m + 2.0 * matching.sd_m
         flagged = in_track | motion.spread(found, self._free.appeared(x, y, margin))
@@ -169,7 +167,8 @@ class StaticMap:
         if not self.count:
             return x, y, away
         data = self._points.data
-        return data[X][index], data[Y][index], away
+        old = (data[FIRST] <= max(self._time_s - _ESTABLISHED_S, 0.0))[index]
+        return data[X][index], data[Y][index], np.where(old, away, np.inf)
 
     def _average(
         self, found: Surfaces, index: Array, x: Array, y: Array, width: Array, hit: Array,

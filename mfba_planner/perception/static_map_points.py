@@ -50,7 +50,7 @@ class MapPoints:
 
         NONE and inf where there is none.
         """
-        if not self.count:
+        if not (self.count and x.size):
             return np.full(x.size, NONE), np.full(x.size, np.inf)
         step = np.arange(-reach, reach + 1)
         ix = (np.floor(x / self.cell_m).astype(np.int64)[:, None] + step) & self._mask
