@@ -129,7 +129,7 @@ class Judge:
         moving, beams = self._tracker.moving(), self._tracker.beams
         assert beams is not None
         e, start = self._errors, time.perf_counter()
-        self._map.update(obs.stamp_ns, obs.pose, beams, moving)
+        self._map.update(obs.stamp_ns, obs.pose, beams, *moving, self._tracker.pose_error)
         updated = time.perf_counter()
         self._map.distance(np.array([obs.pose.x]), np.array([obs.pose.y]))
         e.update_s.append(updated - start)

@@ -17,7 +17,9 @@ from .pose_error import PoseError
 from .scan_beams import BeamReader, Beams
 from .scan_segments import Segments, segments, taken_from_a_gap
 from .track_association import NONE, associate, expected_labels
-from .track_bank import RADIUS, TrackBank
+import os
+SIG=float(os.environ.get('SIG','4')); LOW=float(os.environ.get('LOW','0.0025'))
+from .track_bank import RADIUS, VX, VY, TrackBank
 from .track_lifecycle import drop_lost, fragments, judge_motion
 from .tracking_params import TrackingParams
 
@@ -195,15 +197,30 @@ class Tracker:
         circles += [Circle(center_m=point, radius_m=radius) for point in self._walls]
         return tuple(circles)
 
-    def moving(self) -> Array:
-        """Rows (x, y, vx, vy, r) of the tracks that move, by the pose of the last scan; (m, 5)."""
+    @property
+    def pose_error(self) -> tuple[float, float, float]:
+        """Error (x, y, turn) of the pose of the last scan, as far as it is known."""
+        return self._pose_error.error
+
+    def moving(self) -> tuple[Array, Array]:
+        """Tracks that move or may move, by the pose of the last scan.
+
+        Rows (x, y, vx, vy, r) (m, 5), and whether it is sure that each moves (m,).
+        """
         bank = self._bank
-        rows = bank.state[bank.moving]
+        v = bank.state[:, 2:4]
+        speed2 = v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1]
+        P = bank.covariance
+        may = speed2 > SIG * 0.5 * (P[:, VX, VX] + P[:, VY, VY])
+        may &= (bank.scans >= 2)
+        may &= speed2>LOW
+        may |= bank.moving
+        rows = bank.state[may]
         origin = np.array(self._pose.position)
         shift_x, shift_y = self._pose_error.shift(rows[:, 0], rows[:, 1], origin)
         rows[:, 0] += shift_x
         rows[:, 1] += shift_y
-        return rows
+        return rows, bank.moving[may]
 
     def _expected_times(self, beams: Beams, origin: Array) -> Array:
         """When the beams meet each track, s after the stamp; (m,)."""

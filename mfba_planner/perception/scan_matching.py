@@ -12,23 +12,28 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..core.geometry import Point
 from . import small_matrices as sm
 from .scan_surfaces import Surfaces
 
 Array = np.ndarray
+Error = tuple[float, float, float]
 Nearest = Callable[[Array, Array, int], tuple[Array, Array, Array]]
 
 _MOST = 180  # returns that are matched
 _FEWEST = 15
 _ANCHORS, _ANCHOR_M = 3, 0.5  # surfaces that must agree; each 0.5 m of a wide one counts
 _LEARNING_SCANS = 10  # at the start any error is looked for
-_ENOUGH = 60.0  # returns that count in full: errors of neighbours are alike
+_ENOUGH = 200.0  # returns that count in full: errors of neighbours are alike
 _LEARNING, _MEAN_SHARE = 0.1, 0.05
+_LEVER_M = 2.0  # at which a turn counts as a shift
+_HELPS = 0.5  # share of the squared errors that the tracker's estimate must leave, at most
 _LEAST_SD, _MOST_SD, _FIRST_SD = 1e-3, 0.06, 0.005  # m and rad
 _LEAST_NOISE, _MOST_NOISE, _FIRST_NOISE = 0.003, 0.05, 0.01  # m
 _QUIET_SD = 4e-3  # below it one pass is enough
 _FAR_M = 3.0
-_MOST_REACH = 3  # cells
+_SOFT_SD, _SOFT_M = 2.0, 0.025  # distance from its line at which a return counts a quarter
+_MOST_REACH, _PASSES = 3, 4  # cells
 
 
 class ScanMatching:
@@ -47,45 +52,54 @@ class ScanMatching:
         self.error = (0.0, 0.0, 0.0)
         self.sd_m = self.sd_rad = _FIRST_SD  # of what is left of the error
         self.noise_m = _FIRST_NOISE  # of a return
-        self._mean = (0.0, 0.0, 0.0)
+        self._mean = self._expected = (0.0, 0.0, 0.0)
         self._variance_m2 = self._variance_rad2 = _FIRST_SD**2
         self._scans = 0
+        self._tracked = (0.0, 0.0, 0.0)
+        self._squares = [0.0, 0.0]  # of the errors, and of what the tracker leaves of them
+        self._believes = False
 
     def estimate(
-        self, found: Surfaces, still: Array, origin: tuple[float, float], nearest: Nearest
+        self, found: Surfaces, still: Array, origin: Point, nearest: Nearest, expected: Error
     ) -> None:
         """Find the error from the returns with the indices still (k,); k may be 0.
 
+        expected is what else is known of it, less its mean; the tracker's estimate.
         nearest(x, y, cells) gives the x and y of the map's nearest points and the distances.
         """
         still = still[:: max(1, math.ceil(still.size / _MOST))]
         x, y = found.x[still] - origin[0], found.y[still] - origin[1]
         nx, ny, segment = found.nx[still], found.ny[still], found.segment[still]
-        self.error = self._mean
+        self._tracked = expected
+        self._expected = self._mean
+        if self._believes:
+            (mx, my, mt), (ex, ey, et) = self._mean, expected
+            self._expected = (mx + ex, my + ey, mt + et)
+        self.error = self._expected
         vm, vr = self._variance_m2, self._variance_rad2
         wide = math.sqrt(vm) + _FAR_M * math.sqrt(vr)
         reach = min(max(math.ceil(2.0 * wide / self._cell_m), 1), _MOST_REACH)
-        passes = 1 if max(vm, vr) < _QUIET_SD**2 else 3
+        passes = 1 if max(vm, vr) < _QUIET_SD**2 else _PASSES
         if self._scans < _LEARNING_SCANS:
-            reach, passes = _MOST_REACH, 3
+            reach, passes = _MOST_REACH, _PASSES
         left: Array | None = None
         rest = np.empty(0)
         for k in range(passes):
-            step = self._step(x, y, nx, ny, origin, nearest, reach if k == 0 else 1)
+            step = self._step(x, y, nx, ny, origin, nearest, max(reach - k, 1))
             if step is None:
                 left = None
                 break
             left, rest, near = step
         if left is None or _anchors(found, segment[near]) < _ANCHORS:
             self.sd_m, self.sd_rad = math.sqrt(vm), math.sqrt(vr)
-            self.error = self._mean
+            self.error = self._expected
             return
         self.sd_m = math.sqrt(0.5 * (left[0, 0] + left[1, 1]))
         self.sd_rad = math.sqrt(left[2, 2])
         self._learn(left, rest)
 
     def _step(
-        self, x: Array, y: Array, nx: Array, ny: Array, origin: tuple[float, float],
+        self, x: Array, y: Array, nx: Array, ny: Array, origin: Point,
         nearest: Nearest, reach: int,
     ) -> tuple[Array, Array, Array] | None:  # fmt: skip
         """One Gauss-Newton step; the covariance left, distances from lines, and whose they are."""
@@ -100,7 +114,7 @@ class ScanMatching:
             return None
         nx, ny, rx, ry = nx[near], ny[near], rx[near], ry[near]
         rest = nx * (zx[near] - qx[near]) + ny * (zy[near] - qy[near])
-        soft = max(3.0 * self.noise_m, 0.5 * reach * self._cell_m if reach > 1 else 0.0)
+        soft = max(_SOFT_SD * self.noise_m, _SOFT_M if reach == 1 else reach * self._cell_m)
         w = rest / soft
         w = 1.0 / (1.0 + w * w)
         w *= w
@@ -115,7 +129,7 @@ class ScanMatching:
         total = np.add.accumulate(rows, axis=1)[:, -1].tolist()
         xx, xy, xr, yy, yr, rr, bx, by, br = total
         im, ir = 1.0 / self._variance_m2, 1.0 / self._variance_rad2
-        mx, my, mt = self._mean
+        mx, my, mt = self._expected
         matrix = np.array([[[xx + im, xy, xr], [xy, yy + im, yr], [xr, yr, rr + ir]]])
         left: Array = sm.inverse(matrix)[0]
         bx, by, br = bx + im * (mx - ex), by + im * (my - ey), br + ir * (mt - turn)
@@ -129,8 +143,9 @@ class ScanMatching:
 
     def _learn(self, left: Array, rest: Array) -> None:
         self._scans += 1
+        self._compare()
         gain = max(_LEARNING, 1.0 / (1.0 + self._scans))
-        ex, ey, turn = (e - m for e, m in zip(self.error, self._mean))
+        ex, ey, turn = (e - m for e, m in zip(self.error, self._expected))
         second = 0.5 * (ex * ex + ey * ey + float(left[0, 0]) + float(left[1, 1]))
         vm = self._variance_m2 + gain * (second - self._variance_m2)
         vr = self._variance_rad2
@@ -142,14 +157,24 @@ class ScanMatching:
         noise = self.noise_m + _LEARNING * (sample - self.noise_m)
         self.noise_m = min(max(noise, _LEAST_NOISE), _MOST_NOISE)
 
-    def corrected(self, x: Array, y: Array, origin: tuple[float, float]) -> tuple[Array, Array]:
+    def _compare(self) -> None:
+        """Learn whether the tracker's estimate is nearer to the error than its mean."""
+        whole = [e - m for e, m in zip(self.error, self._mean)]
+        rest = [e - t for e, t in zip(whole, self._tracked)]
+        for k, (x, y, turn) in enumerate((whole, rest)):
+            square = x * x + y * y + (_LEVER_M * turn) ** 2
+            self._squares[k] += _LEARNING * (square - self._squares[k])
+        whole2, rest2 = self._squares
+        self._believes = rest2 < (_HELPS if not self._believes else 1.0) * whole2
+
+    def corrected(self, x: Array, y: Array, origin: Point) -> tuple[Array, Array]:
         """Points of odom, as the present pose has them, in the map's frame."""
         ex, ey, turn = self.error
         c, s = math.cos(turn), math.sin(turn)
         dx, dy = x - origin[0], y - origin[1]
         return c * dx + s * dy + (origin[0] - ex), c * dy - s * dx + (origin[1] - ey)
 
-    def measured(self, x: Array, y: Array, origin: tuple[float, float]) -> tuple[Array, Array]:
+    def measured(self, x: Array, y: Array, origin: Point) -> tuple[Array, Array]:
         """Points of the map's frame in odom, as the present pose has it."""
         ex, ey, turn = self.error
         c, s = math.cos(turn), math.sin(turn)

@@ -91,13 +91,19 @@ class StaticMap:
         return self._matching.noise_m
 
     def update(
-        self, stamp_ns: int, pose: Pose2D, beams: Beams, moving: Array | None = None
+        self,
+        stamp_ns: int,
+        pose: Pose2D,
+        beams: Beams,
+        moving: Array | None = None,
+        surely: Array | None = None,
+        pose_error: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         """Update by the beams of a scan, taken from the pose, and by circles that move.
 
         moving (m, 5) are rows (x, y, vx, vy, r) in odom by that pose, as Tracker.moving() gives
-        them; those slower than moving_mps are ignored. An older stamp drops the map, an equal
-        one is ignored.
+        them; those slower than moving_mps are ignored. pose_error is what is known of the
+        pose's error (Tracker.pose_error). An older stamp drops the map, an equal one is ignored.
         """
         if self._stamp_ns is not None:
             dt = (stamp_ns - self._stamp_ns) * NANO
@@ -111,12 +117,14 @@ class StaticMap:
         self._stamp_ns, self._origin = stamp_ns, pose.position
         moving = np.empty((0, 5)) if moving is None else moving
         vx, vy = moving[:, 2], moving[:, 3]
-        moving = moving[vx * vx + vy * vy >= self.params.moving_mps**2]
+        fast = vx * vx + vy * vy >= self.params.moving_mps**2
+        surely = fast if surely is None else fast & surely
+        moving, surely = moving[fast], moving[surely]
         found = surfaces(beams)
         changed = False
         if found is not None:
-            changed = self._mark(found, beams, moving)
-        changed |= self._clear(beams, moving)
+            changed = self._mark(found, beams, moving, pose_error)
+        changed |= self._clear(beams, surely)
         x, y = self._robot
         changed |= self._points.roll(x, y)
         self._seen.update(self._time_s, x, y, self._matching.error[2], beams)
@@ -129,7 +137,9 @@ class StaticMap:
         ex, ey, _ = self._matching.error
         return (self._origin[0] - ex, self._origin[1] - ey)
 
-    def _mark(self, found: Surfaces, beams: Beams, moving: Array) -> bool:
+    def _mark(
+        self, found: Surfaces, beams: Beams, moving: Array, pose_error: tuple[float, float, float]
+    ) -> bool:
         """Match the scan, and mark what stands; whether the points changed."""
         p, points, matching, motion = self.params, self._points, self._matching, self._moving
         in_track = motion.near_any(found.x, found.y, moving)
@@ -137,7 +147,7 @@ class StaticMap:
         usable &= found.range_m < beams.longest_m - _LIMIT_M
         usable &= found.range_m * beams.spacing_rad <= p.spacing_m
         still = np.flatnonzero(usable & ~in_track)
-        matching.estimate(found, still, self._origin, self._nearest)
+        matching.estimate(found, still, self._origin, self._nearest, pose_error)
         x, y = matching.corrected(found.x, found.y, self._origin)
         margin = 3.0 * matching.noise_m + 2.0 * matching.sd_m
         flagged = in_track | motion.spread(found, self._free.appeared(x, y, margin))
