@@ -41,7 +41,7 @@ OUTSIDE: dict[str, set[str]] = {
     "perception": {"numpy"},
     "planning": {"numpy", "pyrvo"},
     "simulation": {"numpy"},
-    "scenarios": {"numpy", "pydantic", "yaml"},
+    "scenarios": {"PIL", "numpy", "pydantic", "yaml"},
     "evaluation": {"distributed", "numpy", "pyarrow", "scipy"},
     "paper": {"numpy", "scipy"},
     "recording": {"mcap", "mcap_ros2", "numpy", "yaml", "zstandard"},

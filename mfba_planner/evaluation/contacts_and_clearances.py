@@ -14,6 +14,7 @@ from ..core.geometry import Point, bearing, distance, wrap_angle
 from ..simulation.batched_motion import Array, StepClearances
 
 CONTACT_SLACK_M = 1e-9  # rounding of a tangential pass is not a collision
+WALL = -1  # first_contact_with of a wall segment; all of them count as one
 STANDSTILL_M = 1e-9  # of a step: shorter ones are rounding
 HEADING_CHANGE_RAD = math.radians(15.0)  # half a sector of Fig. 3
 
@@ -25,10 +26,10 @@ class RunMotion:
     hits_moving, hits_standing: the collisions of Result, by whether the robot moved (more than
         STANDSTILL_M) in the step in which the contact started: the robot hit the obstacle, or
         the obstacle hit the standing robot.
-    first_contact_with, first_contact_s: the obstacle (from 1; 0 for none) of the first contact,
-        and the start time of the step in which it occurs (inf for none).
-    mean_clearance_m: (1/K) sum_k min_i gap_ki, the smallest gap of each step on average; inf
-        without obstacles.
+    first_contact_with, first_contact_s: the obstacle (from 1; 0 for none, WALL for a wall) of the
+        first contact, and the start time of the step in which it occurs (inf for none).
+    mean_clearance_m: (1/K) sum_k min_i gap_ki, the smallest gap of each step on average, walls
+        among them; inf without obstacles and walls.
     min_ttc_s: time to collision, min over k and i of the time until contact if robot and
         obstacle both keep their velocity of step k; 0 in contact, inf if never.
     turning_rad: sum_k |h_(k+1) - h_k| over the headings h of all steps longer than STANDSTILL_M.
@@ -105,18 +106,23 @@ class ObstaclePasses:
         self.hits_moving = self.hits_standing = self.first_contact_with = 0
         self._gaps_m = 0.0
         self._count = 0
+        self._wall: int | None = None  # column of the walls
         self._touching: Array | None = None
 
     def add(self, steps: StepClearances, times_s: Array, moved_m: Array) -> None:
         """Add K steps that start at times_s (K,) and move the robot by moved_m (K,)."""
-        if not steps.gap_m.size:
+        gap_m, contact_s = steps.gaps_with_walls_m, steps.contact_s
+        if steps.walls is not None:
+            contact_s = np.column_stack([contact_s, steps.walls.contact_s])
+        if not gap_m.size:
             return
-        nearest = steps.gap_m.min(axis=1)
+        self._wall = None if steps.walls is None else gap_m.shape[1] - 1
+        nearest = gap_m.min(axis=1)
         self.min_gap_m = min(self.min_gap_m, float(nearest.min()))
-        self.min_ttc_s = min(self.min_ttc_s, float(steps.contact_s.min()))
+        self.min_ttc_s = min(self.min_ttc_s, float(contact_s.min()))
         self._gaps_m += math.fsum(nearest.tolist())
         self._count += len(nearest)
-        touching = steps.gap_m < -CONTACT_SLACK_M
+        touching = gap_m < -CONTACT_SLACK_M
         if self._touching is not None or touching.any():
             self._count_contacts(touching, times_s, moved_m)
         self._touching = touching[-1] if touching[-1].any() else None
@@ -133,9 +139,10 @@ class ObstaclePasses:
             else:
                 self.hits_standing += 1
             if not self.first_contact_with:
-                self.first_contact_with, self.first_contact_s = i + 1, float(times_s[k])
+                self.first_contact_with = WALL if i == self._wall else i + 1
+                self.first_contact_s = float(times_s[k])
 
     @property
     def mean_gap_m(self) -> float:
-        """Mean over the steps of the smallest gap; inf without obstacles."""
+        """Mean over the steps of the smallest gap; inf without any."""
         return self._gaps_m / self._count if self._count else math.inf

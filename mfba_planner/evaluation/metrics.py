@@ -45,8 +45,9 @@ def evaluate(episode: Episode) -> Result:
 
     length_m is the sum of eq. 1 over all steps and fitness its reciprocal, as Tables 5 and 7
     use it (no epsilon; inf for a robot that never moved). min_clearance_m is the smallest
-    gap between robot and obstacle edges, continuous in time, negative in contact (inf without
-    obstacles); collisions counts contacts, one per obstacle and unbroken run of ticks.
+    gap between the robot's edge and those of obstacles and walls, continuous in time, negative in
+    contact (inf without any); collisions counts contacts, one per obstacle and unbroken run of
+    ticks; all walls count as one obstacle.
     encounters lists the obstacles (from 1) whose enlarged edge came within SR at a tick, sorted by
     time. mode_switches counts every change of mode, including that to ARRIVED. success: goal
     reached without collision.
@@ -168,7 +169,10 @@ class MetricsAccumulator:
         starts_s = times_s[:-1]
         if not driven.all():  # a kidnapping adds no length and no contact
             starts_s, moved_m = starts_s[driven], moved_m[driven]
-            steps = StepClearances(steps.gap_m[driven], steps.contact_s[driven], steps.distance_m)
+            walls = steps.walls and steps.walls.select(driven)
+            steps = StepClearances(
+                steps.gap_m[driven], steps.contact_s[driven], steps.distance_m, walls
+            )
         self._steps_m.extend(moved_m.tolist())
         self._passes.add(steps, starts_s, moved_m)
         self._block, self._evaluated = [ticks[-1]], 1
@@ -204,16 +208,19 @@ def steps_driven(episode: Episode) -> list[tuple[Decision, Decision]]:
 
 
 def tick_clearances(episode: Episode) -> list[list[float]]:
-    """Smallest gap (m) to each obstacle during each step; ticks - 1 rows (one if no step)."""
+    """Smallest gap (m) to each obstacle during each step; ticks - 1 rows (one if no step).
+
+    In a scenario with wall segments the last column is the gap to the nearest of them.
+    """
     steps, motion = steps_driven(episode), Motion(episode.scenario)
     moments = [*(a for a, _ in steps), steps[-1][1]]
     times_s = np.array([episode.time_s(tick.stamp_ns) for tick in moments])
     positions_m = np.array([tick.pose.position for tick in moments]).T
-    gaps_m = motion.steps(times_s, positions_m).gap_m
+    gaps_m = motion.steps(times_s, positions_m).gaps_with_walls_m
     for k, (_, b) in enumerate(steps):
         if is_odometry_jump(b.reason):  # the next step starts elsewhere
             at_rest_m = positions_m[:, [k, k]]
-            gaps_m[k] = motion.steps(times_s[k : k + 2], at_rest_m).gap_m[0]
+            gaps_m[k] = motion.steps(times_s[k : k + 2], at_rest_m).gaps_with_walls_m[0]
     return [[float(gap) for gap in row] for row in gaps_m]
 
 

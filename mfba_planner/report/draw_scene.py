@@ -67,12 +67,17 @@ def line(ax: Axes, points: Sequence[Point], gid: str, **looks: object) -> None:
 
 
 def draw_walls(ax: Axes, episode: Episode) -> None:
-    """Draw the walls, if the scenario has any."""
+    """Draw the wall segments and the rectangle that obstacles bounce from, if there are any."""
     walls = episode.scenario.walls
     if walls:
         (left, bottom), (right, top) = walls.lower_m, walls.upper_m
-        room = Rectangle((left, bottom), right - left, top - bottom, fill=False, **style.WALL)
-        patch(ax, room, "wall")
+        room = Rectangle((left, bottom), right - left, top - bottom, fill=False, **style.LIMIT)
+        patch(ax, room, "limit")
+    if episode.scenario.segments_m:
+        lines = [[(x0, y0), (x1, y1)] for x0, y0, x1, y1 in episode.scenario.segments_m]
+        drawn = LineCollection(lines, capstyle="round", zorder=Z_OBSTACLE, **style.WALL)
+        drawn.set_gid("wall")
+        ax.add_collection(drawn, autolim=False)
 
 
 def _track(ax: Axes, episode: Episode, view: View, obstacle: Obstacle, moment: Pass) -> None:

@@ -46,7 +46,8 @@ def _all() -> dict[str, Entry]:
         "set": (Patch(**style.SECTOR), "sectors set"),
         "closing": (Patch(**style.SECTOR), "headings to a contact"),
         "in_range": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle within SR"),
-        "wall": (Line2D([], [], **_edge(style.WALL)), "wall"),
+        "wall": (Line2D([], [], **style.WALL), "wall"),
+        "limit": (Line2D([], [], **_edge(style.LIMIT)), "wall for obstacles only"),
     }
 
 

@@ -189,6 +189,11 @@ class _RunLogger:
             lines = rr.LineStrips3D([[_flat(corner) for corner in corners]], colors=_rgb(_DARK))
             self._log("world/walls", lines, static=True)
 
+        if scenario.segments_m:
+            strips = [[_flat(end[:2]), _flat(end[2:])] for end in scenario.segments_m]
+            segments = rr.LineStrips3D(strips, colors=_rgb(_DARK), radii=0.03)
+            self._log("world/segments", segments, static=True)
+
     def _log_obstacles(self, xs: Any, ys: Any, time_s: float) -> None:
         obstacles = self.scenario.obstacles[: len(self.names)]
         if not obstacles:

@@ -67,11 +67,11 @@ def encounter_ticks(episode: Episode) -> list[Decision]:
 
 
 def closest_passes(episode: Episode) -> list[Pass]:
-    """The closest pass of each obstacle, sorted by obstacle number."""
+    """The closest pass of each obstacle, sorted by obstacle number; without the walls."""
     columns = zip(*tick_clearances(episode))
     return [
         _closest_within(episode, index, min(range(len(gaps)), key=gaps.__getitem__))
-        for index, gaps in enumerate(columns)
+        for index, (_, gaps) in enumerate(zip(episode.scenario.obstacles, columns))
     ]
 
 

@@ -77,7 +77,8 @@ _ARROW: Looks = {"arrowstyle": "-|>", "mutation_scale": 11.0, "shrinkA": 0.0, "s
 FREE_GAP: Looks = {**_ARROW, "color": GREEN, "linewidth": 1.6}
 TAKEN: Looks = {**_ARROW, "color": VERMILLION, "linewidth": 3.0}
 CLOSED_GAP: Looks = {"color": ORANGE, "linewidth": 1.4, "linestyle": (0, (1, 1.8))}
-WALL: Looks = {"edgecolor": INK, "linewidth": 1.8}
+WALL: Looks = {"color": INK, "linewidth": 2.6}
+LIMIT: Looks = {"edgecolor": INK, "linewidth": 1.8}
 # Where the robot stands still its line has no length: a frame marks the position.
 _FRAME: Looks = {"markersize": 15.0, "markerfacecolor": "none", "markeredgewidth": 2.2}
 STANDING: dict[Mode, Looks] = {

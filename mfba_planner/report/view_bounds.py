@@ -72,6 +72,8 @@ def choose_view(episode: Episode, passes: Sequence[Pass]) -> tuple[View, float]:
     ]
     if scenario.walls:
         circles += [(scenario.walls.lower_m, 0.0), (scenario.walls.upper_m, 0.0)]
+    for x0, y0, x1, y1 in scenario.segments_m:
+        circles += [((x0, y0), 0.0), ((x1, y1), 0.0)]
     circles = [(center, radius) for center, radius in circles if radius <= near]
     view = _holding(trip, [c for c in circles if trip.holds(c[0], near)])
     margin = max(scenario.robot_radius_m, _MARGIN * max(view.width, view.height))

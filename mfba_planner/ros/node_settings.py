@@ -100,6 +100,10 @@ class VirtualSensorSettings:
         minimum=0.0,
         maximum=100.0,
     )
+    segments_m: str = option(
+        "",
+        "walls beside obstacles, [[x0, y0, x1, y1], ...] in odom_frame; a scan has its own",
+    )
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )

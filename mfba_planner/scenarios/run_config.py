@@ -22,7 +22,7 @@ from ..planning.planner_params import PerceptionInput, PlannerParams
 from ..simulation.fleet import robot_seed, scenarios_with_others
 from ..simulation.robot_model import DEFAULT_BEAMS
 from ..simulation.scenario import Scenario
-from .scenario_json import scenario_to_json
+from .scenario_json import scenario_to_json, segments_text
 
 Parameters = dict[str, dict[str, Any]]
 
@@ -104,6 +104,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
     robot = config.scenario.robot
     radii = [obstacle.radius_m for obstacle in config.scenario.obstacles]
+    segments = config.scenario.segments_m if not robot.lidar.beams else ()
     return {
         "world_sim": viewed
         | {
@@ -120,6 +121,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
         | {
             "robot_radius_m": config.scenario.robot_radius_m,
             **({"obstacle_radii_m": radii} if radii else {}),
+            **({"segments_m": segments_text(segments)} if segments else {}),
             **({"source": "scan", "scan_yaw": robot.lidar.yaw_rad} if robot.lidar.beams else {}),
         },
         "planner": viewed

@@ -14,6 +14,7 @@ from ..core.option_specs import did_you_mean
 from ..core.shipped_files import scenario_names, scenario_path
 from ..simulation.scenario import Scenario
 from .scenario_json import EXAMPLE, UnusualError, as_written
+from .text_files import read_text
 
 
 def load_scenario(source: str) -> Scenario:
@@ -24,27 +25,24 @@ def load_scenario(source: str) -> Scenario:
     if source.lstrip().startswith("{"):
         return parse_scenario(source, "inline scenario")
     if source.endswith((".yaml", ".yml", ".json")):
-        return parse_scenario(_read(Path(source)), source)
+        return _parse_file(Path(source), source)
     known = scenario_names()
     if source in known:
-        return parse_scenario(_read(scenario_path(source)), source)
+        return _parse_file(scenario_path(source), source)
     if os.path.isfile(source):
-        return parse_scenario(_read(Path(source)), source)
+        return _parse_file(Path(source), source)
     raise ConfigError(
         f"{source!r}: no such scenario; {did_you_mean(source, known)} (or give a .yaml file)"
     )
 
 
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a path with a NUL byte
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigError(f"{path}: {reason}; give a readable scenario .yaml") from None
+def _parse_file(path: Path, origin: str) -> Scenario:
+    text = read_text(path, "give a readable scenario .yaml")
+    return parse_scenario(text, origin, path.parent)
 
 
-def parse_scenario(text: str, origin: str) -> Scenario:
-    """Turn YAML or JSON text into a Scenario.
+def parse_scenario(text: str, origin: str, directory: Path = Path()) -> Scenario:
+    """Turn YAML or JSON text into a Scenario; a map's path is relative to the directory.
 
     Raises ConfigError naming origin, value, reason and remedy.
     """
@@ -58,7 +56,7 @@ def parse_scenario(text: str, origin: str) -> Scenario:
             return as_written(data)
         from .yaml_schema import checked
 
-        return checked(data)
+        return checked(data, directory)
     except ConfigError as error:
         raise ConfigError(f"{origin}: {error}") from None
 
@@ -67,6 +65,6 @@ def _plain(text: str, origin: str) -> Any:
     """The parsed text; JSON first, since YAML reads some JSON escapes differently."""
     with suppress(ValueError, RecursionError):
         return json.loads(text)
-    from .yaml_schema import from_yaml
+    from .read_yaml import from_yaml
 
     return from_yaml(text, origin)

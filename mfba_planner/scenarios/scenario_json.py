@@ -12,6 +12,7 @@ from typing import Any
 from ..core.errors import ConfigError
 from ..core.geometry import Point
 from ..core.option_specs import override
+from ..core.segments import Segment
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.robot_model import Robot
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
@@ -32,6 +33,8 @@ def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
         del plain["kidnappings"]
     if not scenario.robots:
         del plain["robots"]
+    if not scenario.segments_m:
+        del plain["segments_m"]
     for obstacle in plain["obstacles"]:
         if not obstacle["turns"]:
             del obstacle["turns"]
@@ -76,7 +79,7 @@ def as_written(data: dict[str, Any]) -> Scenario:
         raise UnusualError
     if not isinstance(description, str):
         raise UnusualError
-    _require_keys(data, Scenario, "robot", "kidnappings", "robots")
+    _require_keys(data, Scenario, "robot", "kidnappings", "robots", "segments_m")
     robot = data.get("robot", {})
     if not isinstance(robot, dict):
         raise UnusualError
@@ -92,7 +95,37 @@ def as_written(data: dict[str, Any]) -> Scenario:
         robot=parse_robot(robot),
         kidnappings=tuple(_kidnapping(entry) for entry in _list(data.get("kidnappings", []))),
         robots=tuple(_member(entry) for entry in _list(data.get("robots", []))),
+        segments_m=tuple(_segment(entry) for entry in _list(data.get("segments_m", []))),
     )
+
+
+def parse_segments(text: str) -> tuple[Segment, ...]:
+    """Wall segments from a text, [[x0, y0, x1, y1], ...]; none from an empty one.
+
+    Raises ConfigError for anything else.
+    """
+    if not text.strip():
+        return ()
+    try:
+        return tuple(
+            _segment([float(x) for x in _list(entry)]) for entry in _list(json.loads(text))
+        )
+    except (ValueError, TypeError, RecursionError, UnusualError):
+        shown = text if len(text) <= 60 else f"{text[:57]}..."
+        raise ConfigError(
+            f"segments_m={shown!r}: not a list of segments; give [[x0, y0, x1, y1], ...], m"
+        ) from None
+
+
+def segments_text(segments: tuple[Segment, ...]) -> str:
+    """The text from which parse_segments() makes these segments."""
+    return json.dumps(segments)
+
+
+def _segment(data: Any) -> Segment:
+    if len(_list(data)) != 4:
+        raise UnusualError
+    return (_number(data[0]), _number(data[1]), _number(data[2]), _number(data[3]))
 
 
 def _member(data: Any) -> FleetRobot:

@@ -8,33 +8,32 @@ do not need them.
 from __future__ import annotations
 
 import math
-import re
+from pathlib import Path
 from typing import Annotated, Any
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from ..core.errors import ConfigError
 from ..core.option_specs import did_you_mean
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
-from .scenario_json import EXAMPLE, LIMIT, parse_robot
+from .place_schema import MEANINGS as _PLACE_MEANINGS
+from .place_schema import SHAPES as _PLACE_SHAPES
+from .place_schema import Box, Place
+from .scenario_json import EXAMPLE, parse_robot
+from .schema_types import STRICT
+from .schema_types import NotNegative as _NotNegative
+from .schema_types import Number as _Number
+from .schema_types import Point as _Point
+from .schema_types import Positive as _Positive
+from .schema_types import default as _default
 
-_Number = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-LIMIT, le=LIMIT)]
-_Positive = Annotated[float, Field(allow_inf_nan=False, strict=True, gt=0.0, le=LIMIT)]
-_NotNegative = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=0.0, le=LIMIT)]
-_Point = tuple[_Number, _Number]
 # Names appear in messages and file names.
 _Name = Annotated[str, Field(max_length=100, pattern=r"^\w[\w .+-]*$")]
 
 
-def _default(kind: type, name: str) -> Any:
-    """The default of a dataclass field, so that it is defined only once."""
-    return kind.__dataclass_fields__[name].default  # type: ignore[attr-defined]
-
-
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+    model_config = STRICT
 
 
 class _Heading(_Strict):
@@ -98,7 +97,7 @@ class _Member(_Strict):
         return FleetRobot(name=self.name, start_m=self.start_m, goal_m=self.goal_m)
 
 
-class _Scenario(_Strict):
+class _Scenario(Place, _Strict):
     name: _Name
     description: str = _default(Scenario, "description")
     start_m: _Point
@@ -111,7 +110,16 @@ class _Scenario(_Strict):
     kidnappings: list[_Kidnapping] = []
     robots: list[_Member] = []
 
-    def build(self) -> Scenario:
+    def positions(self) -> list[tuple[str, Any]]:
+        """Where a robot is to be: key and point."""
+        found: list[tuple[str, Any]] = [("start_m", self.start_m), ("goal_m", self.goal_m)]
+        found += [("kidnapping to_m", kidnapping.to_m) for kidnapping in self.kidnappings]
+        for member in self.robots:
+            found += [(f"robot {member.name} start_m", member.start_m)]
+            found += [(f"robot {member.name} goal_m", member.goal_m)]
+        return found
+
+    def build(self, directory: Path) -> Scenario:
         walls = self.walls
         return Scenario(
             name=self.name,
@@ -125,6 +133,7 @@ class _Scenario(_Strict):
             robot=parse_robot(self.robot),
             kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
             robots=tuple(member.build() for member in self.robots),
+            segments_m=self.segments(directory, self.positions()),
         )
 
 
@@ -150,6 +159,7 @@ _MEANINGS = {
     "to_m": "position it is moved to, m",
     "lower_m": "corner with the smaller x and y, m",
     "upper_m": "corner with the larger x and y, m",
+    **_PLACE_MEANINGS,
 }
 
 
@@ -162,10 +172,13 @@ def schema() -> dict[str, Any]:
     return found
 
 
-def checked(data: dict[Any, Any]) -> Scenario:
-    """The scenario from plain data. Raises ConfigError: key, value, reason, remedy."""
+def checked(data: dict[Any, Any], directory: Path = Path()) -> Scenario:
+    """The scenario from plain data; a map's path is relative to the directory.
+
+    Raises ConfigError: key, value, reason, remedy.
+    """
     try:
-        return _Scenario.model_validate(_with_ends(data)).build()
+        return _Scenario.model_validate(_with_ends(data)).build(directory)
     except ValidationError as error:
         raise ConfigError(_explain(error)) from None
 
@@ -177,42 +190,6 @@ def _with_ends(data: dict[Any, Any]) -> dict[Any, Any]:
         return data
     ends = {key: robots[0][key] for key in ("start_m", "goal_m") if key in robots[0]}
     return ends | data
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML with two fixes: 1e-3 is a number, and a key given twice is an error."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
-        """Refuse duplicate keys; SafeLoader would keep the last one silently."""
-        keys = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode):
-                if key.value in keys:
-                    problem = f"{key.value!r} given twice"
-                    raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
-                keys.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
-    list("-+.0123456789"),
-)
-
-
-def from_yaml(text: str, origin: str) -> Any:
-    """The parsed YAML text. Raises ConfigError naming origin, line and reason."""
-    try:
-        return yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f" line {mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or "unreadable characters"
-        raise ConfigError(f"{origin}{where}: not YAML ({problem}); {EXAMPLE}") from None
-    except (ValueError, LookupError, AttributeError, RecursionError):
-        # raised by PyYAML for an invalid date, a misused tag, too deep nesting
-        raise ConfigError(f"{origin}: not YAML (unreadable value); {EXAMPLE}") from None
 
 
 _REMEDIES = {
@@ -246,6 +223,8 @@ def _explain(error: ValidationError) -> str:
     if kind == "missing":
         return f"{path}: missing; {_REMEDIES[kind]}"
     remedy = _REMEDIES.get(kind) or fault["msg"].replace("Input should be", "give a number")
+    if location[0] in _PLACE_SHAPES and kind in ("tuple_type", "too_long"):
+        remedy = _PLACE_SHAPES[location[0]]
     value = repr(fault["input"])
     shown = value if len(value) <= 60 else f"{value[:57]}..."
     return f"{path}={shown}: refused; {remedy}"
@@ -258,6 +237,7 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
         "kidnappings": _Kidnapping,
         "robots": _Member,
         "walls": _Walls,
+        "boxes": Box,
     }
     within = [models[item] for item in location[:-1] if item in models]
     return list((within or [_Scenario])[-1].model_fields)

@@ -11,6 +11,7 @@ import numpy as np
 from .contact import clearance
 from .obstacle_motion import stretches_of
 from .scenario import Scenario
+from .wall_contact import WallClearances, wall_clearances
 
 Array = np.ndarray
 
@@ -22,12 +23,21 @@ class StepClearances:
     gap_m (K, N): smallest distance between robot and obstacle edges during a step, as in
     step_clearances. contact_s (K, N): time from the start of the step to contact if both keep
     the velocity of that step; 0 in contact, inf for never. distance_m (K + 1, N): distance
-    between the centres before each step and after the last.
+    between the centres before each step and after the last. walls: the same two of the nearest
+    wall segment; None for a scenario without any.
     """
 
     gap_m: Array
     contact_s: Array
     distance_m: Array
+    walls: WallClearances | None = None
+
+    @property
+    def gaps_with_walls_m(self) -> Array:
+        """gap_m, and with wall segments a last column, that of the nearest of them."""
+        return (
+            self.gap_m if self.walls is None else np.column_stack([self.gap_m, self.walls.gap_m])
+        )
 
 
 class Motion:
@@ -82,7 +92,14 @@ class Motion:
             t0, t1 = times_s[k : k + 2].tolist()
             obstacle = self._scenario.obstacles[i]
             gap[k, i] = clearance(self._scenario, obstacle, t0, t1, (x0, y0), (x1, y1))
-        return StepClearances(gap, contact, distance)
+        return StepClearances(gap, contact, distance, self._walls(times_s, positions_m))
+
+    def _walls(self, times_s: Array, positions_m: Array) -> WallClearances | None:
+        scenario = self._scenario
+        if not scenario.segments_m:
+            return None
+        radius_m = scenario.robot_radius_m
+        return wall_clearances(scenario.segments, radius_m, np.diff(times_s), positions_m)
 
     def _rows(self, times_s: Array, side: Literal["left", "right"] = "right") -> Array:
         """Row number of each obstacle's stretch at each time, (K, N) or (1, N).

@@ -19,9 +19,10 @@ from ..core.geometry import Pose2D, distance
 from ..core.option_specs import did_you_mean
 from ..core.planner_types import Circle, Observation, Ranges, RefusalReason, Scan, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
+from ..perception.sense_segments import sense_circles_and_segments
 from ..perception.sensory_vector import SensorParams, blind, sense_circles
 from .sensor_noise import Reading
-from .simulated_lidar import cast_rays
+from .simulated_lidar import cast_rays, cast_segments
 from .world import World
 
 SENSOR_STREAM = 2  # spawn key of the noise's SeedSequence child; the planner's is 1
@@ -37,10 +38,10 @@ class Perception:
     """Builds the Observations of simulation.run_episode.run, by name of the perception.
 
     sectors: sector ranges only. known: the circles whose enlarged edge is within SR, with their
-    true velocities. scan-12, scan-360: beams from the robot's centre along the middles of equal
-    sectors to the real circles, up to SR + robot radius. A surface at that range has its
-    enlarged edge at SR, so all sense the same region: these hold SR equal, and see less far than
-    a lidar (lidar_perception). Beams do not detect walls.
+    true velocities, and no wall segments. scan-12, scan-360: beams from the robot's centre along
+    the middles of equal sectors to the real circles and segments, up to SR + robot radius. A
+    surface at that range has its enlarged edge at SR, so all sense the same region: these hold SR
+    equal, and see less far than a lidar (lidar_perception). Beams do not detect Scenario.walls.
 
     noise_m is the standard deviation of ranges (of centres for known), drawn from a child of the
     seed named by the stamp. With a latency, circles and scan are that many ticks old (the first
@@ -130,6 +131,10 @@ class Perception:
             if distance(world.pose.position, center) <= longest + radius:
                 near.append((*center, radius))
         ranges = cast_rays(world.pose.position, near, self._beams, longest)
+        if world.scenario.segments_m:
+            segments = world.segments.near(world.pose.position, longest)
+            to_walls = cast_segments(world.pose.position, segments, self._beams)
+            ranges = np.minimum(ranges, np.where(to_walls <= longest, to_walls, np.inf))
         if self.noise_m:
             noisy = np.maximum(ranges + self._noise(world.stamp_ns, self._beams), 0.0)
             ranges = np.where(noisy <= longest, noisy, np.inf)
@@ -159,6 +164,11 @@ def _sensed(world: World, reading: Reading, params: SensorParams) -> Ranges:
     if reading.scan is None:
         position = reading.received.position
         _, circles = world.near(params.sensing_range_m, position)
+        scenario = world.scenario
+        if scenario.segments_m:
+            return sense_circles_and_segments(
+                position, circles, world.segments, scenario.robot_radius_m, params
+            )
         return sense_circles(position, circles, params)
     yaw = reading.received.yaw + world.scenario.robot.lidar.yaw_rad
     return sense_scan(reading.scan, yaw, world.scenario.robot_radius_m, params)

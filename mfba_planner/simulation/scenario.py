@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
@@ -10,9 +11,12 @@ from itertools import combinations, pairwise
 from ..core.errors import ConfigError
 from ..core.geometry import Point, distance
 from ..core.planner_types import ROBOT_RADIUS_M
+from ..core.segments import Segment, Segments, segments_of
 from ..planning.planner_params import PlannerParams
 from .obstacle_motion import Obstacle, Walls, center_at
 from .robot_model import Robot
+
+TOUCH_M = 1e-9  # a robot that starts in touch with a wall is not inside it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +52,8 @@ class FleetRobot:
 class Scenario:
     """A task: start, goal, robot, obstacles, walls and a limit of simulated time.
 
+    segments_m are static walls that the robot touches and its lidar detects; walls is a rectangle
+    that obstacles bounce from and the robot may cross. Moving obstacles pass through segments.
     With robots it is the task of a fleet (fleet.py); start_m and goal_m are its first robot's.
     """
 
@@ -62,6 +68,12 @@ class Scenario:
     robot: Robot = Robot()
     kidnappings: tuple[Kidnapping, ...] = ()
     robots: tuple[FleetRobot, ...] = ()
+    segments_m: tuple[Segment, ...] = ()
+
+    @property
+    def segments(self) -> Segments:
+        """The wall segments as arrays."""
+        return segments_of(self.segments_m)
 
     @property
     def robot_names(self) -> tuple[str, ...]:
@@ -83,6 +95,8 @@ class Scenario:
                 _check_inside(number, obstacle, self.walls)
             _check_turns(number, obstacle)
         _check_kidnappings(self)
+        if self.segments_m:
+            _check_place(self)
         if self.robots:
             _check_fleet(self)
 
@@ -104,6 +118,26 @@ class Scenario:
             (center_at(obstacle, t_s, self.walls), self.enlarged_radius(obstacle))
             for obstacle in self.obstacles
         ]
+
+
+def _check_place(scenario: Scenario) -> None:
+    """Raise ConfigError where a segment is a point, or the robot is to be within a wall."""
+    for number, (x0, y0, x1, y1) in enumerate(scenario.segments_m, start=1):
+        if (x0, y0) == (x1, y1):
+            raise ConfigError(
+                f"segment {number} [{x0:g}, {y0:g}, {x1:g}, {y1:g}]: of length 0; "
+                "give two different ends"
+            )
+    places = [("start_m", scenario.start_m), ("goal_m", scenario.goal_m)]
+    places += [("kidnapping to_m", kidnapping.to_m) for kidnapping in scenario.kidnappings]
+    for what, point in places:
+        near = scenario.segments.near(point, scenario.robot_radius_m).distances(*point)
+        inside_m = scenario.robot_radius_m - float(near.min(initial=math.inf))
+        if inside_m > TOUCH_M:
+            raise ConfigError(
+                f"{what}={list(point)}: {inside_m:.3g} m inside a wall segment "
+                "(robot_radius_m added); move it away from the wall"
+            )
 
 
 def _check_inside(number: int, obstacle: Obstacle, walls: Walls) -> None:

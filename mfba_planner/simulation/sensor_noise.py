@@ -11,8 +11,7 @@ import numpy as np
 
 from ..core.geometry import Pose2D, pose_as_in_message
 from ..core.planner_types import NANO, Scan
-from .obstacle_motion import Walls
-from .robot_model import Robot
+from .scenario import Scenario
 from .simulated_lidar import limited, scan_at
 
 ODOM_STREAM, SCAN_STREAM = 4, 5  # spawn keys of SeedSequence children; one number per purpose
@@ -41,9 +40,11 @@ class NoisySensors:
     and stamp.
     """
 
-    def __init__(self, robot: Robot, walls: Walls | None, tick_ns: int, seed: int) -> None:
+    def __init__(self, scenario: Scenario, tick_ns: int, seed: int) -> None:
         """Start before tick 0."""
-        self._robot, self._walls, self._seed = robot, walls, seed
+        robot = scenario.robot
+        self._robot, self._walls, self._seed = robot, scenario.walls, seed
+        self._segments = scenario.segments
         noise, tick_s = robot.noise, tick_ns * NANO
         self._poses: deque[Pose2D] = deque(maxlen=1 + round(noise.odom_latency_s / tick_s))
         self._scans: deque[Scan] = deque(maxlen=1 + round(noise.scan_latency_s / tick_s))
@@ -54,10 +55,13 @@ class NoisySensors:
         self._poses.append(pose)
         scan = None
         if self._robot.lidar.beams:
-            self._scans.append(scan_at(pose, self._robot.lidar, surfaces, self._walls))
+            self._scans.append(self._scan_at(pose, surfaces))
             scan = self._noisy_scan(self._scans[0], stamp_ns)
         self._last = self._noisy_pose(self._poses[0], stamp_ns)
         return Reading(self._last, scan)
+
+    def _scan_at(self, pose: Pose2D, surfaces: Surfaces) -> Scan:
+        return scan_at(pose, self._robot.lidar, surfaces, self._walls, self._segments)
 
     def _noisy_pose(self, pose: Pose2D, stamp_ns: int) -> Pose2D:
         noise = self._robot.noise

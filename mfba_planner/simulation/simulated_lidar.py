@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated lidar: ray casting against circles and walls, and the resulting scan."""
+"""Simulated lidar: ray casting against circles, segments and walls, and the resulting scan."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import numpy as np
 
 from ..core.geometry import Point, Pose2D
 from ..core.planner_types import Scan
+from ..core.segments import Segments
 from .obstacle_motion import Walls
 from .robot_model import Lidar
 
 _FULL_CIRCLE_RAD = 2.0 * math.pi
+_END_SLACK = 1e-9  # of a segment's length
+_END_SLACK = 1e-9  # of a segment's length
 _RAYS: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = {}
 
 
@@ -84,11 +87,35 @@ def cast_walls(
     return np.where((enter <= leave) & (leave > 0.0), met, np.inf)
 
 
+def cast_segments(
+    position: Point,
+    segments: Segments,
+    beams: int,
+    turned_rad: float = 0.0,
+    fov_rad: float = _FULL_CIRCLE_RAD,
+) -> np.ndarray:
+    """Range of each beam to the nearest segment, inf for a miss; (n,), m.
+
+    The ends belong to a segment, with a rounding error to spare: no beam passes between two that
+    share an end. A beam exactly along a segment misses it, as a wall has no thickness.
+    """
+    c, s = rays(beams, turned_rad, fov_rad)
+    x, y = segments.x[:, None] - position[0], segments.y[:, None] - position[1]
+    dx, dy = segments.dx[:, None], segments.dy[:, None]
+    across = c * dy - s * dx  # 0 along the segment
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ranges = (x * dy - y * dx) / across
+        share = (x * s - y * c) / across
+    hit = (ranges >= 0.0) & (share >= -_END_SLACK) & (share <= 1.0 + _END_SLACK)
+    return np.where(hit, ranges, np.inf).min(axis=0, initial=np.inf)
+
+
 def scan_at(
     pose: Pose2D,
     lidar: Lidar,
     circles: Sequence[tuple[float, float, float]],
     walls: Walls | None,
+    segments: Segments | None = None,
 ) -> Scan:
     """The scan of real surfaces from this pose, in the lidar's own frame.
 
@@ -100,6 +127,10 @@ def scan_at(
     if walls is not None and lidar.walls:
         to_walls = cast_walls(pose.position, walls, lidar.beams, turned, fov_rad)
         ranges = np.minimum(ranges, to_walls)
+    if segments is not None and segments.x.size:
+        near = segments.near(pose.position, lidar.range_max_m)
+        to_segments = cast_segments(pose.position, near, lidar.beams, turned, fov_rad)
+        ranges = np.minimum(ranges, to_segments)
     increment = fov_rad / lidar.beams
     return Scan(
         ranges_m=limited(ranges, lidar),

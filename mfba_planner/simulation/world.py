@@ -39,12 +39,13 @@ class World:
                 "one; use simulation.fleet"
             )
         self.scenario = scenario
+        self.segments = scenario.segments
         self.tick_ns = tick_ns
         self.goal_tolerance_m = goal_tolerance_m
         self.tick = 0
         self.pose = Pose2D(*scenario.start_m)
         self.speeds = Speeds()  # of a differential drive
-        self._instruments = NoisySensors(scenario.robot, scenario.walls, tick_ns, seed)
+        self._instruments = NoisySensors(scenario, tick_ns, seed)
         self._read: tuple[int, Reading] | None = None
         self._nearby = NearbyObstacles(Motion(scenario), tick_ns)
 

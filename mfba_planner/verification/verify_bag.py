@@ -15,7 +15,8 @@ from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner_types import Decision, Mode, Observation, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
-from ..perception.sensory_vector import sense_circles, sensory_vector
+from ..perception.sense_segments import sense_circles_and_segments
+from ..perception.sensory_vector import sensory_vector
 from ..planning.planner_factory import make_planner
 from ..recording.bag_reader import BagReader
 from ..recording.file_integrity import check_data
@@ -246,5 +247,11 @@ def _sectors_match_sensor(setup: Setup, tick: Tick, decision: Decision) -> bool:
     radii = [o.radius_m + scenario.robot_radius_m for o in scenario.obstacles]
     if len(radii) != len(centers):
         return False
-    ranges = sense_circles(position, list(zip(centers, radii)), setup.sensor)
+    ranges = sense_circles_and_segments(
+        position,
+        list(zip(centers, radii)),
+        scenario.segments,
+        scenario.robot_radius_m,
+        setup.sensor,
+    )
     return ranges == decision.ranges_m or (not decision.ranges_m and any(map(math.isnan, ranges)))

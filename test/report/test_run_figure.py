@@ -346,11 +346,15 @@ def legend_labels(figure: Figure) -> list[str]:
 def test_the_legend_lists_what_is_drawn_and_nothing_else() -> None:
     assert legend_labels(figure_of("empty")) == ["start", "goal", "path generation"]
     walled = legend_labels(figure_of("walled"))
-    assert {"wall", "obstacle's track", "sensing range SR at the switch"} <= set(walled)
+    assert {
+        "wall for obstacles only",
+        "obstacle's track",
+        "sensing range SR at the switch",
+    } <= set(walled)
     assert not {"end of the run", "blocked (every gap closed)"} & set(walled)
     blocked = legend_labels(figure_of("blocked"))
     assert {"end of the run", "blocked (every gap closed)"} <= set(blocked)
-    assert not {"wall", "obstacle's track"} & set(blocked)
+    assert not {"wall for obstacles only", "wall", "obstacle's track"} & set(blocked)
 
 
 def texts(figure: Figure) -> list[Text]:

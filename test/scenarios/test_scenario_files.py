@@ -255,9 +255,9 @@ def test_not_yaml(text: str, problem: str) -> None:
     ("text", "message"),
     [
         (TASK + "goal: 3", "goal: unknown key; did you mean 'goal_m'?"),
-        (TASK + "zzzz: 3", "zzzz: unknown key; known: description, goal_m, kidnappings, "
-                           "name, obstacles, robot, robot_radius_m, robots, start_m, "
-                           "time_limit_s, walls"),
+        (TASK + "zzzz: 3", "zzzz: unknown key; known: boxes, description, goal_m, "
+                           "kidnappings, map, name, obstacles, polygons_m, robot, "
+                           "robot_radius_m, robots, segments_m, start_m, time_limit_s, walls"),
         # the misspelt key is named, not the one missing because of it
         ("name: x\nstart_m: [0, 0]\ngaol_m: [1, 1]",
          "gaol_m: unknown key; did you mean 'goal_m'?"),

@@ -115,7 +115,8 @@ def test_beams_end_at_the_walls(x: float, y: float) -> None:
 
 def sensors(seed: int = 0, **noise: float) -> NoisySensors:
     robot = Robot(lidar=Lidar(beams=360), noise=Noise(**noise))
-    return NoisySensors(robot, None, TICK_NS, seed)
+    task = Scenario(name="x", start_m=(0.0, 0.0), goal_m=(9.0, 9.0), robot=robot)
+    return NoisySensors(task, TICK_NS, seed)
 
 
 POSES = [Pose2D(0.1 * k, 0.0, 0.1 * k) for k in range(200)]

@@ -15,7 +15,7 @@ from ...perception.sensory_vector import bits_text
 from ...simulation.batched_motion import Motion
 from ...simulation.episode import Episode, Outcome
 from ...simulation.obstacle_motion import velocity_at
-from ..contacts_and_clearances import RunMotion
+from ..contacts_and_clearances import WALL, RunMotion
 from ..metrics import Result, assess, within_range
 from .single_run import CompletedRun
 
@@ -31,7 +31,8 @@ def _headline(completed: CompletedRun, result: Result, run_motion: RunMotion) ->
         number, index = run_motion.first_contact_with, _index(episode, run_motion) or 0
         did = "ran into" if _moves(episode, index) else "stood still and was hit by"
         more = f"; {result.collisions} contacts in all" if result.collisions > 1 else ""
-        return f"the robot {did} obstacle {number} at {run_motion.first_contact_s:.2f} s{more}"
+        touched = "a wall" if number == WALL else f"obstacle {number}"
+        return f"the robot {did} {touched} at {run_motion.first_contact_s:.2f} s{more}"
     if result.outcome is Outcome.GOAL_REACHED:
         return f"goal reached without collision after {result.length_m:.3f} m"
     remaining_m = distance(episode.ticks[-1].pose.position, episode.scenario.goal_m)
@@ -59,7 +60,10 @@ def explain(completed: CompletedRun) -> list[str]:
     index = _index(episode, run_motion)
     if index is not None:
         number = run_motion.first_contact_with
-        lines += [*_contact(episode, index, number), "", *_table(episode, index, number)]
+        contact = (
+            _wall_contact(episode, index) if number == WALL else _contact(episode, index, number)
+        )
+        lines += [*contact, "", *_table(episode, index, number)]
     elif completed.fault:
         last = len(episode.ticks) - 1
         lines += ["", "the last decisions that were followed:", *_table(episode, last, 0)]
@@ -75,20 +79,36 @@ def explain(completed: CompletedRun) -> list[str]:
     return lines
 
 
-def _contact(episode: Episode, index: int, number: int) -> Iterator[str]:
-    """The first contact: time, motion of both, and since when the obstacle was within SR."""
-    tick = episode.ticks[index]
-    time_s = episode.time_s(tick.stamp_ns)
-    ttc = _time_to_contact(episode, index, number)
-    position, center = tick.pose.position, _center(episode, number, time_s)
-    scenario = episode.scenario
-    obstacle = velocity_at(scenario.obstacles[number - 1], time_s, scenario.walls)
-    closing = _closing_speed(position, center, tick.velocity, obstacle)
-    yield (
+def _contact_step(episode: Episode, index: int, number: int) -> str:
+    """The step of the first contact, with an obstacle or the walls."""
+    time_s, ttc = (
+        episode.time_s(episode.ticks[index].stamp_ns),
+        _time_to_contact(episode, index, number),
+    )
+    return (
         f"contact: in the step after tick {index} ({time_s:.2f} s)"
         + (f", {ttc:.2f} s into it" if math.isfinite(ttc) else "")
         + f"; gap at the tick {_gap(episode, index, number):.3f} m"
     )
+
+
+def _wall_contact(episode: Episode, index: int) -> Iterator[str]:
+    """The first contact with a wall: time, motion, and the decision."""
+    tick = episode.ticks[index]
+    yield _contact_step(episode, index, WALL)
+    yield f"motion: robot {math.hypot(*tick.velocity):.2f} m/s"
+    yield f"decided: {tick.mode.value}, {tick.reason}{_bits(tick)}"
+
+
+def _contact(episode: Episode, index: int, number: int) -> Iterator[str]:
+    """The first contact: time, motion of both, and since when the obstacle was within SR."""
+    tick = episode.ticks[index]
+    time_s = episode.time_s(tick.stamp_ns)
+    position, center = tick.pose.position, _center(episode, number, time_s)
+    scenario = episode.scenario
+    obstacle = velocity_at(scenario.obstacles[number - 1], time_s, scenario.walls)
+    closing = _closing_speed(position, center, tick.velocity, obstacle)
+    yield _contact_step(episode, index, number)
     yield (
         f"motion: robot {math.hypot(*tick.velocity):.2f} m/s, obstacle {math.hypot(*obstacle):.2f}"
         f" m/s, closing at {closing:.2f} m/s; "
@@ -113,7 +133,7 @@ def _contact(episode: Episode, index: int, number: int) -> Iterator[str]:
 
 
 def _table(episode: Episode, index: int, number: int) -> Iterator[str]:
-    """The decisions up to tick index; with an obstacle, its gap and the time to collision."""
+    """The decisions up to tick index; with an obstacle or WALL, gap and time to collision."""
     head = f"{'tick':>5} {'time':>7}  {'mode':<19}"
     yield head + (f" {'gap':>7} {'ttc':>7}" if number else "") + "  why"
     for k in range(max(0, index - BEFORE + 1), index + 1):
@@ -158,6 +178,9 @@ def _center(episode: Episode, number: int, time_s: float) -> Point:
 
 def _gap(episode: Episode, index: int, number: int) -> float:
     tick = episode.ticks[index]
+    if number == WALL:
+        distances = episode.scenario.segments.distances(*tick.pose.position)
+        return float(distances.min()) - episode.scenario.robot_radius_m
     center, radius = episode.scenario.enlarged(episode.time_s(tick.stamp_ns))[number - 1]
     return distance(tick.pose.position, center) - radius
 
@@ -167,13 +190,15 @@ def _moves(episode: Episode, index: int) -> bool:
 
 
 def _time_to_contact(episode: Episode, index: int, number: int) -> float:
-    """Time to collision with one obstacle at the velocities of the step after a tick."""
+    """Time to collision with an obstacle, or WALL, at the velocities of the step after a tick."""
     ticks = episode.ticks[index : index + 2]
     if len(ticks) < 2:
         return math.inf
     times_s = np.array([episode.time_s(tick.stamp_ns) for tick in ticks])
     positions = np.array([tick.pose.position for tick in ticks]).T
     steps = Motion(episode.scenario).steps(times_s, positions)
+    if number == WALL and steps.walls is not None:
+        return float(steps.walls.contact_s[0])
     return float(steps.contact_s[0, number - 1])
 
 

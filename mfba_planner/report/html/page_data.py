@@ -114,6 +114,7 @@ def run_data(
             "goal": list(episode.scenario.goal_m),
             "robot_radius": episode.scenario.robot_radius_m,
             "walls": _walls(episode),
+            "segments": [_drawn(segment) for segment in episode.scenario.segments_m],
             "times": times_s,
             "obstacles": _obstacles(episode, names, times_s),
         },

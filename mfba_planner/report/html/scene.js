@@ -38,7 +38,7 @@ class Scene {
     return element;
   }
 
-  /** The grid with a round spacing, its numbers, and the walls. */
+  /** The grid with a round spacing, its numbers, and the walls of both kinds. */
   drawGround(world) {
     const [left, bottom, right, top] = world.view;
     const step = roundStep(Math.max(right - left, top - bottom) / 8);
@@ -56,6 +56,8 @@ class Scene {
       this.label(`${round(y)}${unit}`, left, y, { class: "axis", dx: 3, dy });
     }
     this.element.prepend(svg("path", { class: "grid", d: lines.join("") }));
+    const walls = world.segments.map(([x0, y0, x1, y1]) => `M${x0} ${-y0}L${x1} ${-y1}`);
+    if (walls.length) this.add("path", { class: "segments", d: walls.join("") });
     if (!world.walls) return;
     const [x0, y0, x1, y1] = world.walls;
     this.add("rect", { class: "wall", x: x0, y: -y1, width: x1 - x0, height: y1 - y0 });

@@ -11,7 +11,8 @@ from typing import Any
 from rclpy.serialization import serialize_message
 
 from ...core.planner_types import Decision, Scan
-from ...perception.sensory_vector import sense_circles, sensory_vector
+from ...perception.sense_segments import sense_circles_and_segments
+from ...perception.sensory_vector import sensory_vector
 from ...planning.planner_params import Method
 from ...recording.bag_writer import BagWriter
 from ...recording.configuration_attachment import attach_configuration
@@ -106,7 +107,9 @@ def _tick_messages(
     """The messages of world, sensor and planner; velocity is that of the previous tick."""
     scenario, stamp, time_s = episode.scenario, tick.stamp_ns, episode.time_s(tick.stamp_ns)
     circles = scenario.enlarged(time_s)
-    ranges = tick.ranges_m or sense_circles(tick.pose.position, circles, episode.sensor)
+    ranges = tick.ranges_m or sense_circles_and_segments(
+        tick.pose.position, circles, scenario.segments, scenario.robot_radius_m, episode.sensor
+    )
     yield topics.CLOCK, to_messages.clock_msg(stamp)
     yield topics.OBSTACLES, to_messages.obstacles_msg([c for c, _ in circles], stamp, _FRAME)
     yield topics.ODOM, to_messages.odometry_msg(tick.pose, velocity, stamp, _FRAME, _BASE)

@@ -26,6 +26,7 @@ SKY: Rgba = (0.34, 0.71, 0.91, 0.9)
 GREEN: Rgba = (0.0, 0.62, 0.45, 0.9)
 VERMILION: Rgba = (0.84, 0.37, 0.0, 0.9)
 GREY: Rgba = (0.5, 0.5, 0.5, 0.6)
+DARK: Rgba = (0.13, 0.13, 0.13, 1.0)
 FAINT: Rgba = (0.90, 0.62, 0.0, 0.25)
 RING, SLICES = 72, 4  # corners of the ring, triangles of a sector
 
@@ -58,7 +59,7 @@ class RateLimit:
 
 
 def world_markers(world: World, stamp_ns: int, frame_id: str) -> MarkerArray:
-    """Robot, goal, obstacles with their radii and velocity arrows."""
+    """Robot, goal, wall segments, obstacles with their radii and velocity arrows."""
     robot_radius = world.scenario.robot_radius_m
     marks = [
         _disc("robot", 0, world.pose.position, robot_radius, SKY),
@@ -70,6 +71,10 @@ def world_markers(world: World, stamp_ns: int, frame_id: str) -> MarkerArray:
         marks.append(_disc("obstacles", number, a, obstacle.radius_m, GREY))
         if a != b:
             marks.append(_arrow("velocities", number, [a, b], VERMILION))
+    ends = [
+        (x, y) for x0, y0, x1, y1 in world.scenario.segments_m for x, y in ((x0, y0), (x1, y1))
+    ]
+    marks.append(_line("walls", 0, ends, 0.05, DARK, Marker.LINE_LIST))
     return _array(marks, stamp_ns, frame_id)
 
 

@@ -9,14 +9,12 @@ from typing import Any
 from ...core.errors import InputError
 from ...core.geometry import Pose2D
 from ...core.planner_types import Ranges
+from ...core.segments import Segments
 from ...perception.scan_to_sectors import sense_scan
-from ...perception.sensory_vector import (
-    SensorParams,
-    enlarged_radii,
-    sense_circles,
-    sensory_vector,
-)
+from ...perception.sense_segments import sense_circles_and_segments
+from ...perception.sensory_vector import SensorParams, enlarged_radii, sensory_vector
 from ...recording.from_messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
+from ...scenarios.scenario_json import parse_segments
 from ..endpoints.sensor_diagnostics import SensorDiagnostics
 from ..interface import parameters, topics
 from ..interface.to_messages import sectors_msg, sensory_vector_msg
@@ -42,6 +40,7 @@ class VirtualSensor(GraphNode):
         self.settings = s = parameters.declare(self, VirtualSensorSettings(), read_only=True)
         self.sensor = parameters.declare(self, SensorParams())
         self.radii = parameters.declare_radii(self, _DEFAULT_RADII)
+        self.segments = Segments.of(parse_segments(s.segments_m))
         parameters.follow(self, lambda: self.sensor, self._set_sensor)
         self._refused_inputs = RefusedInputs(self)
         self._monitor = InputMonitor(self, s, self._refused_inputs, s.input_timeout_s, self._reset)
@@ -128,7 +127,9 @@ class VirtualSensor(GraphNode):
         centers = obstacle_centers(message)
         radii = enlarged_radii(len(centers), self.radii, s.robot_radius_m)
         circles = zip(centers, radii)
-        return sense_circles(pose.position, circles, self.sensor)
+        return sense_circles_and_segments(
+            pose.position, circles, self.segments, s.robot_radius_m, self.sensor
+        )
 
     def _publish(self, stamp: int, ranges: Ranges) -> None:
         s = self.settings
