@@ -40,43 +40,43 @@ class DistanceField:
 
 
 def distance_field(
-    x: Array, y: Array, center: Point, window_m: float, cell_m: float, cap_m: float
+    x: Array, y: Array, low: Point, high: Point, cell_m: float, cap_m: float
 ) -> DistanceField:
-    """Distances (m, at most cap_m) to points (n,) in a square around the centre.
+    """Distances (m, at most cap_m) to points (n,) in a rectangle between two corners.
 
     The grid is aligned with multiples of cell_m. The nearest occupied cell is that of the
     Euclidean distance transform; the distance is that to the nearest of the points in it and in
     the nearest cells of the four neighbours, not to its centre.
     """
-    n = max(math.ceil(window_m / cell_m), 2)
-    pad = math.ceil(cap_m / cell_m) + 1  # points outside the window count as well
-    i0 = math.floor((center[0] - 0.5 * window_m) / cell_m) - pad
-    j0 = math.floor((center[1] - 0.5 * window_m) / cell_m) - pad
-    size = n + 2 * pad
+    width, height = (max(math.ceil((b - a) / cell_m), 2) for a, b in zip(low, high))
+    pad = math.ceil(cap_m / cell_m) + 1  # points outside the rectangle count as well
+    i0 = math.floor(low[0] / cell_m) - pad
+    j0 = math.floor(low[1] / cell_m) - pad
+    rows, columns = height + 2 * pad, width + 2 * pad
     i = np.floor(x / cell_m).astype(np.int64) - i0
     j = np.floor(y / cell_m).astype(np.int64) - j0
-    inside = (i >= 0) & (j >= 0) & (i < size) & (j < size)
+    inside = (i >= 0) & (j >= 0) & (i < columns) & (j < rows)
     origin = ((i0 + pad) * cell_m, (j0 + pad) * cell_m)
     if not inside.any():
-        return DistanceField(origin, cell_m, np.full((n, n), cap_m), cap_m)
+        return DistanceField(origin, cell_m, np.full((height, width), cap_m), cap_m)
     from scipy.ndimage import distance_transform_edt  # loads in 0.1 s, and only here
 
-    cells = j[inside] * size + i[inside]
-    px, py = np.zeros(size * size), np.zeros(size * size)
+    cells = j[inside] * columns + i[inside]
+    px, py = np.zeros(rows * columns), np.zeros(rows * columns)
     px[cells], py[cells] = x[inside] - origin[0], y[inside] - origin[1]
-    empty = np.ones(size * size, dtype=bool)
+    empty = np.ones(rows * columns, dtype=bool)
     empty[cells] = False
     near = distance_transform_edt(
-        empty.reshape(size, size), return_distances=False, return_indices=True
+        empty.reshape(rows, columns), return_distances=False, return_indices=True
     )
-    index = near[0].astype(np.int64) * size + near[1]
+    index = near[0].astype(np.int64) * columns + near[1]
     qx, qy = px[index], py[index]
-    at = (np.arange(n) + 0.5) * cell_m
-    best = np.full((n, n), cap_m * cap_m)
+    at_x, at_y = (np.arange(width) + 0.5) * cell_m, (np.arange(height) + 0.5) * cell_m
+    best = np.full((height, width), cap_m * cap_m)
     for dj, di in ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)):
-        rows, columns = slice(pad + dj, pad + dj + n), slice(pad + di, pad + di + n)
-        dx = qx[rows, columns] - at
-        dy = qy[rows, columns] - at[:, None]
+        part = (slice(pad + dj, pad + dj + height), slice(pad + di, pad + di + width))
+        dx = qx[part] - at_x
+        dy = qy[part] - at_y[:, None]
         dx *= dx
         dy *= dy
         dx += dy

@@ -256,13 +256,24 @@ class StaticMap:
         x, y = self._matching.measured(data[X], data[Y], self._origin)
         return np.stack((x, y), axis=1)
 
+    def map_points(self) -> Array:
+        """Points (n, 2) in the map's frame."""
+        data: Array = self._points.data[:2].T
+        return data
+
     def distance_field(self, center: Point, window_m: float, cell_m: float) -> DistanceField:
         """Distances to the nearest point in a square around a position, in the map's frame.
 
         Capped at widest_m; array[j, i] belongs to origin + ((i + 0.5) cell, (j + 0.5) cell).
         """
+        half = 0.5 * window_m
+        low, high = (center[0] - half, center[1] - half), (center[0] + half, center[1] + half)
+        return self.rectangle_field(low, high, cell_m)
+
+    def rectangle_field(self, low: Point, high: Point, cell_m: float) -> DistanceField:
+        """distance_field() between two corners."""
         data = self._points.data
-        return distance_field(data[X], data[Y], center, window_m, cell_m, self.params.widest_m)
+        return distance_field(data[X], data[Y], low, high, cell_m, self.params.widest_m)
 
     def distance(self, x: Array, y: Array) -> Array:
         """Distance to the nearest point at positions (k,) in odom, capped at widest_m.

@@ -16,12 +16,15 @@ from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
 from ..perception.scan_coverage import ScanCoverage
+from ..perception.static_map import StaticMapParams
 from ..perception.sensory_vector import SensorParams, sense_circles
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
 from .differential_drive import Speeds, apply_command, command
+from .distance_to_go import RouteParams
 from .drive_rollout import DriveRollout
+from .map_planning import MapPlanning
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
@@ -71,6 +74,8 @@ class PredictiveParams:
     )  # fmt: skip
     memory: ObstacleMemoryParams = field(default_factory=ObstacleMemoryParams)
     tracking: TrackingParams = field(default_factory=TrackingParams)
+    map: StaticMapParams = field(default_factory=StaticMapParams)
+    route: RouteParams = field(default_factory=RouteParams)
     risk: RiskParams = field(default_factory=RiskParams)
 
     def __post_init__(self) -> None:
@@ -128,6 +133,7 @@ class Predictive(BasePlanner):
         self._waypoint: Point | None = None
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
+        self._map_planning: MapPlanning
         super().__init__(params, sensor, seed)
 
     def move(self, obs: Observation, goal: Point) -> Move:
@@ -137,6 +143,14 @@ class Predictive(BasePlanner):
         self._perceived = circles = self._circles(obs)
         self._by_sectors = obs.circles is None and obs.scan is None
         self._unobserved = None if obs.scan is None else self._coverage.unsafe(obs.pose_ns)
+        if obs.scan is not None and obs.circles is None:
+            among = self._map_planning.move(
+                obs, goal, circles, self._speeds, self._unobserved, last_waypoint, self.tick_s
+            )
+            if among is not None:
+                if among.event is Event.OBSTACLE:
+                    self._waypoint = among.waypoint
+                return among
         if not circles and self._is_observed((goal[0] - position[0], goal[1] - position[1])):
             self._changes.not_enclosed()
             straight = self.straight(position, goal, self.params.speed_mps)
@@ -294,6 +308,10 @@ class Predictive(BasePlanner):
         self._changes = SectorChanges()
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
+        self._map_planning = MapPlanning(
+            self.params, self.options.map, self.options.route, self.options.risk,
+            self.options.headings, self.options.reach_m, self.options.search_m, self.seed,
+        )  # fmt: skip
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
         """Circles at obs.pose_ns: given and remembered, tracked, or one for each set sector."""
@@ -305,6 +323,7 @@ class Predictive(BasePlanner):
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
             self._coverage.update(stamp_ns, obs.scan)
+            self._map_planning.update(stamp_ns, obs, self._tracker)
             return self._tracker.circles(obs.pose_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 

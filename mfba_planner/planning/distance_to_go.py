@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Distance to go: length of the shortest way to the goal through the local map.
+
+In eq. 1 it takes the place of the straight line from a waypoint to the goal. It solves the
+eikonal equation |grad D| F = 1 by fast marching (Sethian 1996) from the goal; F is the share of
+the full speed, small near what stands. Unknown space counts as free.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.geometry import Point, distance
+from ..core.option_specs import check, option
+from ..core.planner_types import NANO
+from ..perception.distance_field import DistanceField
+from ..perception.static_map import StaticMap
+
+Array = np.ndarray
+
+_CLEAR_M = 0.04  # beside the robot's radius: a straight line with so much room is driven
+_TOUCH_M = 0.02  # nearer than so much beyond the radius counts as closed
+_CLOSED = 0.02  # F there; not 0, so that the distance to go stays finite
+_SLOWEST, _ROOM_M = 0.6, 0.25  # F beside what stands, and from where it is 1
+_MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
+_MOST_CELLS = 20_000  # about 8 ms
+_FARTHEST_M = 20.0  # a goal farther away is replaced by a point on the line to it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RouteParams:
+    """Options of the distance to go."""
+
+    refresh_s: float = option(
+        0.25, "time after which the distance to go is computed again, if the map has changed",
+        unit="s", minimum=0.0, maximum=10.0,
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+class DistanceToGo:
+    """The distance to go to one goal, computed again when the map has changed.
+
+    All positions are in the map's frame. While the straight line from the robot is clear, the
+    distance to go is the straight line.
+    """
+
+    def __init__(self, params: RouteParams, radius_m: float) -> None:
+        """radius_m is the robot's."""
+        self._params, self._radius_m = params, radius_m
+        self.goal: Point = (0.0, 0.0)
+        self.is_straight = True
+        self._computed: tuple[int, int, Point] | None = None  # stamp, map version, goal
+        self._field: DistanceField | None = None  # distances to what stands
+        self._to_go: Array | None = None
+        self._beyond_m = 0.0
+        self._step_x: Array | None = None
+        self._step_y: Array | None = None
+        self._origin: Point = (0.0, 0.0)
+        self._cell_m = 1.0
+
+    def update(self, stamp_ns: int, known: StaticMap, position: Point, goal: Point) -> None:
+        """Take the map as it is now."""
+        self.goal = goal
+        self.is_straight = is_clear(known, position, goal, self._radius_m + _CLEAR_M)
+        if self.is_straight:
+            return
+        if self._computed is not None:
+            then_ns, version, then_goal = self._computed
+            age_s = (stamp_ns - then_ns) * NANO
+            fresh = 0.0 <= age_s < self._params.refresh_s or version == known.version
+            if fresh and then_goal == goal and self._is_inside(position):
+                return
+        self._compute(known, position, goal)
+        self._computed = (stamp_ns, known.version, goal)
+
+    def _compute(self, known: StaticMap, position: Point, goal: Point) -> None:
+        import eikonalfm  # only here: most runs in the open do not need it
+
+        target = goal
+        away = distance(position, goal)
+        if away > _FARTHEST_M:
+            share = _FARTHEST_M / away
+            target = (
+                position[0] + share * (goal[0] - position[0]),
+                position[1] + share * (goal[1] - position[1]),
+            )
+        self._beyond_m = distance(target, goal)
+        fine = known.params.cell_m
+        low, high, per_cell = _domain(position, target, fine)
+        self._cell_m = fine * per_cell
+        field = known.rectangle_field(low, high, fine)
+        self._origin = field.origin_m
+        speed = _speed(field.distance_m, self._radius_m)
+        height, width = (n // per_cell for n in speed.shape)
+        speed = speed[: height * per_cell, : width * per_cell]
+        # The widest part of a cell decides, or narrow doors would close.
+        speed = speed.reshape(height, per_cell, width, per_cell).max(axis=(1, 3))
+        i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
+        j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
+        to_go = eikonalfm.fast_marching(speed, (j, i), (self._cell_m, self._cell_m), 2)
+        self._to_go = to_go
+        self._speed = speed
+        dy, dx = np.gradient(to_go, self._cell_m)
+        length = np.sqrt(dx * dx + dy * dy) + 1e-12
+        self._step_x, self._step_y = -dx / length, -dy / length
+
+    def _is_inside(self, position: Point) -> bool:
+        if self._to_go is None:
+            return False
+        height, width = self._to_go.shape
+        u = (position[0] - self._origin[0]) / self._cell_m
+        v = (position[1] - self._origin[1]) / self._cell_m
+        return 10.0 <= u <= width - 10.0 and 10.0 <= v <= height - 10.0
+
+    def at(self, x: Array, y: Array) -> Array:
+        """Distance to go (m) at positions of any shape."""
+        if self.is_straight or self._to_go is None:
+            dx, dy = x - self.goal[0], y - self.goal[1]
+            straight: Array = np.sqrt(dx * dx + dy * dy)
+            return straight
+        return _bilinear(self._to_go, *self._cells(x, y)) + self._beyond_m
+
+    def direction(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Unit vector of the shortest way at positions of any shape."""
+        if self.is_straight or self._to_go is None:
+            dx, dy = self.goal[0] - x, self.goal[1] - y
+        else:
+            assert self._step_x is not None and self._step_y is not None
+            cells = self._cells(x, y)
+            dx, dy = _bilinear(self._step_x, *cells), _bilinear(self._step_y, *cells)
+        length = np.sqrt(dx * dx + dy * dy) + 1e-12
+        return dx / length, dy / length
+
+    def _cells(self, x: Array, y: Array) -> tuple[Array, Array]:
+        assert self._to_go is not None
+        height, width = self._to_go.shape
+        u = (x - self._origin[0]) / self._cell_m - 0.5
+        v = (y - self._origin[1]) / self._cell_m - 0.5
+        return np.clip(u, 0.0, width - 1.001), np.clip(v, 0.0, height - 1.001)
+
+
+def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:
+    """Whether no point of the map is nearer to the line than room_m; its ends may be."""
+    points = known.map_points()
+    if not points.shape[0]:
+        return True
+    x, y = points[:, 0] - start[0], points[:, 1] - start[1]
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length2 = dx * dx + dy * dy
+    if length2 == 0.0:
+        return True
+    share = np.clip((x * dx + y * dy) / length2, 0.0, 1.0)
+    x, y = x - share * dx, y - share * dy
+    near = x * x + y * y < room_m * room_m
+    # What stands beside the robot already does not close a line that leads away from it.
+    return not bool((near & (share > 0.0)).any())
+
+
+def _domain(position: Point, goal: Point, fine_m: float) -> tuple[Point, Point, int]:
+    """Corners of the rectangle, and how many cells of the map make one of its cells."""
+    margin, per_cell = _MARGIN_M, 2
+    while True:
+        low = (min(position[0], goal[0]) - margin, min(position[1], goal[1]) - margin)
+        high = (max(position[0], goal[0]) + margin, max(position[1], goal[1]) + margin)
+        cell = fine_m * per_cell
+        if (high[0] - low[0]) * (high[1] - low[1]) <= _MOST_CELLS * cell * cell:
+            return low, high, per_cell
+        if margin > _LEAST_MARGIN_M:
+            margin -= 0.5
+        else:
+            margin, per_cell = _MARGIN_M, per_cell + 1
+
+
+def _speed(clearance_m: Array, radius_m: float) -> Array:
+    """Share of the full speed at distances from what stands."""
+    room = (clearance_m - radius_m - _TOUCH_M) / _ROOM_M
+    speed = _SLOWEST + (1.0 - _SLOWEST) * np.minimum(room, 1.0)
+    speed[room < 0.0] = _CLOSED
+    return speed
+
+
+def _bilinear(values: Array, u: Array, v: Array) -> Array:
+    flat, width = values.ravel(), values.shape[1]
+    i, j = u.astype(np.int64), v.astype(np.int64)
+    u, v = u - i, v - j
+    k = j * width + i
+    low = flat[k] * (1.0 - u) + flat[k + 1] * u
+    k += width
+    high = flat[k] * (1.0 - u) + flat[k + 1] * u
+    found: Array = low + v * (high - low)
+    return found
