@@ -8,7 +8,6 @@ the full speed, small near what stands. Unknown space counts as free.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +21,7 @@ from ..perception.static_map import StaticMap
 Array = np.ndarray
 
 _CLEAR_M = 0.04  # beside the robot's radius: a straight line with so much room is driven
-_TOUCH_M = 0.02  # nearer than so much beyond the radius counts as closed
+_TOUCH_M = 0.03  # nearer than so much beyond the radius counts as closed
 _CLOSED = 0.02  # F there; not 0, so that the distance to go stays finite
 _SLOWEST, _ROOM_M = 0.6, 0.25  # F beside what stands, and from where it is 1
 _MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
@@ -60,8 +59,7 @@ class DistanceToGo:
         self._field: DistanceField | None = None  # distances to what stands
         self._to_go: Array | None = None
         self._beyond_m = 0.0
-        self._step_x: Array | None = None
-        self._step_y: Array | None = None
+        self._step: Array | None = None  # unit vectors of the shortest way, complex
         self._origin: Point = (0.0, 0.0)
         self._cell_m = 1.0
 
@@ -108,8 +106,8 @@ class DistanceToGo:
         self._to_go = to_go
         self._speed = speed
         dy, dx = np.gradient(to_go, self._cell_m)
-        length = np.sqrt(dx * dx + dy * dy) + 1e-12
-        self._step_x, self._step_y = -dx / length, -dy / length
+        step = dx + 1j * dy
+        self._step = -step / (np.abs(step) + 1e-12)
 
     def _is_inside(self, position: Point) -> bool:
         if self._to_go is None:
@@ -130,20 +128,23 @@ class DistanceToGo:
     def direction(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Unit vector of the shortest way at positions of any shape."""
         if self.is_straight or self._to_go is None:
-            dx, dy = self.goal[0] - x, self.goal[1] - y
+            step = (self.goal[0] - x) + 1j * (self.goal[1] - y)
         else:
-            assert self._step_x is not None and self._step_y is not None
-            cells = self._cells(x, y)
-            dx, dy = _bilinear(self._step_x, *cells), _bilinear(self._step_y, *cells)
-        length = np.sqrt(dx * dx + dy * dy) + 1e-12
-        return dx / length, dy / length
+            assert self._step is not None
+            step = _bilinear(self._step, *self._cells(x, y))
+        step = step / (np.abs(step) + 1e-12)
+        return step.real, step.imag
 
     def _cells(self, x: Array, y: Array) -> tuple[Array, Array]:
         assert self._to_go is not None
         height, width = self._to_go.shape
         u = (x - self._origin[0]) / self._cell_m - 0.5
         v = (y - self._origin[1]) / self._cell_m - 0.5
-        return np.clip(u, 0.0, width - 1.001), np.clip(v, 0.0, height - 1.001)
+        np.maximum(u, 0.0, out=u)
+        np.minimum(u, width - 1.001, out=u)
+        np.maximum(v, 0.0, out=v)
+        np.minimum(v, height - 1.001, out=v)
+        return u, v
 
 
 def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:

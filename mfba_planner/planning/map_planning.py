@@ -86,7 +86,7 @@ class MapPlanning:
         speed = params.speed_mps
         rollout = MapRollout(
             position, obs.pose.yaw + turn, speeds, params, params.robot_radius_m, speed,
-            tick_s, to_go, clearance,
+            tick_s, to_go, clearance, circles, self._risk.horizon_s,
         )  # fmt: skip
         last = None
         if last_waypoint is not None:
@@ -97,7 +97,7 @@ class MapPlanning:
             delay = TurnDelay(params, obs.pose.yaw + turn, speeds.omega)
         observed = None if unobserved is None else ~unobserved
         found = self._search.search(
-            rollout, position, circles, self._risk, speed, tick_s, delay, observed, last,
+            rollout, position, self._risk, speed, tick_s, delay, observed, last,
             lambda center: self._swarm(center, obs.stamp_ns),
         )  # fmt: skip
         return self._as_move(obs, found, position, turn, points[away < 1.0], circles, tick_s)

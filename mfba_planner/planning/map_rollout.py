@@ -24,7 +24,8 @@ from .trajectory_cost import RiskParams
 
 Array = np.ndarray
 
-CONTACT_M = 0.01  # beyond the robot's radius
+CONTACT_M = 0.02  # beyond the robot's radius: the end of a wall is seen a beam too short
+CLOSE_M = 1.0  # cost of a pass beside what stands without clearance
 FORBIDDEN_M = 1000.0  # cost of a contact before the waypoint with what stands
 CARROT_M = 0.4  # a differential base aims so far ahead along the shortest way
 SLOW_ROOM_M, SLOWEST = 0.4, 0.35  # room below which a differential base slows down, and to what
@@ -57,22 +58,45 @@ class MapRollout:
         tick_s: float,
         to_go: DistanceToGo,
         clearance: DistanceField,
+        circles: Sequence[Circle],
+        horizon_s: float,
     ) -> None:
-        """clearance: distances to what stands around the robot."""
+        """clearance: distances to what stands around the robot; circles: what moves, enlarged."""
         self._position, self._yaw, self._speeds = position, yaw_rad, speeds
         self._base, self._radius_m, self._full = base, radius_m, speed_mps
         if base.turns:
             self._full = min(speed_mps, base.max_speed_mps)
         self._tick_s, self._to_go, self._clearance = tick_s, to_go, clearance
+        self._horizon_s = horizon_s
+        rows = np.array([(*c.center_m, *c.velocity_mps, c.radius_m) for c in circles])
+        if len(circles):
+            speed = np.sqrt(rows[:, 2] ** 2 + rows[:, 3] ** 2)
+            reach = rows[:, 4] + 1.0 + (speed + self._full) * horizon_s
+            away = (rows[:, 0] - position[0]) ** 2 + (rows[:, 1] - position[1]) ** 2
+            rows = rows[away < reach * reach]
+        self._circles = rows
 
-    def paths(self, qx: Array, qy: Array, t1: Array, horizon_s: float) -> Paths:
-        """Rollouts through waypoints (m,), relative to the robot, reached after t1 (m,) s."""
+    @property
+    def alone(self) -> bool:
+        """Whether nothing that moves is in reach."""
+        return not len(self._circles)
+
+    def paths(self, qx: Array, qy: Array, t1: Array) -> Paths:
+        """Rollouts through waypoints (m,), relative to the robot, reached after t1 (m,) s.
+
+        They end at the waypoints where nothing moves: what stands is in the distance to go.
+        """
+        horizon_s = self._horizon_s
         if self._base.turns:
             return self._turning(qx, qy, t1, horizon_s)
+        if self.alone:
+            return self._straight(qx, qy, t1)
         (px, py), h, full = self._position, self._tick_s, self._full
         m = qx.size
         steps = math.ceil(horizon_s / h)
-        longest = math.ceil((horizon_s + float((t1 - np.sqrt(qx * qx + qy * qy) / full).max())) / h)
+        longest = math.ceil(
+            (horizon_s + float((t1 - np.sqrt(qx * qx + qy * qy) / full).max())) / h
+        )
         steps = min(max(steps, longest), math.ceil(_LONGEST * horizon_s / h))
         xs, ys = np.empty((m, steps + 1)), np.empty((m, steps + 1))
         driven = np.zeros((m, steps + 1))
@@ -106,6 +130,16 @@ class MapRollout:
             arrived[reached] = k + 1
             on_first &= ~reached
         return Paths(xs, ys, h, driven, arrived)
+
+    def _straight(self, qx: Array, qy: Array, t1: Array) -> Paths:
+        """The straight lines to the waypoints alone."""
+        length = np.sqrt(qx * qx + qy * qy)
+        step_m = self._full * self._tick_s
+        steps = max(math.ceil(float(length.max()) / step_m), 1)
+        share = np.linspace(0.0, 1.0, steps + 1)
+        (px, py), driven = self._position, length[:, None] * share / self._full
+        x, y = px + qx[:, None] * share, py + qy[:, None] * share
+        return Paths(x, y, self._tick_s, driven, np.full(qx.size, steps))
 
     def _turning(self, qx: Array, qy: Array, t1: Array, horizon_s: float) -> Paths:
         base, full, (px, py) = self._base, self._full, self._position
@@ -151,15 +185,21 @@ class MapRollout:
             before, omega = omega, omega + np.clip(turn - omega, -most_turn, most_turn)
             mean_turn = omega - 0.5 * (omega - before) * np.abs(omega - before) / most_turn
             middle = yaw + 0.5 * mean_turn * h
-            x, y, yaw = x + mean * np.cos(middle) * h, y + mean * np.sin(middle) * h, yaw + mean_turn * h
+            x, y, yaw = (
+                x + mean * np.cos(middle) * h,
+                y + mean * np.sin(middle) * h,
+                yaw + mean_turn * h,
+            )
             xs[:, k + 1], ys[:, k + 1] = x, y
             driven[:, k + 1] = driven[:, k] + np.abs(mean) * h / full
             reach = np.maximum(_REACHED_M, np.abs(v) * h)
-            ended = np.where(waits, (k + 1) * h >= t1, (qx - x) ** 2 + (qy - y) ** 2 < reach * reach)
+            ended = np.where(
+                waits, (k + 1) * h >= t1, (qx - x) ** 2 + (qy - y) ** 2 < reach * reach
+            )
             reached = on_first & ended
             arrived[reached] = k + 1
             on_first &= ~reached
-            if float(driven[:, k + 1].min()) >= horizon_s:
+            if not on_first.any() if self.alone else float(driven[:, k + 1].min()) >= horizon_s:
                 steps = k + 1
                 break
         arrived = np.minimum(arrived, steps)
@@ -176,7 +216,7 @@ class MapRollout:
         contact = (d < limit) & ahead
         contact[:, 0] = False
         missing = np.clip((limit + margin_m - d) / margin_m, 0.0, 1.0)
-        found: Array = (risk.close_m * missing * left)[:, 1:].max(axis=1)
+        found: Array = (CLOSE_M * missing * missing * left)[:, 1:].max(axis=1)
         if not contact.any():
             return found
         first = np.where(contact.any(axis=1), contact.argmax(axis=1), d.shape[1])
@@ -187,13 +227,12 @@ class MapRollout:
         found[hit & (first <= paths.arrived)] += FORBIDDEN_M
         return found
 
-    def moving_risk(self, paths: Paths, circles: Sequence[Circle], risk: RiskParams) -> Array:
+    def moving_risk(self, paths: Paths, risk: RiskParams) -> Array:
         """Risk (m,) of circles that keep their velocities; the formula of TrajectoryCost."""
         m = paths.x.shape[0]
-        if not circles:
+        if self.alone:
             return np.zeros(m)
-        rows = np.array([(*c.center_m, *c.velocity_mps, c.radius_m) for c in circles])
-        cx, cy, vx, vy, r = rows.T[:, :, None, None]
+        cx, cy, vx, vy, r = self._circles.T[:, :, None, None]
         margin = risk.margin_m + risk.margin_ticks * self._tick_s * np.sqrt(vx * vx + vy * vy)
         h, tau = paths.step_s, risk.horizon_s
         t = np.arange(paths.x.shape[1] - 1) * h

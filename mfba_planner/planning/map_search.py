@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core.geometry import Point
-from ..core.planner_types import Bits, Circle
+from ..core.planner_types import Bits
 from ..perception.distance_field import DistanceField
 from ..perception.static_map import StaticMap
 from ..swarm.bat_swarm import BatSwarm
@@ -27,9 +27,10 @@ WAITS_S = (0.4, 1.0, 2.0)
 SPEEDS = (1e-6, 0.5)
 BATCH = 40  # candidates evaluated at once
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
-WINDOW_M = 8.0  # side of the square in which clearances are known
+WINDOW_M = 7.0  # side of the square in which clearances are known
 _KEPT_M = 0.5  # the window is used again until the robot is so far from its middle
 _STEP_M = 0.1
+SIGHT_M = (0.08, 0.03)  # room beside a line of sight: the first that leads anywhere
 EXPLAINED_M = 0.12  # a circle at rest whose outline is so near to a point of the map is in it
 
 
@@ -75,7 +76,6 @@ class MapSearch:
         self,
         rollout: MapRollout,
         position: Point,
-        circles: Sequence[Circle],
         risk: RiskParams,
         speed_mps: float,
         tick_s: float,
@@ -88,9 +88,7 @@ class MapSearch:
 
         observed (n,): headings that may be driven; None: all. last: the last waypoint.
         """
-        evaluate = _Evaluation(
-            rollout, position, circles, risk, speed_mps, self.to_go, turn_delay
-        )
+        evaluate = _Evaluation(rollout, position, risk, speed_mps, self.to_go, turn_delay)
         (px, py), to_go = position, self.to_go
         here = float(to_go.at(np.array([px]), np.array([py]))[0])
         ahead = self._ahead(position, here)
@@ -103,7 +101,7 @@ class MapSearch:
             best_cost = float(cost[0])
             if harm[0] <= 0.0:
                 return Found(ahead, t1, best_cost, here, (), (), True)
-        qx, qy, t = self._candidates(ahead, speed_mps, tick_s, last)
+        qx, qy, t = self._candidates(ahead, speed_mps, tick_s, last, waits=not rollout.alone)
         if observed is not None:
             headings = np.round(np.arctan2(qy, qx) * self._n / (2.0 * math.pi)).astype(int) - 1
             kept = observed[headings % self._n]
@@ -162,21 +160,23 @@ class MapSearch:
         xs = position[0] + ends[:, :1] * share
         ys = position[1] + ends[:, 1:] * share
         now = float(field.at(np.array([position[0]]), np.array([position[1]]))[0])
-        limit = min(self._radius_m + 0.02, now - 0.005)
-        seen = (field.at(xs, ys) > limit).all(axis=1)
-        k = int(np.flatnonzero(seen)[-1]) if seen.any() else 0
-        return way[k]
+        least = field.at(xs, ys).min(axis=1)
+        for room_m in SIGHT_M:
+            seen = least > min(self._radius_m + room_m, now - 0.005)
+            if seen.any():
+                return way[int(np.flatnonzero(seen)[-1])]
+        return way[0]
 
     def _candidates(
-        self, ahead: Point, speed_mps: float, tick_s: float, last: Point | None
+        self, ahead: Point, speed_mps: float, tick_s: float, last: Point | None, waits: bool
     ) -> tuple[Array, Array, Array]:
         qx, qy, t = self._qx, self._qy, self._length / speed_mps
         length = math.hypot(*ahead) or 1.0
         ux, uy = ahead[0] / length * speed_mps, ahead[1] / length * speed_mps
-        extra = [(ux * s * w, uy * s * w, w) for s in SPEEDS for w in WAITS_S]
+        extra = [(ux * s * w, uy * s * w, w) for s in SPEEDS for w in WAITS_S if waits]
         if last is not None:
             extra.append((*last, max(math.hypot(*last) / speed_mps, tick_s)))
-        ex, ey, et = np.array(extra).T
+        ex, ey, et = np.array(extra).reshape(-1, 3).T
         return np.concatenate((ex, qx)), np.concatenate((ey, qy)), np.concatenate((et, t))
 
     def _closed(self, evaluate: _Evaluation, speed_mps: float, observed: Array | None) -> Bits:
@@ -196,13 +196,12 @@ class _Evaluation:
         self,
         rollout: MapRollout,
         position: Point,
-        circles: Sequence[Circle],
         risk: RiskParams,
         speed_mps: float,
         to_go: DistanceToGo,
         turn_delay: TurnDelay | None,
     ) -> None:
-        self._rollout, self._position, self._circles = rollout, position, circles
+        self._rollout, self._position = rollout, position
         self._risk, self._speed, self._to_go = risk, speed_mps, to_go
         self._turn_delay = turn_delay
 
@@ -214,16 +213,16 @@ class _Evaluation:
         cost += risk.waiting * (speed * t1 - length)
         if self._turn_delay is not None:
             cost += risk.waiting * speed * self._turn_delay.towards_all(qx, qy)
-        paths = self._rollout.paths(qx, qy, t1, risk.horizon_s)
+        paths = self._rollout.paths(qx, qy, t1)
         standing = self._rollout.standing_risk(paths, risk, MARGIN_M)
-        harm = np.maximum(standing, self._rollout.moving_risk(paths, self._circles, risk))
+        harm = np.maximum(standing, self._rollout.moving_risk(paths, risk))
         return cost + harm, harm
 
     def contact(self, qx: Array, qy: Array, t1: Array) -> Array:
         """Whether the way to each waypoint touches something."""
-        paths = self._rollout.paths(qx, qy, t1, float(t1.max()))
+        paths = self._rollout.paths(qx, qy, t1)
         brief = replace(self._risk, horizon_s=max(float(t1.max()), 0.1), close_m=0.0)
         standing = self._rollout.standing_risk(paths, brief, MARGIN_M) >= FORBIDDEN_M
-        moving = self._rollout.moving_risk(paths, self._circles, brief) > 0.0
+        moving = self._rollout.moving_risk(paths, brief) > 0.0
         touches: Array = standing | moving
         return touches

@@ -16,8 +16,8 @@ from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
 from ..perception.scan_coverage import ScanCoverage
-from ..perception.static_map import StaticMapParams
 from ..perception.sensory_vector import SensorParams, sense_circles
+from ..perception.static_map import StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
