@@ -38,7 +38,10 @@ __all__ = ["StaticMap", "StaticMapParams"]
 
 Array = np.ndarray
 
-_YOUNG_S = 2.0  # a moving circle takes younger points with it
+_LAGS_S, _MARGIN_M = (1.2, 0.4), 0.05  # of the scans that tell what appeared
+_COARSE_M = 0.05  # where beams are farther apart, tracks that may move are not marked
+_FEWEST_HITS, _BRIEF_S = 3.0, 2.0  # points seen less often are dropped so long after
+_YOUNG_S = 4.0  # a moving circle takes younger points with it
 _ESTABLISHED_S = 1.0  # scans are matched to points that are older
 _MOST_HITS = 20.0  # that count in a point's mean
 _SAME_M, _SAME_SD, _MOST_SAME_M = 0.025, 2.5, 0.05  # returns nearer to a point are its own
@@ -64,7 +67,7 @@ class StaticMap:
         self._points = MapPoints(p.cell_m, p.size_m)
         self._moving = MovingReturns(p.size_m)
         self._matching = ScanMatching(p.cell_m)
-        self._free = FreeSpace()
+        self._free = FreeSpace(_LAGS_S, _MARGIN_M)
         self._seen = SeenCells(p.size_m)
         self._stamp_ns: int | None = None
         self._time_s = 0.0
@@ -101,9 +104,10 @@ class StaticMap:
     ) -> None:
         """Update by the beams of a scan, taken from the pose, and by circles that move.
 
-        moving (m, 5) are rows (x, y, vx, vy, r) in odom by that pose, as Tracker.moving() gives
-        them; those slower than moving_mps are ignored. pose_error is what is known of the
-        pose's error (Tracker.pose_error). An older stamp drops the map, an equal one is ignored.
+        moving (m, 5) are rows (x, y, vx, vy, r) in odom by that pose and surely (m,) whether
+        they surely move, as Tracker.moving() gives them; those slower than moving_mps are
+        ignored. pose_error is what is known of the pose's error (Tracker.pose_error).
+        An older stamp drops the map, an equal one is ignored.
         """
         if self._stamp_ns is not None:
             dt = (stamp_ns - self._stamp_ns) * NANO
@@ -116,10 +120,13 @@ class StaticMap:
                 self._free.pass_time(dt)
         self._stamp_ns, self._origin = stamp_ns, pose.position
         moving = np.empty((0, 5)) if moving is None else moving
+        surely = np.ones(moving.shape[0], dtype=bool) if surely is None else surely
         vx, vy = moving[:, 2], moving[:, 3]
         fast = vx * vx + vy * vy >= self.params.moving_mps**2
-        surely = fast if surely is None else fast & surely
-        moving, surely = moving[fast], moving[surely]
+        dx, dy = moving[:, 0] - pose.x, moving[:, 1] - pose.y
+        coarse_m = _COARSE_M / beams.spacing_rad
+        kept_out = fast & (surely | (dx * dx + dy * dy > coarse_m * coarse_m))
+        moving, surely = moving[kept_out], moving[fast & surely]
         found = surfaces(beams)
         changed = False
         if found is not None:
@@ -237,6 +244,7 @@ class StaticMap:
             )
             seen_through = judged[data[MISSED][judged] >= p.scans]
             self._moving.remember(data[X][seen_through], data[Y][seen_through], self._time_s)
+        gone |= (data[HITS] < _FEWEST_HITS) & (data[LAST] < self._time_s - _BRIEF_S)
         if moving.shape[0]:
             young = np.flatnonzero(data[FIRST] > self._time_s - _YOUNG_S)
             x, y = m.measured(data[X][young], data[Y][young], self._origin)
