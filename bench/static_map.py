@@ -57,23 +57,23 @@ class Row:
     odom_rad: float = 0.0
 
 
-NOISE = {"scan_m": 0.02, "odom_m": 0.02, "odom_rad": 0.02}
+NOISE = Row("barn", scan_m=0.02, odom_m=0.02, odom_rad=0.02)
 ROWS = {
     "BARN": Row("barn"),
     "BARN, 1 cm, 1 cm, 0.01 rad": Row("barn", scan_m=0.01, odom_m=0.01, odom_rad=0.01),
-    "BARN, 2 cm, 2 cm, 0.02 rad": Row("barn", **NOISE),
+    "BARN, 2 cm, 2 cm, 0.02 rad": replace(NOISE, worlds="barn"),
     "BARN, 180 beams": Row("barn", beams=180),
     "BARN, 1080 beams, 30 m": Row("barn", beams=1080, reach_m=30.0),
     "random-20": Row("random-20"),
     "random-20, 10 m": Row("random-20", reach_m=10.0),
-    "random-20, 2 cm, 2 cm, 0.02 rad": Row("random-20", **NOISE),
+    "random-20, 2 cm, 2 cm, 0.02 rad": replace(NOISE, worlds="random-20"),
     "dense": Row("dense"),
     "dense, 10 m": Row("dense", reach_m=10.0),
-    "dense, 2 cm, 2 cm, 0.02 rad": Row("dense", **NOISE),
+    "dense, 2 cm, 2 cm, 0.02 rad": replace(NOISE, worlds="dense"),
     "pedestrians": Row("pedestrians"),
     "pedestrians, 10 m": Row("pedestrians", reach_m=10.0),
     "pedestrians, 180 beams, 30 m": Row("pedestrians", beams=180, reach_m=30.0),
-    "pedestrians, 2 cm, 2 cm, 0.02 rad": Row("pedestrians", **NOISE),
+    "pedestrians, 2 cm, 2 cm, 0.02 rad": replace(NOISE, worlds="pedestrians"),
     "fast-20": Row("fast-20"),
     "dynabarn-like": Row("dynabarn-like"),
 }
