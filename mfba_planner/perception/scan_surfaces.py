@@ -30,7 +30,7 @@ class Surfaces:
     segment: Array  # (k,) int, ascending
     first: Array  # (n,) index of a segment's first return
     last: Array
-    width_m: Array  # (n,) between a segment's first and last return
+    width_m: Array  # (n,) longer side of the box around a segment, along the axes
 
 
 def surfaces(beams: Beams) -> Surfaces | None:
@@ -63,6 +63,8 @@ def surfaces(beams: Beams) -> Surfaces | None:
     length[alone] = 1.0
     nx = np.where(alone, cos, -ty / length)
     ny = np.where(alone, sin, tx / length)
-    wx, wy = x[last] - x[first], y[last] - y[first]
-    width = np.sqrt(wx * wx + wy * wy)
+    width = np.maximum(
+        np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first),
+        np.maximum.reduceat(y, first) - np.minimum.reduceat(y, first),
+    )
     return Surfaces(x, y, r, nx, ny, segment, first, last, width)
