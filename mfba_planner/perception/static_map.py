@@ -41,6 +41,7 @@ Array = np.ndarray
 _LAGS_S, _MARGIN_M = (1.2, 0.4), 0.05  # of the scans that tell what appeared
 _COARSE_M = 0.05  # where beams are farther apart, tracks that may move are not marked
 _FEWEST_HITS, _BRIEF_S = 3.0, 2.0  # points seen less often are dropped so long after
+_STANDING_HITS = 6.0  # points seen so often stand, whatever a track seems to do
 _YOUNG_S = 4.0  # a moving circle takes younger points with it
 _ESTABLISHED_S = 1.0  # scans are matched to points that are older
 _MOST_HITS = 20.0  # that count in a point's mean
@@ -246,7 +247,8 @@ class StaticMap:
             self._moving.remember(data[X][seen_through], data[Y][seen_through], self._time_s)
         gone |= (data[HITS] < _FEWEST_HITS) & (data[LAST] < self._time_s - _BRIEF_S)
         if moving.shape[0]:
-            young = np.flatnonzero(data[FIRST] > self._time_s - _YOUNG_S)
+            young = (data[FIRST] > self._time_s - _YOUNG_S) & (data[HITS] < _STANDING_HITS)
+            young = young.nonzero()[0]
             x, y = m.measured(data[X][young], data[Y][young], self._origin)
             gone[young] |= self._moving.near_any(x, y, moving)
         if not gone.any():
