@@ -18,7 +18,7 @@ from .scan_surfaces import Surfaces
 
 Array = np.ndarray
 Error = tuple[float, float, float]
-Nearest = Callable[[Array, Array, int], tuple[Array, Array, Array]]
+Nearest = Callable[[Array, Array, Array, Array, int], tuple[Array, Array, Array]]
 
 _MOST = 180  # returns that are matched
 _FEWEST = 15
@@ -65,7 +65,8 @@ class ScanMatching:
         """Find the error from the returns with the indices still (k,); k may be 0.
 
         expected is what else is known of it, less its mean; the tracker's estimate.
-        nearest(x, y, cells) gives the x and y of the map's nearest points and the distances.
+        nearest(x, y, nx, ny, cells) gives the x and y of the map's nearest points and the
+        distances from positions (k,) with these normals.
         """
         still = still[:: max(1, math.ceil(still.size / _MOST))]
         x, y = found.x[still] - origin[0], found.y[still] - origin[1]
@@ -108,7 +109,7 @@ class ScanMatching:
         rx, ry = c * x + s * y, c * y - s * x
         nx, ny = c * nx + s * ny, c * ny - s * nx
         zx, zy = rx + (origin[0] - ex), ry + (origin[1] - ey)
-        qx, qy, d = nearest(zx, zy, reach)
+        qx, qy, d = nearest(zx, zy, nx, ny, reach)
         near = np.flatnonzero(d <= reach * self._cell_m)
         if near.size < _FEWEST:
             return None

@@ -22,17 +22,19 @@ from .scan_beams import Beams
 from .scan_matching import ScanMatching
 from .scan_surfaces import Surfaces, surfaces
 from .static_map_params import StaticMapParams
-from .static_map_points import (
+from .static_map_points import (  # fmt: skip
     FIRST,
     HITS,
     LAST,
     MISSED,
+    NX,
+    NY,
     WEAK,
     WIDTH,
     MapPoints,
     X,
     Y,
-)  # fmt: skip
+)
 
 __all__ = ["StaticMap", "StaticMapParams"]
 
@@ -44,6 +46,7 @@ _FEWEST_HITS, _BRIEF_S = 3.0, 2.0  # points seen less often are dropped so long 
 _STANDING_HITS = 6.0  # points seen so often stand, whatever a track seems to do
 _YOUNG_S = 4.0  # a moving circle takes younger points with it
 _ESTABLISHED_S = 1.0  # scans are matched to points that are older
+_ALIKE = 0.3  # cosine between normals of the same surface
 _MOST_HITS = 20.0  # that count in a point's mean
 _SAME_M, _SAME_SD, _MOST_SAME_M = 0.025, 2.5, 0.05  # returns nearer to a point are its own
 _ALONE_M = 0.01  # so near to a beam is a point that is thinner than the beams are apart
@@ -171,7 +174,10 @@ class StaticMap:
             new = new.nonzero()[0]
             new = new[~motion.recent(x[new], y[new], settled)]
             new = new[self._inside(x[new], y[new])]
-            changed |= points.add(x[new], y[new], self._time_s, width[new]) > 0
+            added = points.add(
+                x[new], y[new], self._time_s, width[new], found.nx[new], found.ny[new]
+            )
+            changed |= added > 0
         return changed
 
     def _inside(self, x: Array, y: Array) -> Array:
@@ -180,13 +186,17 @@ class StaticMap:
         inside: Array = (np.abs(x - rx) <= half) & (np.abs(y - ry) <= half)
         return inside
 
-    def _nearest(self, x: Array, y: Array, reach: int) -> tuple[Array, Array, Array]:
+    def _nearest(
+        self, x: Array, y: Array, nx: Array, ny: Array, reach: int
+    ) -> tuple[Array, Array, Array]:
         index, away = self._points.nearest(x, y, reach)
         if not self.count:
             return x, y, away
         data = self._points.data
-        old = (data[FIRST] <= max(self._time_s - _ESTABLISHED_S, 0.0))[index]
-        return data[X][index], data[Y][index], np.where(old, away, np.inf)
+        # What is seen from behind is another surface: walls are thin.
+        usable = data[NX][index] * nx + data[NY][index] * ny > _ALIKE
+        usable &= (data[FIRST] <= max(self._time_s - _ESTABLISHED_S, 0.0))[index]
+        return data[X][index], data[Y][index], np.where(usable, away, np.inf)
 
     def _average(
         self, found: Surfaces, index: Array, x: Array, y: Array, width: Array, hit: Array,
@@ -201,6 +211,7 @@ class StaticMap:
         data[HITS, of] += 1.0  # once per scan
         data[LAST, of] = self._time_s
         data[MISSED, of] = 0.0
+        data[NX, of], data[NY, of] = found.nx[hit], found.ny[hit]
         np.maximum.at(data[WIDTH], of, width[hit])
         chosen = np.flatnonzero(steady)
         of = index[chosen]
@@ -235,7 +246,8 @@ class StaticMap:
             spacing_m = d * beams.spacing_rad
             clear, off = _clear_lengths(beams, bearing, m.sd_rad)
             passes = clear - d
-            thin = (data[WIDTH][judged] < spacing_m) & (off * d > _ALONE_M)
+            unsure_m = off * d + m.sd_rad * d + m.sd_m
+            thin = (data[WIDTH][judged] < spacing_m) & (unsure_m > _ALONE_M)
             margin = p.margin_m + 0.5 * spacing_m
             strong = (passes > margin + _NOISE_SD * m.noise_m + m.sd_m) & ~thin
             data[MISSED, judged] = np.where(strong, data[MISSED][judged] + 1.0, 0.0)

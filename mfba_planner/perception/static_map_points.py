@@ -9,15 +9,17 @@ import numpy as np
 
 Array = np.ndarray
 
-X, Y, FIRST, LAST, HITS, MISSED, WEAK, WIDTH = range(8)  # rows of data
+ROWS = 10
+X, Y, FIRST, LAST, HITS, MISSED, WEAK, WIDTH, NX, NY = range(ROWS)  # of data
 NONE = -1
 
 
 class MapPoints:
     """Points with real coordinates, found through the cells of a grid that wraps around.
 
-    data (8, n): x, y (m); when first and last seen (s); scans that met the point; scans in a row
-    that saw through it; scans that ended a little behind it; width of the surface it is on (m).
+    data (ROWS, n): x, y (m); when first and last seen (s); scans that met the point; scans in a
+    row that saw through it; scans that ended a little behind it; width of the surface that it is
+    on (m); its normal towards the lidar when it was last seen.
     The grid has 2^k cells along a side, so that a cell is found by masking its coordinates.
     """
 
@@ -28,7 +30,7 @@ class MapPoints:
         self._mask = (1 << self._bits) - 1
         self._slot = np.full(1 << 2 * self._bits, NONE, dtype=np.int32)
         self._cell = np.empty(0, dtype=np.int64)
-        self.data = np.empty((8, 0))
+        self.data = np.empty((ROWS, 0))
 
     @property
     def count(self) -> int:
@@ -68,17 +70,21 @@ class MapPoints:
         row = np.arange(x.size)
         return slot[row, best].astype(np.int64), np.sqrt(dx[row, best])
 
-    def add(self, x: Array, y: Array, time_s: float, width_m: Array) -> int:
-        """Add a point in each empty cell; of several in one cell the first. How many were."""
+    def add(self, x: Array, y: Array, time_s: float, width_m: Array, nx: Array, ny: Array) -> int:
+        """Add a point in each empty cell; of several in one cell the first. How many were.
+
+        nx and ny are the normals towards the lidar.
+        """
         cell = self._cells(x, y)
         chosen = np.sort(np.unique(cell, return_index=True)[1])
         chosen = chosen[self._slot[cell[chosen]] == NONE]
         if not chosen.size:
             return 0
-        new = np.zeros((8, chosen.size))
+        new = np.zeros((ROWS, chosen.size))
         new[X], new[Y] = x[chosen], y[chosen]
         new[FIRST] = new[LAST] = time_s
         new[HITS], new[WIDTH] = 1.0, width_m[chosen]
+        new[NX], new[NY] = nx[chosen], ny[chosen]
         self._slot[cell[chosen]] = np.arange(self.count, self.count + chosen.size)
         self.data = np.concatenate((self.data, new), axis=1)
         self._cell = np.concatenate((self._cell, cell[chosen]))
