@@ -30,7 +30,7 @@ class Surfaces:
     segment: Array  # (k,) int, ascending
     first: Array  # (n,) index of a segment's first return
     last: Array
-    width_m: Array  # (n,) longer side of the box around a segment, along the axes
+    width_m: Array  # (n,) diagonal of the box around a segment, along the axes
 
 
 def surfaces(beams: Beams) -> Surfaces | None:
@@ -66,8 +66,7 @@ def surfaces(beams: Beams) -> Surfaces | None:
     away = nx * cos + ny * sin > 0.0
     nx[away] *= -1.0
     ny[away] *= -1.0
-    width = np.maximum(
-        np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first),
-        np.maximum.reduceat(y, first) - np.minimum.reduceat(y, first),
-    )
+    wx = np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first)
+    wy = np.maximum.reduceat(y, first) - np.minimum.reduceat(y, first)
+    width = np.sqrt(wx * wx + wy * wy)
     return Surfaces(x, y, r, nx, ny, segment, first, last, width)

@@ -33,7 +33,8 @@ def test_points_are_found_after_any_changes(seed: int, steps: int) -> None:
             n = int(rng.integers(1, 60))
             x, y = (center + rng.uniform(-1.0, 1.0, (n, 2))).T
             before = points.count
-            assert points.count == before + added(points, x, y)
+            new = added(points, x, y)
+            assert points.count == before + new
         elif kind == 1:
             points.keep(rng.random(points.count) < 0.7)
         elif kind == 2:
