@@ -14,7 +14,7 @@ Array = np.ndarray
 
 OCCUPIED, FREE, UNKNOWN = 100, 0, -1
 _CELL_M = 0.2
-_EVERY_S = 0.25
+_EVERY_S = 0.5
 
 
 class SeenCells:

@@ -46,6 +46,7 @@ _FEWEST_HITS, _BRIEF_S = 3.0, 2.0  # points seen less often are dropped so long 
 _STANDING_HITS = 6.0  # points seen so often stand, whatever a track seems to do
 _YOUNG_S = 4.0  # a moving circle takes younger points with it
 _ESTABLISHED_S = 1.0  # scans are matched to points that are older
+_STILL_M = 5e-4  # points are not moved by less
 _ALIKE = 0.3  # cosine between normals of the same surface
 _MOST_HITS = 20.0  # that count in a point's mean
 _SAME_M, _SAME_SD, _MOST_SAME_M = 0.025, 2.5, 0.05  # returns nearer to a point are its own
@@ -160,12 +161,11 @@ class StaticMap:
         still = np.flatnonzero(usable & ~in_track)
         matching.estimate(found, still, self._origin, self._nearest, pose_error)
         x, y = matching.corrected(found.x, found.y, self._origin)
-        margin = 3.0 * matching.noise_m + 2.0 * matching.sd_m
-        flagged = in_track | motion.spread(found, self._free.appeared(x, y, margin))
-        motion.remember(x[flagged], y[flagged], self._time_s)
         index, away = points.nearest(x, y)
         same_m = min(_SAME_M + _SAME_SD * matching.noise_m, _MOST_SAME_M)
         same = usable & (away <= same_m)
+        flagged = in_track | motion.spread(found, self._appeared(x, y, index, same))
+        motion.remember(x[flagged], y[flagged], self._time_s)
         width = found.width_m[found.segment]
         changed = self._average(found, index, x, y, width, same, same & ~flagged)
         new = usable & ~flagged & ~same
@@ -179,6 +179,16 @@ class StaticMap:
             )
             changed |= added > 0
         return changed
+
+    def _appeared(self, x: Array, y: Array, index: Array, same: Array) -> Array:
+        """Whether returns (k,) are in space that was seen free; where a point stands is none."""
+        standing = same.copy()
+        standing[same] = self._points.data[HITS][index[same]] >= _STANDING_HITS
+        asked = (~standing).nonzero()[0]
+        appeared = np.zeros(x.size, dtype=bool)
+        margin = 3.0 * self._matching.noise_m + 2.0 * self._matching.sd_m
+        appeared[asked] = self._free.appeared(x[asked], y[asked], margin)
+        return appeared
 
     def _inside(self, x: Array, y: Array) -> Array:
         rx, ry = self._robot
@@ -226,8 +236,12 @@ class StaticMap:
         gain = 1.0 / (count[met] * np.minimum(data[HITS][met], _MOST_HITS))
         dx = np.bincount(of, rest * nx, n)[met] * gain
         dy = np.bincount(of, rest * ny, n)[met] * gain
-        points.move(met, data[X][met] + dx, data[Y][met] + dy)
-        return bool((np.abs(dx) + np.abs(dy)).max() > 1e-3)
+        far = np.abs(dx) + np.abs(dy) > _STILL_M
+        if not far.any():
+            return False
+        met = met[far]
+        points.move(met, data[X][met] + dx[far], data[Y][met] + dy[far])
+        return True
 
     def _clear(self, beams: Beams, moving: Array) -> bool:
         """Clear points that the beams see through, and young ones where something moves."""
