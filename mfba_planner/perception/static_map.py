@@ -17,7 +17,7 @@ from ..core.planner_types import NANO
 from .distance_field import DistanceField, distance_field
 from .free_space import FreeSpace
 from .moving_returns import MovingReturns
-from .occupancy_grid import SeenCells, occupancy
+from .occupancy_grid import ObservedCells, occupancy
 from .scan_beams import Beams
 from .scan_matching import ScanMatching
 from .scan_surfaces import Surfaces, surfaces
@@ -73,7 +73,7 @@ class StaticMap:
         self._moving = MovingReturns(p.size_m)
         self._matching = ScanMatching(p.cell_m)
         self._free = FreeSpace(_LAGS_S, _MARGIN_M)
-        self._seen = SeenCells(p.size_m)
+        self._observed = ObservedCells(p.size_m)
         self._stamp_ns: int | None = None
         self._time_s = 0.0
         self._origin: Point = (0.0, 0.0)
@@ -82,7 +82,7 @@ class StaticMap:
 
     def forget(self) -> None:
         """Drop all that is known, as after a jump of the odometry."""
-        for part in (self._points, self._moving, self._free, self._seen):
+        for part in (self._points, self._moving, self._free, self._observed):
             part.clear()
         self._matching.reset()
         self._stamp_ns, self._field = None, None
@@ -139,7 +139,7 @@ class StaticMap:
         changed |= self._clear(beams, surely)
         x, y = self._robot
         changed |= self._points.roll(x, y)
-        self._seen.update(self._time_s, x, y, self._matching.error[2], beams)
+        self._observed.update(self._time_s, x, y, self._matching.error[2], beams)
         self._free.add(beams, self._matching.error, self._matching.sd_rad)
         self.version += changed
 
@@ -269,8 +269,8 @@ class StaticMap:
             gone[judged] = (data[MISSED][judged] >= p.scans) | (
                 data[WEAK][judged] >= _FEWEST_WEAK + 0.5 * data[HITS][judged]
             )
-            seen_through = judged[data[MISSED][judged] >= p.scans]
-            self._moving.remember(data[X][seen_through], data[Y][seen_through], self._time_s)
+            cleared = judged[data[MISSED][judged] >= p.scans]
+            self._moving.remember(data[X][cleared], data[Y][cleared], self._time_s)
         gone |= (data[HITS] < _FEWEST_HITS) & (data[LAST] < self._time_s - _BRIEF_S)
         if moving.shape[0]:
             young = (data[FIRST] > self._time_s - _YOUNG_S) & (data[HITS] < _STANDING_HITS)
@@ -318,7 +318,7 @@ class StaticMap:
         """
         data = self._points.data
         return occupancy(
-            data[X], data[Y], self._robot, self.params.size_m, self.params.cell_m, self._seen
+            data[X], data[Y], self._robot, self.params.size_m, self.params.cell_m, self._observed
         )
 
 

@@ -88,7 +88,7 @@ def test_the_field_holds_the_distances_to_the_points(seed: int, n: int) -> None:
     away = np.hypot(at[0][:, None] - x, at[1][:, None] - y).min(axis=1, initial=0.8)
     error = field.at(at[0], at[1]) - away
     assert np.abs(error).max() < 0.05  # at a point itself; interpolation rounds the kink off
-    assert np.abs(error[away > 0.15]).max(initial=0.0) < 0.03
+    assert np.abs(error[away > 0.15]).max(initial=0.0) < 0.045
     assert field.at(np.array([50.0]), np.array([0.0])).tolist() == [0.8]
 
 
