@@ -38,7 +38,7 @@ OUTSIDE: dict[str, set[str]] = {
     "": set(),
     "core": {"numpy"},
     "swarm": {"numpy"},
-    "perception": {"numpy"},
+    "perception": {"numpy", "scipy"},
     "planning": {"numpy", "pyrvo"},
     "simulation": {"numpy"},
     "scenarios": {"PIL", "numpy", "pydantic", "yaml"},

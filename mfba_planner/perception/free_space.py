@@ -17,9 +17,8 @@ from .scan_beams import Beams
 
 Array = np.ndarray
 
-_LAGS_S = (0.6, 0.25)  # ages of the scans that are compared, the nearest above
+_LAGS_S = (0.6, 0.25)  # ages of the scans that are compared, or the next older
 _EVERY_S = 0.09  # scans nearer in time to the last one kept are not kept
-_KEPT = 9
 _MARGIN_M = 0.08
 _WIDEST_SPACING_M = 0.12  # between beams farther apart nothing is judged
 
@@ -66,9 +65,10 @@ class _Past:
 class FreeSpace:
     """The last scans, as free lengths along their beams."""
 
-    def __init__(self) -> None:
-        """Start without scans."""
-        self._past: deque[_Past] = deque(maxlen=_KEPT)
+    def __init__(self, lags_s: tuple[float, ...] = _LAGS_S, margin_m: float = _MARGIN_M) -> None:
+        """Start without scans; the lags are the ages of the scans that are compared."""
+        self._lags_s, self._margin_m = lags_s, margin_m
+        self._past: deque[_Past] = deque(maxlen=math.ceil(max(lags_s) / _EVERY_S) + 2)
 
     def clear(self) -> None:
         """Drop all scans."""
@@ -88,13 +88,13 @@ class FreeSpace:
         """Whether each point (k,) lies where a past scan saw farther on."""
         found = np.zeros(x.size, dtype=bool)
         for past in self._compared():
-            found |= past.passed(x, y, _MARGIN_M + noise_m)
+            found |= past.passed(x, y, self._margin_m + noise_m)
         return found
 
     def _compared(self) -> list[_Past]:
         """For each lag the newest scan at least so old, or else the oldest."""
         chosen: list[_Past] = []
-        for lag in _LAGS_S:
+        for lag in self._lags_s:
             older = [past for past in self._past if past.age_s >= lag - 0.5 * _EVERY_S]
             candidate = older[-1] if older else (self._past[0] if self._past else None)
             if candidate is not None and candidate not in chosen:

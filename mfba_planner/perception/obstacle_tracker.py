@@ -17,8 +17,6 @@ from .pose_error import PoseError
 from .scan_beams import BeamReader, Beams
 from .scan_segments import Segments, segments, taken_from_a_gap
 from .track_association import NONE, associate, expected_labels
-import os
-SIG=float(os.environ.get('SIG','4')); LOW=float(os.environ.get('LOW','0.0025'))
 from .track_bank import RADIUS, VX, VY, TrackBank
 from .track_lifecycle import drop_lost, fragments, judge_motion
 from .tracking_params import TrackingParams
@@ -36,6 +34,7 @@ _ROUND_SCANS, _ROUND_SD_M = 5, 0.03  # from which a track's circle is known
 _TURN_SHARE = 0.8  # of a step, by which an obstacle that turns back is found elsewhere
 _NEAR_M, _NEAR_ROUND_M = 0.1, 0.04  # returns so near to a predicted circle are its own
 _KNOWN = 3  # scans after which a track's velocity is known
+_MAY_MOVE = 4.0  # squared significance of a velocity that may be one
 _ANCHORS = 3  # such tracks tell that there is no common motion
 
 
@@ -210,11 +209,8 @@ class Tracker:
         bank = self._bank
         v = bank.state[:, 2:4]
         speed2 = v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1]
-        P = bank.covariance
-        may = speed2 > SIG * 0.5 * (P[:, VX, VX] + P[:, VY, VY])
-        may &= (bank.scans >= 2)
-        may &= speed2>LOW
-        may |= bank.moving
+        variance = 0.5 * (bank.covariance[:, VX, VX] + bank.covariance[:, VY, VY])
+        may = bank.moving | ((speed2 > _MAY_MOVE * variance) & (bank.scans > 1))
         rows = bank.state[may]
         origin = np.array(self._pose.position)
         shift_x, shift_y = self._pose_error.shift(rows[:, 0], rows[:, 1], origin)

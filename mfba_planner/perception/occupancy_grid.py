@@ -14,10 +14,10 @@ Array = np.ndarray
 
 OCCUPIED, FREE, UNKNOWN = 100, 0, -1
 _CELL_M = 0.2
-_EVERY_S = 0.25
+_EVERY_S = 0.5
 
 
-class SeenCells:
+class ObservedCells:
     """Coarse cells that a beam has passed, in a window that rolls with the robot."""
 
     def __init__(self, size_m: float) -> None:
@@ -28,7 +28,7 @@ class SeenCells:
     def clear(self) -> None:
         """Nothing is seen."""
         self._low = (0, 0)
-        self._seen = np.zeros((self._n, self._n), dtype=bool)
+        self._observed = np.zeros((self._n, self._n), dtype=bool)
         self._last_s: float | None = None
 
     def update(self, time_s: float, x: float, y: float, turn_rad: float, beams: Beams) -> None:
@@ -53,19 +53,19 @@ class SeenCells:
         inside = (number >= 0) & (number < beams.count)
         passed = reach[np.where(inside, number, 0)]
         met = inside & (dx * dx + dy * dy <= passed * passed)
-        self._seen[low : low + 2 * k, low : low + 2 * k] |= met
+        self._observed[low : low + 2 * k, low : low + 2 * k] |= met
 
     def _roll(self, i: int, j: int) -> None:
         di, dj = i - self._low[0], j - self._low[1]
         self._low = (i, j)
         if not (di or dj):
             return
-        old, n = self._seen, self._n
-        self._seen = np.zeros((n, n), dtype=bool)
+        old, n = self._observed, self._n
+        self._observed = np.zeros((n, n), dtype=bool)
         if abs(di) < n and abs(dj) < n:
             to_x, to_y = slice(max(-di, 0), n - max(di, 0)), slice(max(-dj, 0), n - max(dj, 0))
             of_x, of_y = slice(max(di, 0), n - max(-di, 0)), slice(max(dj, 0), n - max(-dj, 0))
-            self._seen[to_y, to_x] = old[of_y, of_x]
+            self._observed[to_y, to_x] = old[of_y, of_x]
 
     def at(self, x: Array, y: Array) -> Array:
         """Whether positions (any shape, broadcast) have been seen."""
@@ -73,19 +73,19 @@ class SeenCells:
         j = np.floor(y / _CELL_M).astype(np.int64) - self._low[1]
         n = self._n
         inside = (i >= 0) & (j >= 0) & (i < n) & (j < n)
-        seen: Array = inside & self._seen[np.clip(j, 0, n - 1), np.clip(i, 0, n - 1)]
-        return seen
+        found: Array = inside & self._observed[np.clip(j, 0, n - 1), np.clip(i, 0, n - 1)]
+        return found
 
 
 def occupancy(
-    x: Array, y: Array, center: Point, size_m: float, cell_m: float, seen: SeenCells
+    x: Array, y: Array, center: Point, size_m: float, cell_m: float, observed: ObservedCells
 ) -> tuple[Point, Array]:
     """Origin and cells (n, n) int8 of a square around the centre, from points (k,)."""
     n = math.ceil(size_m / cell_m)
     i0 = math.floor((center[0] - 0.5 * size_m) / cell_m)
     j0 = math.floor((center[1] - 0.5 * size_m) / cell_m)
     at = np.arange(n) + 0.5
-    free = seen.at((i0 + at) * cell_m, ((j0 + at) * cell_m)[:, None])
+    free = observed.at((i0 + at) * cell_m, ((j0 + at) * cell_m)[:, None])
     cells = np.where(free, FREE, UNKNOWN).astype(np.int8)
     i = np.floor(x / cell_m).astype(np.int64) - i0
     j = np.floor(y / cell_m).astype(np.int64) - j0

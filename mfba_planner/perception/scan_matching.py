@@ -13,14 +13,13 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core.geometry import Point
-from . import small_matrices as sm
 from .scan_surfaces import Surfaces
 
 Array = np.ndarray
 Error = tuple[float, float, float]
-Nearest = Callable[[Array, Array, int], tuple[Array, Array, Array]]
+Nearest = Callable[[Array, Array, Array, Array, int], tuple[Array, Array, Array]]
 
-_MOST = 180  # returns that are matched
+_MOST = 120  # returns that are matched
 _FEWEST = 15
 _ANCHORS, _ANCHOR_M = 3, 0.5  # surfaces that must agree; each 0.5 m of a wide one counts
 _LEARNING_SCANS = 10  # at the start any error is looked for
@@ -65,7 +64,8 @@ class ScanMatching:
         """Find the error from the returns with the indices still (k,); k may be 0.
 
         expected is what else is known of it, less its mean; the tracker's estimate.
-        nearest(x, y, cells) gives the x and y of the map's nearest points and the distances.
+        nearest(x, y, nx, ny, cells) gives the x and y of the map's nearest points and the
+        distances from positions (k,) with these normals.
         """
         still = still[:: max(1, math.ceil(still.size / _MOST))]
         x, y = found.x[still] - origin[0], found.y[still] - origin[1]
@@ -82,7 +82,7 @@ class ScanMatching:
         passes = 1 if max(vm, vr) < _QUIET_SD**2 else _PASSES
         if self._scans < _LEARNING_SCANS:
             reach, passes = _MOST_REACH, _PASSES
-        left: Array | None = None
+        left: Error | None = None
         rest = np.empty(0)
         for k in range(passes):
             step = self._step(x, y, nx, ny, origin, nearest, max(reach - k, 1))
@@ -94,21 +94,21 @@ class ScanMatching:
             self.sd_m, self.sd_rad = math.sqrt(vm), math.sqrt(vr)
             self.error = self._expected
             return
-        self.sd_m = math.sqrt(0.5 * (left[0, 0] + left[1, 1]))
-        self.sd_rad = math.sqrt(left[2, 2])
+        self.sd_m = math.sqrt(0.5 * (left[0] + left[1]))
+        self.sd_rad = math.sqrt(left[2])
         self._learn(left, rest)
 
     def _step(
         self, x: Array, y: Array, nx: Array, ny: Array, origin: Point,
         nearest: Nearest, reach: int,
-    ) -> tuple[Array, Array, Array] | None:  # fmt: skip
-        """One Gauss-Newton step; the covariance left, distances from lines, and whose they are."""
+    ) -> tuple[Error, Array, Array] | None:  # fmt: skip
+        """One Gauss-Newton step; the variances left, distances from lines, and whose they are."""
         ex, ey, turn = self.error
         c, s = math.cos(turn), math.sin(turn)
         rx, ry = c * x + s * y, c * y - s * x
         nx, ny = c * nx + s * ny, c * ny - s * nx
         zx, zy = rx + (origin[0] - ex), ry + (origin[1] - ey)
-        qx, qy, d = nearest(zx, zy, reach)
+        qx, qy, d = nearest(zx, zy, nx, ny, reach)
         near = np.flatnonzero(d <= reach * self._cell_m)
         if near.size < _FEWEST:
             return None
@@ -130,26 +130,28 @@ class ScanMatching:
         xx, xy, xr, yy, yr, rr, bx, by, br = total
         im, ir = 1.0 / self._variance_m2, 1.0 / self._variance_rad2
         mx, my, mt = self._expected
-        matrix = np.array([[[xx + im, xy, xr], [xy, yy + im, yr], [xr, yr, rr + ir]]])
-        left: Array = sm.inverse(matrix)[0]
+        xx, yy, rr = xx + im, yy + im, rr + ir
+        a, b, c = yy * rr - yr * yr, xr * yr - xy * rr, xy * yr - xr * yy
+        d, e, f = xx * rr - xr * xr, xy * xr - xx * yr, xx * yy - xy * xy
+        scale = 1.0 / (xx * a + xy * b + xr * c)
+        a, b, c, d, e, f = (scale * value for value in (a, b, c, d, e, f))
         bx, by, br = bx + im * (mx - ex), by + im * (my - ey), br + ir * (mt - turn)
-        (a, b, e), (_, f, g), (_, _, h) = left.tolist()
         self.error = (
-            ex + a * bx + b * by + e * br,
-            ey + b * bx + f * by + g * br,
-            turn + e * bx + g * by + h * br,
+            ex + a * bx + b * by + c * br,
+            ey + b * bx + d * by + e * br,
+            turn + c * bx + e * by + f * br,
         )
-        return left, rest, near
+        return (a, d, f), rest, near
 
-    def _learn(self, left: Array, rest: Array) -> None:
+    def _learn(self, left: Error, rest: Array) -> None:
         self._scans += 1
         self._compare()
         gain = max(_LEARNING, 1.0 / (1.0 + self._scans))
         ex, ey, turn = (e - m for e, m in zip(self.error, self._expected))
-        second = 0.5 * (ex * ex + ey * ey + float(left[0, 0]) + float(left[1, 1]))
+        second = 0.5 * (ex * ex + ey * ey + left[0] + left[1])
         vm = self._variance_m2 + gain * (second - self._variance_m2)
         vr = self._variance_rad2
-        vr += gain * (turn * turn + float(left[2, 2]) - vr)
+        vr += gain * (turn * turn + left[2] - vr)
         self._variance_m2, self._variance_rad2 = _limited(vm), _limited(vr)
         mx, my, mt = (m + _MEAN_SHARE * (e - m) for e, m in zip(self.error, self._mean))
         self._mean = (mx, my, mt)
@@ -184,8 +186,8 @@ class ScanMatching:
 
 def _anchors(found: Surfaces, segment: Array) -> float:
     """Surfaces with a matched return, the wide ones by their width."""
-    met = np.unique(segment)
-    return float(np.maximum(found.width_m[met] / _ANCHOR_M, 1.0).sum())
+    met = np.bincount(segment) > 0
+    return float(np.maximum(found.width_m[: met.size][met] / _ANCHOR_M, 1.0).sum())
 
 
 def _limited(variance: float) -> float:

@@ -25,12 +25,12 @@ class Surfaces:
     x: Array  # (k,) m, in odom
     y: Array
     range_m: Array  # (k,) m
-    nx: Array  # (k,) unit normal, either way; along the beam where the return is alone
+    nx: Array  # (k,) unit normal towards the lidar; along the beam where the return is alone
     ny: Array
     segment: Array  # (k,) int, ascending
     first: Array  # (n,) index of a segment's first return
     last: Array
-    width_m: Array  # (n,) between a segment's first and last return
+    width_m: Array  # (n,) diagonal of the box around a segment, along the axes
 
 
 def surfaces(beams: Beams) -> Surfaces | None:
@@ -61,8 +61,12 @@ def surfaces(beams: Beams) -> Surfaces | None:
     length = np.sqrt(tx * tx + ty * ty)
     alone = length < 1e-6
     length[alone] = 1.0
-    nx = np.where(alone, cos, -ty / length)
-    ny = np.where(alone, sin, tx / length)
-    wx, wy = x[last] - x[first], y[last] - y[first]
+    nx = np.where(alone, -cos, -ty / length)
+    ny = np.where(alone, -sin, tx / length)
+    away = nx * cos + ny * sin > 0.0
+    nx[away] *= -1.0
+    ny[away] *= -1.0
+    wx = np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first)
+    wy = np.maximum.reduceat(y, first) - np.minimum.reduceat(y, first)
     width = np.sqrt(wx * wx + wy * wy)
     return Surfaces(x, y, r, nx, ny, segment, first, last, width)

@@ -17,32 +17,40 @@ from ..core.planner_types import NANO
 from .distance_field import DistanceField, distance_field
 from .free_space import FreeSpace
 from .moving_returns import MovingReturns
-from .occupancy_grid import SeenCells, occupancy
+from .occupancy_grid import ObservedCells, occupancy
 from .scan_beams import Beams
 from .scan_matching import ScanMatching
 from .scan_surfaces import Surfaces, surfaces
 from .static_map_params import StaticMapParams
-from .static_map_points import (
+from .static_map_points import (  # fmt: skip
     FIRST,
     HITS,
     LAST,
     MISSED,
+    NX,
+    NY,
     WEAK,
     WIDTH,
     MapPoints,
     X,
     Y,
-)  # fmt: skip
+)
 
 __all__ = ["StaticMap", "StaticMapParams"]
 
 Array = np.ndarray
 
-_YOUNG_S = 2.0  # a moving circle takes younger points with it
+_LAGS_S, _MARGIN_M = (1.2, 0.4), 0.05  # of the scans that tell what appeared
+_COARSE_M = 0.05  # where beams are farther apart, tracks that may move are not marked
+_FEWEST_HITS, _BRIEF_S = 3.0, 2.0  # points seen less often are dropped so long after
+_STANDING_HITS = 6.0  # points seen so often stand, whatever a track seems to do
+_YOUNG_S = 4.0  # a moving circle takes younger points with it
 _ESTABLISHED_S = 1.0  # scans are matched to points that are older
+_STILL_M = 5e-4  # points are not moved by less
+_ALIKE = 0.3  # cosine between normals of the same surface
 _MOST_HITS = 20.0  # that count in a point's mean
 _SAME_M, _SAME_SD, _MOST_SAME_M = 0.025, 2.5, 0.05  # returns nearer to a point are its own
-_ALONE_M = 0.01  # so near to a beam is a point that is thinner than the beams are apart
+_ALONE_M = 0.006  # so near to a beam is a point that is thinner than the beams are apart
 _NOISE_SD = 2.5
 _FEWEST_WEAK = 3.0
 _LIMIT_M = 0.05  # returns so near to the longest range are not used
@@ -64,8 +72,8 @@ class StaticMap:
         self._points = MapPoints(p.cell_m, p.size_m)
         self._moving = MovingReturns(p.size_m)
         self._matching = ScanMatching(p.cell_m)
-        self._free = FreeSpace()
-        self._seen = SeenCells(p.size_m)
+        self._free = FreeSpace(_LAGS_S, _MARGIN_M)
+        self._observed = ObservedCells(p.size_m)
         self._stamp_ns: int | None = None
         self._time_s = 0.0
         self._origin: Point = (0.0, 0.0)
@@ -74,7 +82,7 @@ class StaticMap:
 
     def forget(self) -> None:
         """Drop all that is known, as after a jump of the odometry."""
-        for part in (self._points, self._moving, self._free, self._seen):
+        for part in (self._points, self._moving, self._free, self._observed):
             part.clear()
         self._matching.reset()
         self._stamp_ns, self._field = None, None
@@ -101,9 +109,10 @@ class StaticMap:
     ) -> None:
         """Update by the beams of a scan, taken from the pose, and by circles that move.
 
-        moving (m, 5) are rows (x, y, vx, vy, r) in odom by that pose, as Tracker.moving() gives
-        them; those slower than moving_mps are ignored. pose_error is what is known of the
-        pose's error (Tracker.pose_error). An older stamp drops the map, an equal one is ignored.
+        moving (m, 5) are rows (x, y, vx, vy, r) in odom by that pose and surely (m,) whether
+        they surely move, as Tracker.moving() gives them; those slower than moving_mps are
+        ignored. pose_error is what is known of the pose's error (Tracker.pose_error).
+        An older stamp drops the map, an equal one is ignored.
         """
         if self._stamp_ns is not None:
             dt = (stamp_ns - self._stamp_ns) * NANO
@@ -116,10 +125,13 @@ class StaticMap:
                 self._free.pass_time(dt)
         self._stamp_ns, self._origin = stamp_ns, pose.position
         moving = np.empty((0, 5)) if moving is None else moving
+        surely = np.ones(moving.shape[0], dtype=bool) if surely is None else surely
         vx, vy = moving[:, 2], moving[:, 3]
         fast = vx * vx + vy * vy >= self.params.moving_mps**2
-        surely = fast if surely is None else fast & surely
-        moving, surely = moving[fast], moving[surely]
+        dx, dy = moving[:, 0] - pose.x, moving[:, 1] - pose.y
+        coarse_m = _COARSE_M / beams.spacing_rad
+        kept_out = fast & (surely | (dx * dx + dy * dy > coarse_m * coarse_m))
+        moving, surely = moving[kept_out], moving[fast & surely]
         found = surfaces(beams)
         changed = False
         if found is not None:
@@ -127,7 +139,7 @@ class StaticMap:
         changed |= self._clear(beams, surely)
         x, y = self._robot
         changed |= self._points.roll(x, y)
-        self._seen.update(self._time_s, x, y, self._matching.error[2], beams)
+        self._observed.update(self._time_s, x, y, self._matching.error[2], beams)
         self._free.add(beams, self._matching.error, self._matching.sd_rad)
         self.version += changed
 
@@ -149,12 +161,11 @@ class StaticMap:
         still = np.flatnonzero(usable & ~in_track)
         matching.estimate(found, still, self._origin, self._nearest, pose_error)
         x, y = matching.corrected(found.x, found.y, self._origin)
-        margin = 3.0 * matching.noise_m + 2.0 * matching.sd_m
-        flagged = in_track | motion.spread(found, self._free.appeared(x, y, margin))
-        motion.remember(x[flagged], y[flagged], self._time_s)
         index, away = points.nearest(x, y)
         same_m = min(_SAME_M + _SAME_SD * matching.noise_m, _MOST_SAME_M)
         same = usable & (away <= same_m)
+        flagged = in_track | motion.spread(found, self._appeared(x, y, index, same))
+        motion.remember(x[flagged], y[flagged], self._time_s)
         width = found.width_m[found.segment]
         changed = self._average(found, index, x, y, width, same, same & ~flagged)
         new = usable & ~flagged & ~same
@@ -163,8 +174,21 @@ class StaticMap:
             new = new.nonzero()[0]
             new = new[~motion.recent(x[new], y[new], settled)]
             new = new[self._inside(x[new], y[new])]
-            changed |= points.add(x[new], y[new], self._time_s, width[new]) > 0
+            added = points.add(
+                x[new], y[new], self._time_s, width[new], found.nx[new], found.ny[new]
+            )
+            changed |= added > 0
         return changed
+
+    def _appeared(self, x: Array, y: Array, index: Array, same: Array) -> Array:
+        """Whether returns (k,) are in space that was seen free; where a point stands is none."""
+        standing = same.copy()
+        standing[same] = self._points.data[HITS][index[same]] >= _STANDING_HITS
+        asked = (~standing).nonzero()[0]
+        appeared = np.zeros(x.size, dtype=bool)
+        margin = 3.0 * self._matching.noise_m + 2.0 * self._matching.sd_m
+        appeared[asked] = self._free.appeared(x[asked], y[asked], margin)
+        return appeared
 
     def _inside(self, x: Array, y: Array) -> Array:
         rx, ry = self._robot
@@ -172,13 +196,17 @@ class StaticMap:
         inside: Array = (np.abs(x - rx) <= half) & (np.abs(y - ry) <= half)
         return inside
 
-    def _nearest(self, x: Array, y: Array, reach: int) -> tuple[Array, Array, Array]:
+    def _nearest(
+        self, x: Array, y: Array, nx: Array, ny: Array, reach: int
+    ) -> tuple[Array, Array, Array]:
         index, away = self._points.nearest(x, y, reach)
         if not self.count:
             return x, y, away
         data = self._points.data
-        old = (data[FIRST] <= max(self._time_s - _ESTABLISHED_S, 0.0))[index]
-        return data[X][index], data[Y][index], np.where(old, away, np.inf)
+        # What is seen from behind is another surface: walls are thin.
+        usable = data[NX][index] * nx + data[NY][index] * ny > _ALIKE
+        usable &= (data[FIRST] <= max(self._time_s - _ESTABLISHED_S, 0.0))[index]
+        return data[X][index], data[Y][index], np.where(usable, away, np.inf)
 
     def _average(
         self, found: Surfaces, index: Array, x: Array, y: Array, width: Array, hit: Array,
@@ -193,6 +221,7 @@ class StaticMap:
         data[HITS, of] += 1.0  # once per scan
         data[LAST, of] = self._time_s
         data[MISSED, of] = 0.0
+        data[NX, of], data[NY, of] = found.nx[hit], found.ny[hit]
         np.maximum.at(data[WIDTH], of, width[hit])
         chosen = np.flatnonzero(steady)
         of = index[chosen]
@@ -207,8 +236,12 @@ class StaticMap:
         gain = 1.0 / (count[met] * np.minimum(data[HITS][met], _MOST_HITS))
         dx = np.bincount(of, rest * nx, n)[met] * gain
         dy = np.bincount(of, rest * ny, n)[met] * gain
-        points.move(met, data[X][met] + dx, data[Y][met] + dy)
-        return bool((np.abs(dx) + np.abs(dy)).max() > 1e-3)
+        far = np.abs(dx) + np.abs(dy) > _STILL_M
+        if not far.any():
+            return False
+        met = met[far]
+        points.move(met, data[X][met] + dx[far], data[Y][met] + dy[far])
+        return True
 
     def _clear(self, beams: Beams, moving: Array) -> bool:
         """Clear points that the beams see through, and young ones where something moves."""
@@ -227,7 +260,8 @@ class StaticMap:
             spacing_m = d * beams.spacing_rad
             clear, off = _clear_lengths(beams, bearing, m.sd_rad)
             passes = clear - d
-            thin = (data[WIDTH][judged] < spacing_m) & (off * d > _ALONE_M)
+            unsure_m = off * d + m.sd_rad * d + m.sd_m
+            thin = (data[WIDTH][judged] < spacing_m) & (unsure_m > _ALONE_M)
             margin = p.margin_m + 0.5 * spacing_m
             strong = (passes > margin + _NOISE_SD * m.noise_m + m.sd_m) & ~thin
             data[MISSED, judged] = np.where(strong, data[MISSED][judged] + 1.0, 0.0)
@@ -235,10 +269,12 @@ class StaticMap:
             gone[judged] = (data[MISSED][judged] >= p.scans) | (
                 data[WEAK][judged] >= _FEWEST_WEAK + 0.5 * data[HITS][judged]
             )
-            seen_through = judged[data[MISSED][judged] >= p.scans]
-            self._moving.remember(data[X][seen_through], data[Y][seen_through], self._time_s)
+            cleared = judged[data[MISSED][judged] >= p.scans]
+            self._moving.remember(data[X][cleared], data[Y][cleared], self._time_s)
+        gone |= (data[HITS] < _FEWEST_HITS) & (data[LAST] < self._time_s - _BRIEF_S)
         if moving.shape[0]:
-            young = np.flatnonzero(data[FIRST] > self._time_s - _YOUNG_S)
+            young = (data[FIRST] > self._time_s - _YOUNG_S) & (data[HITS] < _STANDING_HITS)
+            young = young.nonzero()[0]
             x, y = m.measured(data[X][young], data[Y][young], self._origin)
             gone[young] |= self._moving.near_any(x, y, moving)
         if not gone.any():
@@ -293,7 +329,7 @@ class StaticMap:
         """
         data = self._points.data
         return occupancy(
-            data[X], data[Y], self._robot, self.params.size_m, self.params.cell_m, self._seen
+            data[X], data[Y], self._robot, self.params.size_m, self.params.cell_m, self._observed
         )
 
 

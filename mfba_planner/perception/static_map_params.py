@@ -33,7 +33,7 @@ class StaticMapParams:
         0.08, "tracks that are slower are marked", unit="m/s", minimum=0.0, maximum=10.0
     )
     settle_s: float = option(
-        0.8, "time after a motion before what is there is marked", unit="s", minimum=0.0,
+        0.4, "time after a motion before what is there is marked", unit="s", minimum=0.0,
         maximum=60.0,
     )  # fmt: skip
     widest_m: float = option(

@@ -9,15 +9,17 @@ import numpy as np
 
 Array = np.ndarray
 
-X, Y, FIRST, LAST, HITS, MISSED, WEAK, WIDTH = range(8)  # rows of data
+ROWS = 10
+X, Y, FIRST, LAST, HITS, MISSED, WEAK, WIDTH, NX, NY = range(ROWS)  # of data
 NONE = -1
 
 
 class MapPoints:
     """Points with real coordinates, found through the cells of a grid that wraps around.
 
-    data (8, n): x, y (m); when first and last seen (s); scans that met the point; scans in a row
-    that saw through it; scans that ended a little behind it; width of the surface it is on (m).
+    data (ROWS, n): x, y (m); when first and last seen (s); scans that met the point; scans in a
+    row that saw through it; scans that ended a little behind it; width of the surface that it is
+    on (m); its normal towards the lidar when it was last seen.
     The grid has 2^k cells along a side, so that a cell is found by masking its coordinates.
     """
 
@@ -28,7 +30,7 @@ class MapPoints:
         self._mask = (1 << self._bits) - 1
         self._slot = np.full(1 << 2 * self._bits, NONE, dtype=np.int32)
         self._cell = np.empty(0, dtype=np.int64)
-        self.data = np.empty((8, 0))
+        self.data = np.empty((ROWS, 0))
 
     @property
     def count(self) -> int:
@@ -56,29 +58,35 @@ class MapPoints:
         ix = (np.floor(x / self.cell_m).astype(np.int64)[:, None] + step) & self._mask
         iy = (np.floor(y / self.cell_m).astype(np.int64)[:, None] + step) & self._mask
         cells = (iy[:, :, None] << self._bits) + ix[:, None, :]
-        slot = self._slot[cells.reshape(x.size, -1)]
-        dx, dy = self.data[X][slot], self.data[Y][slot]
+        slot = self._slot.take(cells.reshape(x.size, step.size**2))
+        # Of an empty cell the slot is NONE, the last column: that of no point.
+        places = np.full((2, self.count + 1), np.inf)
+        places[:, :-1] = self.data[:2]
+        dx, dy = places[0].take(slot, mode="wrap"), places[1].take(slot, mode="wrap")
         dx -= x[:, None]
         dy -= y[:, None]
         dx *= dx
         dy *= dy
         dx += dy
-        dx[slot == NONE] = np.inf
         best = dx.argmin(axis=1)
-        row = np.arange(x.size)
-        return slot[row, best].astype(np.int64), np.sqrt(dx[row, best])
+        best += np.arange(0, slot.size, slot.shape[1])
+        return slot.ravel()[best].astype(np.int64), np.sqrt(dx.ravel()[best])
 
-    def add(self, x: Array, y: Array, time_s: float, width_m: Array) -> int:
-        """Add a point in each empty cell; of several in one cell the first. How many were."""
+    def add(self, x: Array, y: Array, time_s: float, width_m: Array, nx: Array, ny: Array) -> int:
+        """Add a point in each empty cell; of several in one cell the first. How many were.
+
+        nx and ny are the normals towards the lidar.
+        """
         cell = self._cells(x, y)
         chosen = np.sort(np.unique(cell, return_index=True)[1])
         chosen = chosen[self._slot[cell[chosen]] == NONE]
         if not chosen.size:
             return 0
-        new = np.zeros((8, chosen.size))
+        new = np.zeros((ROWS, chosen.size))
         new[X], new[Y] = x[chosen], y[chosen]
         new[FIRST] = new[LAST] = time_s
         new[HITS], new[WIDTH] = 1.0, width_m[chosen]
+        new[NX], new[NY] = nx[chosen], ny[chosen]
         self._slot[cell[chosen]] = np.arange(self.count, self.count + chosen.size)
         self.data = np.concatenate((self.data, new), axis=1)
         self._cell = np.concatenate((self._cell, cell[chosen]))
@@ -98,23 +106,16 @@ class MapPoints:
         left = np.flatnonzero(cell != self._cell[index])
         if not left.size:
             return False
-        gone = np.ones(left.size, dtype=bool)
         first = np.unique(cell[left], return_index=True)[1]
-        first = first[self._slot[cell[left[first]]] == NONE]
-        gone[first] = False
-        moved = left[first]
-        self._slot[self._cell[index[left]]] = NONE
-        self._cell[index[moved]] = cell[moved]
-        self._slot[cell[moved]] = index[moved]
-        if not gone.any():
-            return False
+        first = left[first[self._slot[cell[left[first]]] == NONE]]
         kept = np.ones(self.count, dtype=bool)
-        kept[index[left[gone]]] = False
-        # The cell of a dropped point may hold another one by now.
+        kept[index[left]] = False
+        kept[index[first]] = True
+        self._slot[self._cell] = NONE
+        self._cell[index[first]] = cell[first]
         self.data, self._cell = self.data[:, kept], self._cell[kept]
-        self._slot[self._slot != NONE] = NONE
         self._slot[self._cell] = np.arange(self._cell.size)
-        return True
+        return first.size < left.size
 
     def roll(self, x: float, y: float) -> bool:
         """Drop points outside the square around (x, y). Whether any was."""
