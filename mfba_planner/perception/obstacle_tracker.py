@@ -201,16 +201,21 @@ class Tracker:
         """Error (x, y, turn) of the pose of the last scan, as far as it is known."""
         return self._pose_error.error
 
+    def may_move(self) -> Array:
+        """Whether each of the tracks moves or may move; (m,)."""
+        bank = self._bank
+        v = bank.state[:, 2:4]
+        speed2 = v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1]
+        variance = 0.5 * (bank.covariance[:, VX, VX] + bank.covariance[:, VY, VY])
+        may: Array = bank.moving | ((speed2 > _MAY_MOVE * variance) & (bank.scans > 1))
+        return may
+
     def moving(self) -> tuple[Array, Array]:
         """Tracks that move or may move, by the pose of the last scan.
 
         Rows (x, y, vx, vy, r) (m, 5), and whether it is sure that each moves (m,).
         """
-        bank = self._bank
-        v = bank.state[:, 2:4]
-        speed2 = v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1]
-        variance = 0.5 * (bank.covariance[:, VX, VX] + bank.covariance[:, VY, VY])
-        may = bank.moving | ((speed2 > _MAY_MOVE * variance) & (bank.scans > 1))
+        bank, may = self._bank, self.may_move()
         rows = bank.state[may]
         origin = np.array(self._pose.position)
         shift_x, shift_y = self._pose_error.shift(rows[:, 0], rows[:, 1], origin)

@@ -21,9 +21,9 @@ from ..perception.static_map import StaticMap
 Array = np.ndarray
 
 _CLEAR_M = 0.04  # beside the robot's radius: a straight line with so much room is driven
-_TOUCH_M = 0.03  # nearer than so much beyond the radius counts as closed
+_TOUCH_M = 0.01  # nearer than so much beyond the radius counts as closed
 _CLOSED = 0.02  # F there; not 0, so that the distance to go stays finite
-_SLOWEST, _ROOM_M = 0.6, 0.25  # F beside what stands, and from where it is 1
+_SLOWEST, _ROOM_M = 0.5, 0.25  # F beside what stands, and from where it is 1
 _MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
 _MOST_CELLS = 20_000  # about 8 ms
 _FARTHEST_M = 20.0  # a goal farther away is replaced by a point on the line to it
@@ -34,7 +34,7 @@ class RouteParams:
     """Options of the distance to go."""
 
     refresh_s: float = option(
-        0.25, "time after which the distance to go is computed again, if the map has changed",
+        0.3, "time after which the distance to go is computed again, if the map has changed",
         unit="s", minimum=0.0, maximum=10.0,
     )  # fmt: skip
 

@@ -12,6 +12,7 @@ import numpy as np
 from ..core.geometry import Point
 from ..core.planner_types import Circle, Observation
 from ..core.random_streams import stream
+from ..perception.distance_field import DistanceField
 from ..perception.obstacle_tracker import Tracker
 from ..perception.static_map import StaticMap, StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
@@ -20,7 +21,7 @@ from .base_planner import Move
 from .differential_drive import Speeds
 from .distance_to_go import RouteParams
 from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
-from .map_search import EXPLAINED_M, Found, MapSearch
+from .map_search import Found, MapSearch
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
@@ -29,6 +30,7 @@ from .turn_delay import TurnDelay
 
 NEAR_M = 3.5  # what stands farther away does not matter while the straight way is clear
 _LEAST_M = 0.005  # kept from what stands, beyond the robot's radius
+_MAPPED_M = 0.1  # so near to its outline is a point of the map on a circle at rest
 _STRAIGHT = "the straight way is free"
 
 
@@ -51,13 +53,14 @@ class MapPlanning:
         self._search_m = search_m
         self.map = StaticMap(map_params)
         self._search = MapSearch(route, params.robot_radius_m, headings, reach_m)
-        self._n = headings
+        self._reach_m = 0.0
 
     def update(self, stamp_ns: int, observation_pose: Observation, tracker: Tracker) -> None:
         """Take the scan that the tracker has just taken."""
         pose = (observation_pose.sensed or (0, observation_pose.pose))[1]
         assert tracker.beams is not None
         moving, surely = tracker.moving()
+        self._reach_m = self.map.params.spacing_m / tracker.beams.spacing_rad
         self.map.update(stamp_ns, pose, tracker.beams, moving, surely, tracker.pose_error)
 
     def move(
@@ -81,8 +84,8 @@ class MapPlanning:
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
         if to_go.is_straight and float(away.min()) > NEAR_M:
             return None
-        clearance = self._search.clearance(known, position)
-        circles = self._not_in_map(circles)
+        clearance = self._search.clearance(known, position, obs.pose_ns)
+        circles = self._not_in_map(circles, position, clearance)
         speed = params.speed_mps
         rollout = MapRollout(
             position, obs.pose.yaw + turn, speeds, params, params.robot_radius_m, speed,
@@ -116,19 +119,20 @@ class MapPlanning:
         turn = math.atan2(float(y[1] - y[0]), float(x[1] - x[0]))
         return (float(x[0]), float(y[0])), turn
 
-    def _not_in_map(self, circles: Sequence[Circle]) -> list[Circle]:
+    def _not_in_map(
+        self, circles: Sequence[Circle], position: Point, clearance: DistanceField
+    ) -> list[Circle]:
         """Circles that move, or stand and are not in the map, in the map's frame."""
         if not circles:
             return []
         rows = np.array([(*c.center_m, *c.velocity_mps, c.radius_m) for c in circles])
         x, y = self.map.to_map(rows[:, 0], rows[:, 1])
-        (px, py), _ = (self._search._clearance[1], 0.0)  # type: ignore[index]
-        still = (rows[:, 2] == 0.0) & (rows[:, 3] == 0.0)
-        dx, dy = px - x, py - y
-        d = np.sqrt(dx * dx + dy * dy) + 1e-9
-        r = np.minimum(np.maximum(rows[:, 4] - self._params.robot_radius_m, 0.0), d)
-        near = self._search._clearance[2].at(x + dx / d * r, y + dy / d * r)  # type: ignore[index]
-        kept = ~still | (near > EXPLAINED_M)
+        dx, dy = x - position[0], y - position[1]
+        kept = (rows[:, 2] != 0.0) | (rows[:, 3] != 0.0)
+        kept |= dx * dx + dy * dy > self._reach_m * self._reach_m
+        # What may move is not marked, but may have been marked before it began to.
+        outline_m = rows[:, 4] - self._params.robot_radius_m + _MAPPED_M
+        kept |= clearance.at(x, y) > outline_m
         return [
             replace(c, center_m=(cx, cy))
             for c, cx, cy, keep in zip(circles, x.tolist(), y.tolist(), kept.tolist())
@@ -156,7 +160,7 @@ class MapPlanning:
         length = math.sqrt(qx * qx + qy * qy)
         scale = 1.0 / max(found.t1, length / params.speed_mps)
         if params.turns:
-            clearance = self._search.clearance(self.map, position)
+            clearance = self._search.clearance(self.map, position, obs.pose_ns)
             room = float(clearance.at(np.array([position[0]]), np.array([position[1]]))[0])
             room -= params.robot_radius_m
             scale *= min(max(room / SLOW_ROOM_M, SLOWEST), 1.0)

@@ -81,12 +81,12 @@ class MapRollout:
         """Whether nothing that moves is in reach."""
         return not len(self._circles)
 
-    def paths(self, qx: Array, qy: Array, t1: Array) -> Paths:
+    def paths(self, qx: Array, qy: Array, t1: Array, horizon_s: float | None = None) -> Paths:
         """Rollouts through waypoints (m,), relative to the robot, reached after t1 (m,) s.
 
         They end at the waypoints where nothing moves: what stands is in the distance to go.
         """
-        horizon_s = self._horizon_s
+        horizon_s = horizon_s or self._horizon_s
         if self._base.turns:
             return self._turning(qx, qy, t1, horizon_s)
         if self.alone:

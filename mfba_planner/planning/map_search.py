@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.geometry import Point
-from ..core.planner_types import Bits
+from ..core.planner_types import NANO, Bits
 from ..perception.distance_field import DistanceField
 from ..perception.static_map import StaticMap
 from ..swarm.bat_swarm import BatSwarm
@@ -28,10 +28,10 @@ SPEEDS = (1e-6, 0.5)
 BATCH = 40  # candidates evaluated at once
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
 WINDOW_M = 7.0  # side of the square in which clearances are known
+KEPT_S = 0.15  # contact is ruled out by the points themselves
 _KEPT_M = 0.5  # the window is used again until the robot is so far from its middle
 _STEP_M = 0.1
-SIGHT_M = (0.08, 0.03)  # room beside a line of sight: the first that leads anywhere
-EXPLAINED_M = 0.12  # a circle at rest whose outline is so near to a point of the map is in it
+SIGHT_M = (0.12, 0.07, 0.025)  # room beside a line of sight
 
 
 class Found(NamedTuple):
@@ -59,17 +59,18 @@ class MapSearch:
         self._qx = (self._cos[:, None] * lengths).ravel()
         self._qy = (self._sin[:, None] * lengths).ravel()
         self._length = np.tile(lengths, headings)
-        self._clearance: tuple[int, Point, DistanceField] | None = None
+        self._clearance: tuple[int, int, Point, DistanceField] | None = None
 
-    def clearance(self, known: StaticMap, position: Point) -> DistanceField:
-        """Distances to what stands around the robot."""
+    def clearance(self, known: StaticMap, position: Point, stamp_ns: int) -> DistanceField:
+        """Distances to what stands around the robot; as of KEPT_S ago, where that will do."""
         if self._clearance is not None:
-            version, (x, y), field = self._clearance
+            then_ns, version, (x, y), field = self._clearance
             near = abs(x - position[0]) < _KEPT_M and abs(y - position[1]) < _KEPT_M
-            if version == known.version and near:
+            fresh = 0.0 <= (stamp_ns - then_ns) * NANO < KEPT_S or version == known.version
+            if fresh and near:
                 return field
         field = known.distance_field(position, WINDOW_M, known.params.cell_m)
-        self._clearance = (known.version, position, field)
+        self._clearance = (stamp_ns, known.version, position, field)
         return field
 
     def search(
@@ -91,17 +92,19 @@ class MapSearch:
         evaluate = _Evaluation(rollout, position, risk, speed_mps, self.to_go, turn_delay)
         (px, py), to_go = position, self.to_go
         here = float(to_go.at(np.array([px]), np.array([py]))[0])
-        ahead = self._ahead(position, here)
-        length = math.hypot(*ahead)
-        t1 = max(length / speed_mps, tick_s)
-        drivable = observed is None or bool(observed[self._heading(ahead)])
-        best, best_cost = (ahead, t1), math.inf
-        if drivable:
-            cost, harm = evaluate(np.array([ahead[0]]), np.array([ahead[1]]), np.array([t1]))
-            best_cost = float(cost[0])
-            if harm[0] <= 0.0:
-                return Found(ahead, t1, best_cost, here, (), (), True)
-        qx, qy, t = self._candidates(ahead, speed_mps, tick_s, last, waits=not rollout.alone)
+        ahead = self._ahead(position)
+        if observed is not None:
+            ahead = [q for q in ahead if observed[self._heading(q)]] or ahead
+        ax, ay = np.array(ahead).T
+        at = np.maximum(np.sqrt(ax * ax + ay * ay) / speed_mps, tick_s)
+        best, best_cost = (ahead[0], float(at[0])), math.inf
+        if observed is None or observed[self._heading(ahead[0])]:
+            cost, harm = evaluate(ax, ay, at)
+            k = int(cost.argmin())
+            best, best_cost = (ahead[k], float(at[k])), float(cost[k])
+            if harm[k] <= 0.0:
+                return Found(*best, best_cost, here, (), (), True)
+        qx, qy, t = self._candidates(best[0], speed_mps, tick_s, last, waits=not rollout.alone)
         if observed is not None:
             headings = np.round(np.arctan2(qy, qx) * self._n / (2.0 * math.pi)).astype(int) - 1
             kept = observed[headings % self._n]
@@ -139,16 +142,16 @@ class MapSearch:
     def _heading(self, q: Point) -> int:
         return (round(math.atan2(q[1], q[0]) * self._n / (2.0 * math.pi)) - 1) % self._n
 
-    def _ahead(self, position: Point, here: float) -> Point:
-        """The farthest point of the shortest way that is in line of sight, relative."""
+    def _ahead(self, position: Point) -> list[Point]:
+        """The farthest points of the shortest way in line of sight, with more room and less."""
         to_go, clearance = self.to_go, self._clearance
         assert clearance is not None
-        field = clearance[2]
+        field = clearance[3]
         if to_go.is_straight:
             dx, dy = to_go.goal[0] - position[0], to_go.goal[1] - position[1]
             away = math.sqrt(dx * dx + dy * dy)
             share = min(1.0, self._reach_m / max(away, 1e-9))
-            return (dx * share, dy * share)
+            return [(dx * share, dy * share)]
         x, y = np.array([position[0]]), np.array([position[1]])
         way = []
         for _ in range(round(self._reach_m / _STEP_M)):
@@ -161,11 +164,11 @@ class MapSearch:
         ys = position[1] + ends[:, 1:] * share
         now = float(field.at(np.array([position[0]]), np.array([position[1]]))[0])
         least = field.at(xs, ys).min(axis=1)
+        found = set()
         for room_m in SIGHT_M:
             seen = least > min(self._radius_m + room_m, now - 0.005)
-            if seen.any():
-                return way[int(np.flatnonzero(seen)[-1])]
-        return way[0]
+            found.add(int(np.flatnonzero(seen)[-1]) if seen.any() else 0)
+        return [way[k] for k in sorted(found)]
 
     def _candidates(
         self, ahead: Point, speed_mps: float, tick_s: float, last: Point | None, waits: bool
@@ -220,7 +223,7 @@ class _Evaluation:
 
     def contact(self, qx: Array, qy: Array, t1: Array) -> Array:
         """Whether the way to each waypoint touches something."""
-        paths = self._rollout.paths(qx, qy, t1)
+        paths = self._rollout.paths(qx, qy, t1, float(t1.max()))
         brief = replace(self._risk, horizon_s=max(float(t1.max()), 0.1), close_m=0.0)
         standing = self._rollout.standing_risk(paths, brief, MARGIN_M) >= FORBIDDEN_M
         moving = self._rollout.moving_risk(paths, brief) > 0.0
