@@ -28,7 +28,7 @@ CONTACT_M = 0.02  # beyond the robot's radius: the end of a wall is seen a beam 
 CLOSE_M = 1.0  # cost of a pass beside what stands without clearance
 FORBIDDEN_M = 1000.0  # cost of a contact before the waypoint with what stands
 CARROT_M = 0.4  # a differential base aims so far ahead along the shortest way
-SLOW_ROOM_M, SLOWEST = 0.4, 0.35  # room below which a differential base slows down, and to what
+SLOW_ROOM_M, SLOWEST = 0.15, 0.4  # room below which a differential base slows down, and to what
 _REACHED_M = 0.1
 _LONGEST = 2.0  # horizons, waiting and turning included
 
