@@ -81,4 +81,5 @@ def distance_field(
         dy *= dy
         dx += dy
         np.minimum(best, dx, out=best)
-    return DistanceField(origin, cell_m, np.sqrt(best).astype(np.float64), cap_m)
+    distance = np.minimum(np.sqrt(best).astype(np.float64), cap_m)
+    return DistanceField(origin, cell_m, distance, cap_m)
