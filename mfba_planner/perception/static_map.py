@@ -53,7 +53,7 @@ _SAME_M, _SAME_SD, _MOST_SAME_M = 0.025, 2.5, 0.05  # returns nearer to a point 
 _ALONE_M = 0.006  # so near to a beam is a point that is thinner than the beams are apart
 _NOISE_SD = 2.5
 _FEWEST_WEAK = 3.0
-_LIMIT_M = 0.05  # returns so near to the longest range are not used
+_LIMIT_M = 0.15  # returns so near to the longest range are not used
 _FIELD_M = 10.0  # side of the window in which distance() knows
 
 
