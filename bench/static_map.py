@@ -158,7 +158,7 @@ class Judge:
         beams = self._tracker.beams
         assert beams is not None
         hit = beams.range_m * beams.spacing_rad <= self._map.params.spacing_m
-        hit &= beams.range_m < beams.longest_m - 0.1
+        hit &= beams.range_m < beams.longest_m - 0.2
         r = beams.range_m[hit]
         x = beams.origin_x[hit] + r * beams.cos[hit]
         y = beams.origin_y[hit] + r * beams.sin[hit]

@@ -5,10 +5,14 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mapped_scenes import Disc, Scene, near, off_surface, room, wall
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.planner_types import Scan
+from mfba_planner.perception.obstacle_tracker import Tracker
 from mfba_planner.perception.static_map import StaticMap, StaticMapParams
 
 NOISES = [
@@ -174,6 +178,42 @@ def test_the_window_rolls_and_the_memory_is_bounded() -> None:
         counts.append(scene.map.count)
     assert max(counts[300:]) <= 1.2 * max(counts[50:300])
     assert max(counts) < 400
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    beams=st.integers(1, 400),
+    increment=st.floats(-0.1, 0.1).filter(lambda value: abs(value) > 1e-3),
+    time_increment_s=st.sampled_from([0.0, 1e-3]),
+)
+@settings(max_examples=60, deadline=None)
+def test_any_scan_is_taken(
+    seed: int, beams: int, increment: float, time_increment_s: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    increment = math.copysign(min(abs(increment), 2.0 * math.pi / beams), increment)
+    tracker, local_map, version = Tracker(), StaticMap(StaticMapParams(size_m=8.0)), 0
+    for k in range(6):
+        ranges = rng.uniform(0.0, 12.0, beams)
+        ranges[rng.random(beams) < 0.2] = rng.choice([math.inf, -math.inf, math.nan])
+        pose = Pose2D(*rng.normal(0.0, 0.5, 3).tolist())
+        scan = Scan(
+            ranges_m=ranges, angle_min_rad=pose.yaw, angle_increment_rad=increment,
+            range_min_m=0.1, range_max_m=10.0, time_increment_s=time_increment_s,
+        )  # fmt: skip
+        tracker.update((k + 1) * 10**8, pose, scan)
+        assert tracker.beams is not None
+        local_map.update(
+            (k + 1) * 10**8, pose, tracker.beams, *tracker.moving(), tracker.pose_error
+        )
+        assert local_map.version >= version
+        version = local_map.version
+        points = local_map.points()
+        assert np.isfinite(points).all()
+        assert np.abs(points - pose.position).max(initial=0.0) < 8.0
+        found = local_map.distance(*rng.uniform(-5.0, 5.0, (2, 20)))
+        assert ((found >= 0.0) & (found <= 0.8)).all()
+    assert local_map.occupancy_grid()[1].shape == (160, 160)
 
 
 def test_the_same_scans_give_the_same_map() -> None:
