@@ -31,6 +31,7 @@ _LEAST_SD, _MOST_SD, _FIRST_SD = 1e-3, 0.06, 0.005  # m and rad
 _LEAST_NOISE, _MOST_NOISE, _FIRST_NOISE = 0.003, 0.05, 0.01  # m
 _QUIET_SD = 4e-3  # below it one pass is enough
 _FAR_M = 3.0
+_CLOSE_M = 1e-3  # a step so short is the last
 _SOFT_SD, _SOFT_M = 2.0, 0.025  # distance from its line at which a return counts a quarter
 _MOST_REACH, _PASSES = 3, 4  # cells
 
@@ -85,11 +86,15 @@ class ScanMatching:
         left: Error | None = None
         rest = np.empty(0)
         for k in range(passes):
+            before = self.error
             step = self._step(x, y, nx, ny, origin, nearest, max(reach - k, 1))
             if step is None:
                 left = None
                 break
             left, rest, near = step
+            dx, dy, dturn = (e - b for e, b in zip(self.error, before))
+            if k >= max(reach - 1, 1) and max(abs(dx), abs(dy), _FAR_M * abs(dturn)) < _CLOSE_M:
+                break
         if left is None or _anchors(found, segment[near]) < _ANCHORS:
             self.sd_m, self.sd_rad = math.sqrt(vm), math.sqrt(vr)
             self.error = self._expected
