@@ -26,6 +26,7 @@ _CLOSED = 0.02  # F there; not 0, so that the distance to go stays finite
 _SLOWEST, _ROOM_M = 0.5, 0.3  # F beside what stands, and from where it is 1
 _MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
 _MOST_CELLS = 20_000  # about 8 ms
+_SAME_GOAL_M = 0.1  # noise of the odometry moves the goal in the map's frame
 _FARTHEST_M = 20.0  # a goal farther away is replaced by a point on the line to it
 
 
@@ -73,7 +74,8 @@ class DistanceToGo:
             then_ns, version, then_goal = self._computed
             age_s = (stamp_ns - then_ns) * NANO
             fresh = 0.0 <= age_s < self._params.refresh_s or version == known.version
-            if fresh and then_goal == goal and self._is_inside(position):
+            same = distance(then_goal, goal) < _SAME_GOAL_M
+            if fresh and same and self._is_inside(position):
                 return
         self._compute(known, position, goal)
         self._computed = (stamp_ns, known.version, goal)

@@ -79,7 +79,7 @@ class MapPlanning:
             return None
         position, turn = self._in_map(obs.pose.position)
         to_go = self._search.to_go
-        to_go.update(obs.pose_ns, known, position, goal)
+        to_go.update(obs.pose_ns, known, position, self._in_map(goal)[0])
         points = known.map_points()
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
         if to_go.is_straight and float(away.min()) > NEAR_M:
