@@ -12,6 +12,8 @@ import math
 
 import numpy as np
 
+from ..core.geometry import Point
+
 Array = np.ndarray
 Covariance = tuple[float, float, float, float, float, float]  # xx, xy, xr, yy, yr, rr
 
@@ -52,26 +54,26 @@ class PoseError:
         """Standard deviation of the heading."""
         return math.sqrt(self.variance_rad2)
 
-    def shift(self, x: Array, y: Array, origin: Array) -> tuple[Array, Array]:
+    def shift(self, x: Array, y: Array, origin: Point) -> tuple[Array, Array]:
         """How far the present error has moved measured points."""
         ex, ey, turn = self.error
         return ex - turn * (y - origin[1]), ey + turn * (x - origin[0])
 
     @staticmethod
-    def noise(measured: Array, left: Covariance, origin: Array) -> Array:
-        """Covariances (j, 3, 3) of (x, y, r) at centres (j, 2) by what is left of the error."""
-        px, py = origin[1] - measured[:, 1], measured[:, 0] - origin[0]
+    def noise(measured: Array, left: Covariance, origin: Point) -> Array:
+        """Covariances (3, 3, j) of (x, y, r) at centres (2, j) by what is left of the error."""
+        px, py = origin[1] - measured[1], measured[0] - origin[0]
         xx, xy, xr, yy, yr, rr = left
-        noise = np.zeros((measured.shape[0], 3, 3))
-        noise[:, 0, 0] = xx + px * (2.0 * xr + rr * px)
-        noise[:, 1, 1] = yy + py * (2.0 * yr + rr * py)
-        noise[:, 0, 1] = noise[:, 1, 0] = xy + px * yr + py * (xr + rr * px)
+        noise = np.zeros((3, 3, measured.shape[1]))
+        noise[0, 0] = xx + px * (2.0 * xr + rr * px)
+        noise[1, 1] = yy + py * (2.0 * yr + rr * py)
+        noise[0, 1] = noise[1, 0] = xy + px * yr + py * (xr + rr * px)
         return noise
 
     def estimate(
-        self, measured: Array, predicted: Array, covariance: Array, settled: Array, origin: Array
+        self, measured: Array, predicted: Array, covariance: Array, settled: Array, origin: Point
     ) -> Covariance:
-        """Estimate the error from centres (j, 2) and their covariances (j, 2, 2).
+        """Estimate the error from centres (2, j) and their covariances (2, 2, j).
 
         Outliers are left out. If fewer than three or fewer than half of the tracks agree, the
         error stays 0: one or two that move look like an odometry that errs. The variances are
@@ -80,11 +82,11 @@ class PoseError:
         self.error = (0.0, 0.0, 0.0)
         vm, vr = self.variance_m2, self.variance_rad2
         left = (vm, 0.0, 0.0, vm, 0.0, vr)
-        if not measured.shape[0]:
+        if not settled.size:
             return left
         equations = _Equations(measured, predicted, covariance, origin)
         agree = settled
-        if measured.shape[0] >= _ENOUGH:
+        if settled.size >= _ENOUGH:
             found = self._solve(equations)
             if found is not None:
                 left, agree = found
@@ -145,11 +147,11 @@ class _Equations:
     """The differences of j centres as linear functions of the pose's error."""
 
     def __init__(
-        self, measured: Array, predicted: Array, covariance: Array, origin: Array
+        self, measured: Array, predicted: Array, covariance: Array, origin: Point
     ) -> None:
-        self.ex, self.ey = measured[:, 0] - predicted[:, 0], measured[:, 1] - predicted[:, 1]
-        self.px, self.py = origin[1] - predicted[:, 1], predicted[:, 0] - origin[0]  # m per rad
-        self.xx, self.xy, self.yy = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+        self.ex, self.ey = measured - predicted
+        self.px, self.py = origin[1] - predicted[1], predicted[0] - origin[0]  # m per rad
+        self.xx, self.xy, self.yy = covariance[0, 0], covariance[0, 1], covariance[1, 1]
         scale = 1.0 / (self.xx * self.yy - self.xy * self.xy)
         ixx, ixy, iyy = scale * self.yy, -scale * self.xy, scale * self.xx
         self.ixx, self.ixy, self.iyy = ixx, ixy, iyy
