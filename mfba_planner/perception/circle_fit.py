@@ -30,13 +30,10 @@ _NINE = np.arange(9)[:, None]
 class Returns:
     """k returns of g groups, one circle each, and e sure edges of these groups."""
 
-    x: Array  # (k,) m
-    y: Array
+    xy: Array  # (2, k) m
     group: Array  # (k,) int
-    edge_x: Array  # (e,) m, origin of the beam at the edge
-    edge_y: Array
-    normal_x: Array  # (e,) outward
-    normal_y: Array
+    edge_xy: Array  # (2, e) m, origin of the beam at the edge
+    normal: Array  # (2, e) outward
     edge_gap_m: Array  # (e,) width of the gap at the surface
     edge_group: Array  # (e,) int
     count: Array  # (g,) returns of each group
@@ -88,37 +85,35 @@ class _Rows:
 
     def __init__(self, returns: Returns, range_variance: float, groups: int) -> None:
         self._returns, self._groups = returns, groups
-        k, rows = returns.x.size, returns.x.size + returns.edge_group.size
+        k, rows = returns.group.size, returns.group.size + returns.edge_group.size
         self._count = np.maximum(returns.count, 1.0)
         shared = np.minimum(1.0, MOST_RETURNS / self._count) / range_variance
         self._group = np.concatenate((returns.group, returns.edge_group))
         self._weight = np.empty(rows)
         self._weight[:k] = shared.take(returns.group)
         self._weight[k:] = 1.0 / (_UNIFORM * returns.edge_gap_m**2 + range_variance)
-        self._hx, self._hy, self._residual = np.empty((3, rows))
-        self._hx[k:], self._hy[k:] = returns.normal_x, returns.normal_y
-        self._edge = returns.normal_x * returns.edge_x + returns.normal_y * returns.edge_y
+        self._h, self._residual = np.empty((2, rows)), np.empty(rows)
+        self._h[:, k:] = returns.normal
+        edge = returns.normal * returns.edge_xy
+        self._edge = edge[0] + edge[1]
         self._sums = (self._group + groups * _NINE).ravel()
         self._terms = np.empty((9, rows))
 
     def normal_equations(self, z: Array) -> tuple[Array, Array]:
         """Information (3, 3, g) and gradient (3, g) at circles z (3, g)."""
-        returns, hx, hy, e = self._returns, self._hx, self._hy, self._residual
-        k = returns.x.size
-        x, y, r = z.take(self._group, axis=1)
-        dx, dy, d = self._to_returns(x, y)
+        h, e, w, t = self._h, self._residual, self._weight, self._terms
+        k = self._returns.group.size
+        of = z.take(self._group, axis=1)
+        d = self._distances(of[:2, :k], h[:, :k])
         d += _TINY
-        np.divide(dx, d, out=hx[:k])
-        np.divide(dy, d, out=hy[:k])
-        np.subtract(d, r[:k], out=e[:k])
-        e[k:] = self._edge - hx[k:] * x[k:] - hy[k:] * y[k:] - r[k:]
-        t, w = self._terms, self._weight
-        np.multiply(w, hx, out=t[2])
-        np.multiply(w, hy, out=t[4])
+        h[:, :k] /= d
+        np.subtract(d, of[2, :k], out=e[:k])
+        along = h[:, k:] * of[:2, k:]
+        e[k:] = self._edge - along[0] - along[1] - of[2, k:]
+        np.multiply(w, h, out=t[2:5:2])
         t[5] = w
-        np.multiply(t[2], hx, out=t[0])
-        np.multiply(t[2], hy, out=t[1])
-        np.multiply(t[4], hy, out=t[3])
+        np.multiply(t[2], h, out=t[:2])
+        np.multiply(t[4], h[1], out=t[3])
         np.multiply(t[2:5:2], e, out=t[6:8])
         np.multiply(w, e, out=t[8])
         total = np.bincount(self._sums, t.ravel(), 9 * self._groups).reshape(9, -1)
@@ -127,21 +122,19 @@ class _Rows:
     def rms(self, z: Array) -> Array:
         """Root mean square (g,) of the returns' distances from circles z (3, g)."""
         group = self._returns.group
-        x, y, r = z.take(group, axis=1)
-        _, _, e = self._to_returns(x, y)
-        e -= r
+        of = z.take(group, axis=1)
+        e = self._distances(of[:2], np.empty((2, group.size)))
+        e -= of[2]
         e *= e
         rms: Array = np.sqrt(np.bincount(group, e, self._groups) / self._count)
         return rms
 
-    def _to_returns(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """The returns relative to points, of which the first k count, and their distances."""
-        returns, k = self._returns, self._returns.x.size
-        dx, dy = returns.x - x[:k], returns.y - y[:k]
-        d = dx * dx
-        d += dy * dy
-        np.sqrt(d, out=d)
-        return dx, dy, d
+    def _distances(self, centers: Array, relative: Array) -> Array:
+        """Of the returns (k,) from points (2, k); relative (2, k) gets the differences."""
+        np.subtract(self._returns.xy, centers, out=relative)
+        squares = relative * relative
+        d: Array = np.add(squares[0], squares[1], out=squares[0])
+        return np.sqrt(d, out=d)
 
 
 def start_of(

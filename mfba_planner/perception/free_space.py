@@ -40,10 +40,13 @@ class _Past:
         dx, dy = x - self._x, y - self._y
         d = np.sqrt(dx * dx + dy * dy)
         index = beams.index_of(np.arctan2(dy, dx) + self._turn)
-        inside = (index >= 0) & (index < beams.count)
-        clear = self._clear()[np.where(inside, index, 0)]
-        judged = inside & (d * beams.spacing_rad <= _WIDEST_SPACING_M)
-        passed: Array = judged & (clear > d + margin_m)
+        passed: Array = d * beams.spacing_rad <= _WIDEST_SPACING_M
+        if not beams.turns:
+            inside = index < beams.count
+            passed &= inside
+            index *= inside
+        d += margin_m
+        passed &= self._clear().take(index) > d
         return passed
 
     def _clear(self) -> Array:

@@ -42,7 +42,7 @@ def outline_of(
     ends = np.concatenate((found.first[lowest], found.last[highest]))
     gap = np.concatenate((found.right_gap_rad[lowest], found.left_gap_rad[highest]))
     beam = found.beam.take(ends)
-    x, y = beams.origin_x.take(beam), beams.origin_y.take(beam)
+    places = np.array((beams.origin_x.take(beam), beams.origin_y.take(beam)))
     # The tangent lies in the middle of the gap; turned exactly, by half the tangent of the half.
     t = 0.25 * gap
     t[:groups] *= -1.0
@@ -57,26 +57,22 @@ def outline_of(
     sure = gap > 0.0
     edges = sure.nonzero()[0]
     of_return = group.take(found.segment)
-    normal_x, normal_y = normals.take(edges, axis=1)
     returns = Returns(
-        x=found.x,
-        y=found.y,
+        xy=found.xy,
         group=of_return,
-        edge_x=x.take(edges),
-        edge_y=y.take(edges),
-        normal_x=normal_x,
-        normal_y=normal_y,
+        edge_xy=places.take(edges, axis=1),
+        normal=normals.take(edges, axis=1),
         edge_gap_m=(gap * found.range_m.take(ends)).take(edges),
         edge_group=edges % groups,
         count=np.bincount(of_return, minlength=groups).astype(np.float64),
     )
     nearest = np.full(groups, np.inf)
     np.minimum.at(nearest, group, np.minimum.reduceat(found.range_m, found.first))
-    origin = np.array((x[:groups] + x[groups:], y[:groups] + y[groups:]))
+    origin = places[:, :groups] + places[:, groups:]
     origin *= 0.5
     whole = sure[:groups] & sure[groups:]
-    end_x, end_y, time_s = found.x.take(ends), found.y.take(ends), beams.time_s.take(beam)
-    dx, dy = end_x[groups:] - end_x[:groups], end_y[groups:] - end_y[:groups]
+    outermost, time_s = found.xy.take(ends, axis=1), beams.time_s.take(beam)
+    dx, dy = outermost[:, groups:] - outermost[:, :groups]
     return Outline(
         returns=returns,
         start=start_of(origin, nearest, right, left, whole, radius_m),
@@ -93,7 +89,7 @@ def thinned(found: Segments, wall: Array) -> list[Point]:
     index = np.flatnonzero(wall)
     if not index.size:
         return []
-    x, y, of = found.x[index], found.y[index], found.segment[index]
+    (x, y), of = found.xy[:, index], found.segment[index]
     step = np.zeros(index.size)
     step[1:] = np.sqrt((x[1:] - x[:-1]) ** 2 + (y[1:] - y[:-1]) ** 2)
     along = np.floor(np.cumsum(step) / _POINT_SPACING_M)

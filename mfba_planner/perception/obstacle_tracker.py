@@ -214,29 +214,31 @@ class Tracker:
         """The scan's segments and the distances (k, m) of its returns from the tracks."""
         taken = taken_from_a_gap(beams)
         r = beams.range_m.take(taken)
-        x = beams.origin_x.take(taken) + r * beams.cos.take(taken)
-        y = beams.origin_y.take(taken) + r * beams.sin.take(taken)
+        xy = np.array((beams.cos.take(taken), beams.sin.take(taken)))
+        xy *= r
+        xy[0] += beams.origin_x.take(taken)
+        xy[1] += beams.origin_y.take(taken)
         bank, noise = self._bank, math.sqrt(self._range_variance)
         join, hump = self.params.join_m + 3.0 * noise, self.params.hump_m + 2.5 * noise
         radius_sd = np.sqrt(bank.covariance[RADIUS, RADIUS])
         round_ = (bank.scans >= _ROUND_SCANS) & (radius_sd < _ROUND_SD_M)
         # What comes out from behind a known circle must not be taken for its growth.
         near = np.where(round_, _NEAR_ROUND_M + 2.0 * noise + sd, _NEAR_M)
-        label, off = expected_labels(x, y, bank.state, near + np.minimum(sd, 0.2))
-        return segments(beams, taken, x, y, label, round_, join, hump), off
+        label, off = expected_labels(xy, bank.state, near + np.minimum(sd, 0.2))
+        return segments(beams, taken, xy, label, round_, join, hump), off
 
     def _use(self, beams: Beams, found: Segments, track: Array, origin: Point) -> None:
         """Fit the groups, and update, start and drop tracks by them."""
         bank, p = self._bank, self.params
-        matched = track != NONE
+        is_new = track == NONE
         is_matched = np.zeros(bank.count, dtype=bool)
-        is_matched[track[matched]] = True
-        known, new = is_matched.nonzero()[0], (~matched).nonzero()[0]
-        group_of_track = np.cumsum(is_matched) - 1
+        is_matched[track[~is_new]] = True
+        known = is_matched.nonzero()[0]
+        groups = known.size + int(np.count_nonzero(is_new))
         group = np.empty(track.size, dtype=np.int64)
-        group[matched] = group_of_track[track[matched]]
-        group[new] = known.size + np.arange(new.size)
-        groups = known.size + new.size
+        if known.size:
+            group = (np.add.accumulate(is_matched, dtype=np.int64) - 1).take(track)
+        group[is_new] = np.arange(known.size, groups)
         self._walls = []
         updated = np.zeros(bank.count, dtype=bool)
         if groups:
@@ -247,19 +249,20 @@ class Tracker:
             outline = outline_of(beams, found, group, groups, radius)
             fitted = fit(outline.returns, outline.start, radius, variance, self._range_variance)
             wall = self._is_wall(fitted, outline)
-            is_known = np.arange(groups) < known.size
-            round_known = (~wall & is_known).nonzero()[0]
-            self._correct(known[round_known], round_known, fitted, origin)
-            updated[known[round_known]] = True
-            self._learn_noise(fitted, outline, ~wall)
+            round_ = ~wall
+            of_known = round_[: known.size].nonzero()[0]
+            index = known[of_known]
+            self._correct(index, of_known, fitted, origin)
+            updated[index] = True
+            self._learn_noise(fitted, outline, round_)
             noise = math.sqrt(self._range_variance)
-            judge_motion(
-                bank, known[round_known], round_known, fitted, outline, noise, self._appeared
-            )
-            new = (~wall & ~is_known).nonzero()[0]
-            new = new[~fragments(new, fitted, outline, wall, noise)]
-            self._start(new, fitted, outline, origin)
-            self._walls = thinned(found, wall[group[found.segment]])
+            judge_motion(bank, index, of_known, fitted, outline, noise, self._appeared)
+            new = round_[known.size :].nonzero()[0] + known.size
+            if new.size:
+                new = new[~fragments(new, fitted, outline, wall, noise)]
+                self._start(new, fitted, outline, origin)
+            if wall.any():
+                self._walls = thinned(found, wall[group[found.segment]])
         drop_lost(bank, beams, origin, updated, self._pose_sd(origin, bank.state), p)
 
     def _is_wall(self, fitted: Fit, outline: Outline) -> Array:
@@ -297,13 +300,12 @@ class Tracker:
     def _learn_noise(self, fitted: Fit, outline: Outline, round_: Array) -> None:
         """Learn the range's variance from the residuals of groups of many returns."""
         count = outline.returns.count
-        many = round_ & (count >= 6.0) & outline.whole
-        if many.any():
-            sample = float(
-                np.sort(fitted.rms_m[many] ** 2 * count[many] / (count[many] - 3.0))[
-                    int(many.sum()) // 2
-                ]
-            )
+        many = (round_ & (count >= 6.0) & outline.whole).nonzero()[0]
+        if many.size:
+            n = count[many]
+            samples = fitted.rms_m[many] ** 2 * n / (n - 3.0)
+            samples.sort()
+            sample = float(samples[many.size // 2])
             low, high = self.params.range_sd_m**2, 0.05**2
             learnt = self._range_variance + 0.1 * (sample - self._range_variance)
             self._range_variance = min(max(learnt, low), high)

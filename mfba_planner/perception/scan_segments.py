@@ -30,8 +30,7 @@ class Segments:
     edge is sure if the beam beside it went on for at least 0.1 m: there the surface ends.
     """
 
-    x: Array  # (k,) m, returns in odom
-    y: Array
+    xy: Array  # (2, k) m, returns in odom
     beam: Array  # (k,) index in Beams
     range_m: Array  # (k,) m
     segment: Array  # (k,) int, ascending
@@ -50,14 +49,13 @@ class Segments:
 def no_segments() -> Segments:
     """Of a scan without returns."""
     none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    return Segments(empty, empty, none, empty, none, none, none, empty, empty, none > 0)
+    return Segments(np.empty((2, 0)), none, empty, none, none, none, empty, empty, none > 0)
 
 
 def segments(
     beams: Beams,
     taken: Array,
-    x: Array,
-    y: Array,
+    xy: Array,
     label: Array,
     known: Array,
     join_m: float,
@@ -65,24 +63,22 @@ def segments(
 ) -> Segments:
     """Cut the returns of a scan.
 
-    taken (k,) are the indices of beams with a return, from taken_from_a_gap(), and x, y where
-    they are. label (k,) is the number of the obstacle at which a return is expected, or -1:
-    where it changes from one obstacle to another there is a cut, and where it changes to none
-    from one whose outline is known (m,): something else begins there.
+    taken (k,) are the indices of beams with a return, from taken_from_a_gap(), and xy (2, k)
+    where they are. label (k,) is the number of the obstacle at which a return is expected, or
+    -1: where it changes from one obstacle to another there is a cut, and where it changes to
+    none from one whose outline is known (m,): something else begins there.
     """
     if not taken.size:
         return no_segments()
     r = beams.range_m.take(taken)
-    dx, dy = x[1:] - x[:-1], y[1:] - y[:-1]
+    squares = xy[:, 1:] - xy[:, :-1]
+    squares *= squares
     limit = np.minimum(r[1:], r[:-1])
     limit *= _JOIN_SPACINGS * beams.spacing_rad
     np.minimum(limit, _JOIN_MOST_M, out=limit)
     np.maximum(limit, join_m, out=limit)
-    dx *= dx
-    dy *= dy
-    dx += dy
     limit *= limit
-    cut = dx > limit
+    cut = squares[0] + squares[1] > limit
     size = beams.range_m.size
     step = taken[1:] - taken[:-1]
     cut |= (step != 1) & (step != 1 - size)  # with something between that met nothing
@@ -101,7 +97,7 @@ def segments(
     segment = np.zeros(r.size, dtype=np.int64)
     np.add.accumulate(cut, dtype=np.int64, out=segment[1:])
     right, left, alone = _edges(beams, taken, first, last)
-    return Segments(x, y, taken, r, segment, first, last, right, left, alone)
+    return Segments(xy, taken, r, segment, first, last, right, left, alone)
 
 
 def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:

@@ -17,9 +17,9 @@ _ALONG_WEIGHT = 0.3  # of the distance between the middles, beside that from the
 _ON_CIRCLE_M = 0.1  # returns so near to a circle's surface are its own
 
 
-def expected_labels(x: Array, y: Array, state: Array, tolerance_m: Array) -> tuple[Array, Array]:
-    """Track (k,) on whose predicted surface each point (k,) lies, or -1; and distances (k, m)."""
-    m = state.shape[1]
+def expected_labels(xy: Array, state: Array, tolerance_m: Array) -> tuple[Array, Array]:
+    """Track (k,) on whose predicted surface each of k points lies, or -1; distances (k, m)."""
+    (x, y), m = xy, state.shape[1]
     if not m or not x.size:
         return np.full(x.size, NONE), np.empty((x.size, m))
     off, dy = x[:, None] - state[0], y[:, None] - state[1]
@@ -53,8 +53,9 @@ def associate(
     dx, dy = state[0] - origin[0], state[1] - origin[1]
     d = np.sqrt(dx * dx + dy * dy) + 1e-9
     share = np.maximum(d - state[RADIUS], 0.0) / d
-    fx = found.x.take(middle)[:, None] - (origin[0] + dx * share)
-    fy = found.y.take(middle)[:, None] - (origin[1] + dy * share)
+    x, y = found.xy.take(middle, axis=1)
+    fx = x[:, None] - (origin[0] + dx * share)
+    fy = y[:, None] - (origin[1] + dy * share)
     cost = off.take(middle, axis=0) + _ALONG_WEIGHT * np.sqrt(fx * fx + fy * fy)
     gate = gate_m + _GATE_PER_RADIUS * np.minimum(state[RADIUS], 1.0) + 2.0 * sd_m
     near = (cost <= gate).nonzero()

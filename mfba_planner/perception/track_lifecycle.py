@@ -82,7 +82,7 @@ def _look_for_free_space(
     position[group] = np.arange(group.size)
     of = position[returns.group]
     chosen = of != NONE
-    found = appeared(returns.x[chosen], returns.y[chosen])
+    found = appeared(*returns.xy[:, chosen])
     share = np.bincount(of[chosen], found, group.size)
     total = np.bincount(of[chosen], minlength=group.size)
     bank.appeared_s[index[share >= np.maximum(0.3 * total, 1.0)]] = 0.0
@@ -96,7 +96,7 @@ def fragments(group: Array, fitted: Fit, outline: Outline, wall: Array, noise_m:
     if not (small.any() and large.size):
         return np.zeros(group.size, dtype=bool)
     x, y, r = fitted.z[:, large]
-    dx, dy = returns.x[:, None] - x, returns.y[:, None] - y
+    dx, dy = returns.xy[0, :, None] - x, returns.xy[1, :, None] - y
     limit = r + _FRAGMENT_M + 2.0 * noise_m
     inside = (dx * dx + dy * dy < limit * limit).any(axis=1)
     outside = np.bincount(returns.group, ~inside, returns.count.size)

@@ -20,16 +20,13 @@ def returns_of(x: float, y: float, r: float, *, edges: bool) -> Returns:
     half = math.asin(r / d)
     normals = [(math.sin(bearing - half), -math.cos(bearing - half))]
     normals.append((-math.sin(bearing + half), math.cos(bearing + half)))
-    nx, ny = np.array(normals if edges else np.empty((0, 2))).T
-    zero = np.zeros(nx.size)
+    normal = np.array(normals if edges else np.empty((0, 2))).T
+    zero = np.zeros(normal.shape[1])
     return Returns(
-        x=x + r * np.cos(angles),
-        y=y + r * np.sin(angles),
+        xy=np.array((x + r * np.cos(angles), y + r * np.sin(angles))),
         group=np.zeros(12, dtype=np.int64),
-        edge_x=zero,
-        edge_y=zero,
-        normal_x=nx,
-        normal_y=ny,
+        edge_xy=np.zeros(normal.shape),
+        normal=normal,
         edge_gap_m=zero + 0.02,
         edge_group=zero.astype(np.int64),
         count=np.full(1, 12.0),
@@ -51,8 +48,8 @@ def test_information_is_that_of_the_linear_equations() -> None:
     returns = returns_of(2.0, 1.0, 0.3, edges=True)
     z = np.array([[2.0], [1.0], [0.3]])
     found = fit(returns, z, np.full(1, 0.3), np.full(1, 1.0), 1e-4, 1)
-    H = np.column_stack((returns.x - 2.0, returns.y - 1.0, np.full(12, 0.3))) / 0.3
-    E = np.column_stack((returns.normal_x, returns.normal_y, np.ones(2)))
+    H = np.column_stack((returns.xy[0] - 2.0, returns.xy[1] - 1.0, np.full(12, 0.3))) / 0.3
+    E = np.column_stack((*returns.normal, np.ones(2)))
     expected = (8.0 / 12.0) / 1e-4 * H.T @ H + E.T @ E / (0.02**2 / 12.0 + 1e-4)
     assert np.allclose(found.information[:, :, 0], expected, rtol=1e-6)
     assert np.allclose(found.vector, expected @ z, rtol=1e-6)
