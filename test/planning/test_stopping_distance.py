@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.option_specs import override
 from mfba_planner.core.planner_types import NANO, Mode, Observation, Scan
 from mfba_planner.core.robot_base import Drive
 from mfba_planner.perception.sensory_vector import SensorParams
@@ -55,11 +56,10 @@ def test_each_remedy_is_one(
     assert bool(fault) == (stopping_distance_m(params) > seen - params.robot_radius_m + 1e-6)
     if not fault:
         return
-    assert not too_fast_for_lidar(params, float(re.search(r"lidar of ([\d.]+) m$", fault)[1]))
-    for name in ("speed_mps", "step_length_m"):
-        remedy = re.search(rf"lower {name} to ([\d.]+)", fault)
-        if remedy and (value := float(remedy[1])) >= 0.01:
-            assert not too_fast_for_lidar(replace(params, **{name: value}), seen), fault
+    assert not too_fast_for_lidar(params, float(fault.split()[-2]))
+    remedy = re.search(r"lower (speed_mps|step_length_m) to ([\d.]+)", fault)
+    if remedy and (value := float(remedy[2])) >= 0.01:
+        assert not too_fast_for_lidar(override(params, {remedy[1]: value}), seen)
 
 
 def observation(range_max_m: float) -> Observation:
