@@ -64,7 +64,7 @@ class PoseError:
     @staticmethod
     def noise(measured: Array, left: Covariance, origin: Point) -> Array:
         """Covariances (3, 3, j) of (x, y, r) at centres (2, j) by what is left of the error."""
-        px, py = origin[1] - measured[1], measured[0] - origin[0]
+        px, py = _lever(measured, origin)
         xx, xy, xr, yy, yr, rr = left
         noise = np.zeros((3, 3, measured.shape[1]))
         noise[0, 0] = xx + px * (2.0 * xr + rr * px)
@@ -141,6 +141,11 @@ class PoseError:
         self._mean = (mx, my, mt)
 
 
+def _lever(centers: Array, origin: Point) -> Array:
+    """How centres (2, j) move by a turn around the origin, m per rad; (2, j)."""
+    return np.array((origin[1] - centers[1], centers[0] - origin[0]))
+
+
 def _limited(variance: float) -> float:
     return min(max(variance, _LEAST_SD**2), _MOST_SD**2)
 
@@ -153,20 +158,24 @@ class _Equations:
         vm: float, vr: float,
     ) -> None:  # fmt: skip
         self._prior = vm, vr
-        self._ex, self._ey = ex, ey = measured - predicted
-        self._px, self._py = px, py = origin[1] - predicted[1], predicted[0] - origin[0]  # m/rad
-        xx, xy, yy = covariance[0, 0], covariance[0, 1], covariance[1, 1]
-        scale = 1.0 / (xx * yy - xy * xy)
-        ixx, ixy, iyy = scale * yy, -scale * xy, scale * xx
-        self._inverse = ixx, 2.0 * ixy, iyy
-        gx, gy = ixx * ex + ixy * ey, ixy * ex + iyy * ey
-        rx, ry = ixx * px + ixy * py, ixy * px + iyy * py
+        self._e, self._p = e, p = measured - predicted, _lever(predicted, origin)
+        xy = covariance[0, 1]
+        of_axis = np.array((covariance[0, 0], covariance[1, 1]))
+        scale = 1.0 / (of_axis[0] * of_axis[1] - xy * xy)
+        inverse, inverse_xy = scale * of_axis[::-1], -scale * xy
+        self._inverse = inverse, 2.0 * inverse_xy
+        g, r = (inverse * v + inverse_xy * v[::-1] for v in (e, p))
+        pg, pr = p * g, p * r
         self._rows = np.array(
-            (ixx, ixy, rx, iyy, ry, px * rx + py * ry, gx, gy, px * gx + py * gy)
-        )
-        rpx = vr * px
-        xx, xy, yy = xx + vm + rpx * px, xy + rpx * py, yy + vm + vr * py * py
-        self._adjugate, self._determinant = (yy, -2.0 * xy, xx), xx * yy - xy * xy
+            (inverse[0], inverse_xy, r[0], inverse[1], r[1], pr[0] + pr[1], g[0], g[1],
+             pg[0] + pg[1])
+        )  # fmt: skip
+        by_turn = vr * p
+        of_axis += vm
+        of_axis += by_turn * p
+        xy = xy + by_turn[0] * p[1]
+        self._adjugate = of_axis[::-1], -2.0 * xy
+        self._determinant = of_axis[0] * of_axis[1] - xy * xy
 
     def length(self, mean: Error = NO_ERROR) -> Array:
         """Squared Mahalanobis lengths (j,) of the differences before the error is known."""
@@ -176,14 +185,15 @@ class _Equations:
         """Squared Mahalanobis lengths (j,) of what an error does not explain."""
         return self._quadratic(self._inverse, error)
 
-    def _quadratic(self, form: tuple[Array, Array, Array], error: Error) -> Array:
+    def _quadratic(self, form: tuple[Array, Array], error: Error) -> Array:
         """A quadratic form (j,) of what an error leaves of the differences."""
-        ex, ey = self._ex, self._ey
+        e, (of_axis, xy) = self._e, form
         if error != NO_ERROR:
             x, y, turn = error
-            ex, ey = ex - x - turn * self._px, ey - y - turn * self._py
-        xx, xy, yy = form
-        total: Array = xx * ex * ex + xy * ex * ey + yy * ey * ey
+            e = e - ((x,), (y,)) - turn * self._p
+        squares = of_axis * e
+        squares *= e
+        total: Array = squares[0] + xy * e[0] * e[1] + squares[1]
         return total
 
     def solution(self, weight: Array) -> tuple[Covariance, Error]:

@@ -53,6 +53,8 @@ class BeamReader:
         """Start without directions."""
         self._key: tuple[int, float] = (0, 0.0)
         self._cos, self._sin, self._all = np.empty(0), np.empty(0), np.empty(0, dtype=np.int64)
+        self._first: float | None = None  # direction of the first beam in odom, of these:
+        self._turned = self._cos, self._sin
 
     def read(self, pose: Pose2D, velocity: tuple[float, float, float], scan: Scan) -> Beams:
         """The beams of a scan in a frame aligned with odom, whose origin is at the pose.
@@ -67,15 +69,17 @@ class BeamReader:
             self._cos = np.array([math.cos(a) for a in angles])
             self._sin = np.array([math.sin(a) for a in angles])
             self._all = np.arange(count)
-            self._key = (count, step)
-        number, base_c, base_s = self._all, self._cos, self._sin
+            self._key, self._first = (count, step), None
+        if scan.angle_min_rad != self._first:  # a robot that does not turn keeps it
+            self._first = scan.angle_min_rad
+            c0, s0 = math.cos(self._first), math.sin(self._first)
+            self._turned = c0 * self._cos - s0 * self._sin, s0 * self._cos + c0 * self._sin
+        number, (c, s) = self._all, self._turned
         usable = usable_beams(scan)
         if not usable.all():
             number = usable.nonzero()[0]
-            r, base_c, base_s = r[number], base_c[number], base_s[number]
+            r, c, s = r[number], c[number], s[number]
         reach = np.maximum(r, scan.range_min_m)  # -inf is nearer than that
-        c0, s0 = math.cos(scan.angle_min_rad), math.sin(scan.angle_min_rad)
-        c, s = c0 * base_c - s0 * base_s, s0 * base_c + c0 * base_s
         k = number.size
         x: Array = np.full(k, pose.x)
         y: Array = np.full(k, pose.y)

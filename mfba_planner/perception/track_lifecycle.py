@@ -12,7 +12,6 @@ from ..core.geometry import Point
 from .circle_fit import Fit
 from .group_outline import Outline
 from .scan_beams import Beams
-from .track_association import NONE
 from .track_bank import RADIUS, VX, VY, TrackBank
 from .tracking_params import TrackingParams
 
@@ -78,14 +77,14 @@ def _look_for_free_space(
     bank: TrackBank, index: Array, group: Array, outline: Outline, appeared: Appeared
 ) -> None:
     returns = outline.returns
-    position = np.full(outline.start.shape[1], NONE)
-    position[group] = np.arange(group.size)
-    of = position[returns.group]
-    chosen = of != NONE
-    found = appeared(*returns.xy[:, chosen])
-    share = np.bincount(of[chosen], found, group.size)
-    total = np.bincount(of[chosen], minlength=group.size)
-    bank.appeared_s[index[share >= np.maximum(0.3 * total, 1.0)]] = 0.0
+    chosen = np.zeros(returns.count.size, dtype=bool)
+    chosen[group] = True
+    index_of_return = chosen.take(returns.group).nonzero()[0]
+    x, y = returns.xy.take(index_of_return, axis=1)
+    found = np.bincount(returns.group.take(index_of_return), appeared(x, y), returns.count.size)[
+        group
+    ]
+    bank.appeared_s[index[found >= np.maximum(0.3 * returns.count[group], 1.0)]] = 0.0
 
 
 def fragments(group: Array, fitted: Fit, outline: Outline, wall: Array, noise_m: float) -> Array:
