@@ -3,7 +3,8 @@
 
 REP-117 says of them only that they are nearer (-inf). Within the robot's radius that is contact,
 wherever it is. Of a lidar whose range_min is larger, an obstacle may stand anywhere between the
-robot's edge and range_min: the robot must not take it to be at range_min, and drive on.
+robot's edge and range_min: a planner must not take it to be at range_min, and drive on. (A sector
+is set by it at any range, so sectors need no such care.)
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def blind_ring(scan: Scan, robot_radius_m: float) -> str:
         return ""
     return (
         f"the lidar's range_min={scan.range_min_m:g} m is beyond robot_radius_m={robot_radius_m:g}"
-        ": what is nearer counts as touching the robot, or is not seen; set robot_radius_m to "
+        ": it does not tell where something between the two is; set robot_radius_m to "
         f"{scan.range_min_m:g}, or use a lidar that sees nearer"
     )
 

@@ -26,10 +26,9 @@ def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: Sensor
     """Range per sector from a laser scan; every return is a point enlarged by the robot.
 
     yaw_rad is the yaw of the scan's frame in the sectors' frame. As in REP-117, +inf is free
-    space and -inf an obstacle nearer than range_min: it is taken there, or at the robot's edge if
-    that is nearer (near_returns.py). NaN and values outside [range_min, range_max] tell nothing.
-    A sector that no beam covers reads 0.0: it is not known to be free. Raises InputError for a
-    scan without any usable beam or with unusable geometry.
+    space and -inf an obstacle nearer than range_min (taken at range_min); NaN and values outside
+    [range_min, range_max] tell nothing. A sector that no beam covers reads 0.0: it is not known
+    to be free. Raises InputError for a scan without any usable beam or with unusable geometry.
     """
     geometry = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m, yaw_rad)
     if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:
@@ -52,7 +51,7 @@ def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: Sensor
             "scan_no_return if its driver reports free space otherwise than by inf"
         )
     hits = known & ~np.isposinf(r)
-    d = np.where(near, min(scan.range_min_m, robot_radius_m), r)
+    d = np.where(near, scan.range_min_m, r)
     hits &= np.where(hits, d, np.inf) - robot_radius_m <= params.sensing_range_m
     angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hits) + yaw_rad
     ranges = [math.inf] * params.sectors

@@ -10,7 +10,6 @@ import pytest
 from mfba_planner.core.planner_types import Scan
 from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.near_returns import blind_ring, near_at_contact
-from mfba_planner.perception.scan_to_sectors import sense_scan
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
@@ -40,18 +39,11 @@ def test_only_minus_infinity_is_taken_at_the_robot_s_edge() -> None:
     )
 
 
-def test_sectors_read_contact_there() -> None:
-    assert sense_scan(SCAN, 0.0, 0.2, SensorParams())[1] == 0.0
-    assert sense_scan(SCAN, 0.0, 0.5, SensorParams())[1] == 0.0
-    assert sense_scan(replace(SCAN, range_min_m=0.4), 0.0, 0.2, SensorParams())[1] == 0.0
-
-
 def test_the_warning_names_values_and_remedy() -> None:
     assert blind_ring(SCAN, 0.5) == ""
     assert blind_ring(SCAN, 0.2) == (
-        "the lidar's range_min=0.5 m is beyond robot_radius_m=0.2: what is nearer counts as "
-        "touching the robot, or is not seen; set robot_radius_m to 0.5, or use a lidar that sees "
-        "nearer"
+        "the lidar's range_min=0.5 m is beyond robot_radius_m=0.2: it does not tell where "
+        "something between the two is; set robot_radius_m to 0.5, or use a lidar that sees nearer"
     )
 
 

@@ -45,9 +45,9 @@ def test_a_lidar_that_does_not_see_what_is_about_to_touch(graph: Graph) -> None:
         inputs = robot.inputs(node)
         assert inputs.level == WARN
         assert inputs.message.endswith(
-            "are sound, but the lidar's range_min=0.5 m is beyond robot_radius_m=0.3: what is "
-            "nearer counts as touching the robot, or is not seen; set robot_radius_m to 0.5, or "
-            "use a lidar that sees nearer"
+            "are sound, but the lidar's range_min=0.5 m is beyond robot_radius_m=0.3: it does "
+            "not tell where something between the two is; set robot_radius_m to 0.5, or use a "
+            "lidar that sees nearer"
         )
     # Something is nearer ahead than the lidar can tell. The goal is ahead as well.
     ahead = tuple(-math.inf if abs(k - BEAMS // 2) < 5 else math.inf for k in range(BEAMS))
