@@ -33,8 +33,10 @@ def too_fast_for_lidar(params: PlannerParams, range_max_m: float) -> str:
     if not fault:
         return ""
     farther_m = _up(radius_m + stopping_distance_m(params))
-    seen = f"the lidar's range of {range_max_m:g} m less robot_radius_m={radius_m:g}"
-    return f"{fault}: {seen}; {_slower(params, range_max_m - radius_m)}a lidar of {farther_m:g} m"
+    observed = f"the lidar's range of {range_max_m:g} m less robot_radius_m={radius_m:g}"
+    return (
+        f"{fault}: {observed}; {_slower(params, range_max_m - radius_m)}a lidar of {farther_m:g} m"
+    )
 
 
 def too_fast_for_sectors(params: PlannerParams, sensing_range_m: float) -> str:

@@ -48,7 +48,7 @@ def test_the_warning_names_values_and_remedy() -> None:
 
 
 @pytest.mark.parametrize("y", [0.0, 0.2, 0.4])
-def test_no_contact_with_what_stands_in_the_way(y: float) -> None:
+def test_no_contact_with_what_stands_ahead(y: float) -> None:
     scenario = Scenario(
         name="near",
         start_m=(0.0, 0.0),

@@ -42,24 +42,24 @@ def test_it_is_what_the_simulated_base_drives_until_it_rests() -> None:
     limit=st.floats(0.1, 5.0),
     step=st.floats(0.02, 1.0),
     accel=st.floats(0.1, 5.0),
-    seen=st.floats(0.1, 5.0),
+    observed_m=st.floats(0.1, 5.0),
 )
 @settings(max_examples=300)
 def test_each_remedy_is_one(
-    drive: Drive, speed: float, limit: float, step: float, accel: float, seen: float
+    drive: Drive, speed: float, limit: float, step: float, accel: float, observed_m: float
 ) -> None:
     params = replace(
         PARAMS, drive=drive, speed_mps=speed, max_speed_mps=limit, step_length_m=step,
         max_accel_mps2=accel,
     )  # fmt: skip
-    fault = too_fast_for_lidar(params, seen)
-    assert bool(fault) == (stopping_distance_m(params) > seen - params.robot_radius_m + 1e-6)
+    fault = too_fast_for_lidar(params, observed_m)
+    assert bool(fault) == (stopping_distance_m(params) > observed_m - params.robot_radius_m + 1e-6)
     if not fault:
         return
     assert not too_fast_for_lidar(params, float(fault.split()[-2]))
     remedy = re.search(r"lower (speed_mps|step_length_m) to ([\d.]+)", fault)
     if remedy and (value := float(remedy[2])) >= 0.01:
-        assert not too_fast_for_lidar(override(params, {remedy[1]: value}), seen)
+        assert not too_fast_for_lidar(override(params, {remedy[1]: value}), observed_m)
 
 
 def observation(range_max_m: float) -> Observation:
