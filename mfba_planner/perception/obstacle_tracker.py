@@ -321,9 +321,9 @@ class Tracker:
         """Start a track for each of these groups."""
         if not group.size:
             return
-        z = fitted.z[:, group]
+        z = fitted.z.take(group, axis=1)
         z[:2] -= self._pose_error.shift(z[0], z[1], origin)
         self._bank.add(
-            z, fitted.covariance[:, :, group], outline.time_s[group], fitted.rms_m[group],
+            z, fitted.covariance.take(group, axis=2), outline.time_s[group], fitted.rms_m[group],
             self.params.speed_sd_mps,
         )  # fmt: skip

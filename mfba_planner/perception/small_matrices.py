@@ -3,6 +3,8 @@
 
 So a component of all of them is one contiguous row, and few calls of numpy do the work. The sums
 are added in one order: BLAS and LAPACK round differently on different machines, and these do not.
+Arrays must be in C order (take and compress keep it, an index array on the last axis does not):
+otherwise numpy may add in another order.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ class TrackBank:
     def keep(self, kept: Array) -> None:
         """Drop the tracks where kept (m,) is False."""
         for name in self._ARRAYS:
-            setattr(self, name, getattr(self, name)[..., kept])
+            setattr(self, name, getattr(self, name).compress(kept, axis=-1))
 
     def pass_time(self, dt: float) -> None:
         """The next scan's stamp is dt seconds later."""
@@ -157,16 +157,16 @@ class TrackBank:
         if turned.size:
             self.streak[index[turned]] = 0
             variance, step = speed_sd * speed_sd, self.predicted_s[index[turned]]
-            P = covariance[:, :, turned]
+            P = covariance.take(turned, axis=2)
             rows = P.reshape(25, -1)
             rows[_POSITION] += variance * step * step
             rows[_CROSS] += variance * step
             rows[_CROSS_BELOW] += variance * step
             rows[_VELOCITY] += variance
+            again = (v.take(turned, axis=-1) for v in (information, vector, noise))
             new_state[:, turned], new_covariance[:, :, turned], shift[:, turned], _ = _corrected(
-                state[:, turned], P, information[:, :, turned], vector[:, turned],
-                noise[:, :, turned],
-            )  # fmt: skip
+                state.take(turned, axis=1), P, *again
+            )
         self.state[:, index], self.covariance[:, :, index] = new_state, new_covariance
         self.shift_m[:, index] = shift
 

@@ -84,3 +84,5 @@ def test_kept_tracks_keep_all_that_is_known_of_them() -> None:
     assert bank.state[:2, 0].tolist() == [5.0, 6.0]
     assert (bank.time_s[0], bank.rms_m[0]) == (1.0, 1.0)
     assert all(getattr(bank, name).shape[-1] == 1 for name in TrackBank._ARRAYS)
+    # The sums of small_matrices are added in order only then.
+    assert all(getattr(bank, name).flags.c_contiguous for name in TrackBank._ARRAYS)
