@@ -39,23 +39,29 @@ class _Past:
         dx, dy = x - self._x, y - self._y
         d = np.sqrt(dx * dx + dy * dy)
         index = beams.index_of(np.arctan2(dy, dx) + self._turn)
-        inside = (index >= 0) & (index < beams.count)
-        clear = self._clear()[np.where(inside, index, 0)]
-        judged = inside & (d * beams.spacing_rad <= _WIDEST_SPACING_M)
-        passed: Array = judged & (clear > d + margin_m)
+        passed: Array = d * beams.spacing_rad <= _WIDEST_SPACING_M
+        if not beams.turns:
+            inside = index < beams.count
+            passed &= inside
+            index *= inside
+        d += margin_m
+        passed &= self._clear().take(index) > d
         return passed
 
     def _clear(self) -> Array:
         """Free length (count,) of each beam and those beside it."""
         if self._clear_m is None:
             beams = self._beams
-            clear = np.zeros(beams.count)
-            clear[beams.number] = np.minimum(beams.range_m, beams.longest_m)
+            reach = np.minimum(beams.range_m, beams.longest_m)
+            clear = reach
+            if reach.size < beams.count:
+                clear = np.zeros(beams.count)
+                clear[beams.number] = reach
             beside = 1 + math.floor(2.0 * self._turn_sd / beams.spacing_rad)
+            around = np.concatenate((clear[-beside:], clear, clear[:beside]))
             least = clear.copy()
-            for k in range(1, beside + 1):
-                for shifted in (np.roll(clear, k), np.roll(clear, -k)):
-                    np.minimum(least, shifted, out=least)
+            for k in range(2 * beside + 1):
+                np.minimum(least, around[k : k + clear.size], out=least)
             if not beams.turns:
                 least[:beside] = least[least.size - beside :] = 0.0
             self._clear_m = least
