@@ -18,9 +18,7 @@ counted apart. The run is that of `mfba sim` for a robot with that lidar.
 from __future__ import annotations
 
 import argparse
-import csv
 import gzip
-import math
 import sys
 from pathlib import Path
 
@@ -29,106 +27,50 @@ from crossings import add_robot_arguments, judge_all, obstacle_along, report, ro
 
 from mfba_planner.core.errors import ConfigError, InputError, MfbaError
 from mfba_planner.core.geometry import Point
+from mfba_planner.scenarios.importers.crossings import (
+    LIMIT_S,
+    ROBOT_RADIUS_M,
+    Track,
+    draw_crossing,
+    straight_on,
+)
+from mfba_planner.scenarios.importers.people_recording import csv_tracks
 from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.scenario import Scenario
 
-COLUMNS = ("t_s", "person", "x_m", "y_m")
-ROBOT_RADIUS_M, PERSON_RADIUS_M = 0.3, 0.3
-LIMIT_S = 60.0
-NEAR_M = 1.0  # that a straight trip comes to a person's centre, or nearer
-FREE_M = 0.4  # around the start at first, beyond both radii, and around the goal while arriving
-LEAST_PEOPLE = 3  # who are in the area meanwhile
-TRIES = 5000
-STANDS_MPS = 0.1
-
-Track = tuple[np.ndarray, np.ndarray]  # times (n,) and positions (n, 2) of one person
+PERSON_RADIUS_M = 0.3
 
 
 def read_recording(path: Path) -> list[Track]:
     """The people of a recording. Raises InputError, in one line, for what is no such table."""
     open_text = gzip.open if path.suffix == ".gz" else open
-    rows: dict[str, list[tuple[float, float, float]]] = {}
     try:
         with open_text(path, "rt", encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file)
-            if missing := [name for name in COLUMNS if name not in (reader.fieldnames or ())]:
-                raise InputError(f"{path}: no column {missing[0]}; give {', '.join(COLUMNS)}")
-            for number, row in enumerate(reader, start=2):
-                try:
-                    t, x, y = (float(row[name]) for name in ("t_s", "x_m", "y_m"))
-                except (TypeError, ValueError):
-                    raise InputError(f"{path}, line {number}: not three numbers") from None
-                if not all(map(math.isfinite, (t, x, y))):
-                    raise InputError(f"{path}, line {number}: not finite")
-                rows.setdefault(row["person"], []).append((t, x, y))
+            return csv_tracks(file.read())
+    except ConfigError as error:
+        raise InputError(f"{path}, {error}") from None
     except (OSError, UnicodeDecodeError, EOFError) as error:
         raise InputError(f"{path}: cannot be read ({error}); give a CSV, also .gz") from None
-    tracks = []
-    for person, samples in rows.items():
-        table = np.array(sorted(samples))
-        if (np.diff(table[:, 0]) <= 0.0).any():
-            raise InputError(f"{path}: person {person} is at two places at once")
-        if len(table) > 1:
-            tracks.append((table[:, 0], table[:, 1:]))
-    if not tracks:
-        raise InputError(f"{path}: no person with two samples")
-    return tracks
-
-
-def position(track: Track, t_s: np.ndarray) -> np.ndarray:
-    """Positions (k, 2) at times (k,): interpolated, and straight on beyond both ends."""
-    times, points = track
-    k = np.clip(np.searchsorted(times, t_s, side="right") - 1, 0, len(times) - 2)
-    share = (t_s - times[k]) / (times[k + 1] - times[k])
-    found: np.ndarray = points[k] + share[:, None] * (points[k + 1] - points[k])
-    return found
 
 
 def crossing(
     name: str, tracks: list[Track], speed_mps: float, number: int, seed: int, radius_m: float
 ) -> Scenario:
     """Crossing `number` of a recording; ConfigError where none is found."""
-    rng = np.random.default_rng([seed, number])
-    everywhere = np.concatenate([points for _, points in tracks])
-    low, high = np.percentile(everywhere, [2.0, 98.0], axis=0)
-    first_s = min(times[0] for times, _ in tracks)
-    last_s = max(times[-1] for times, _ in tracks)
-    for _ in range(TRIES):
-        axis, flip = int(rng.integers(2)), rng.random() < 0.5
-        a, b = np.empty(2), np.empty(2)
-        a[axis], b[axis] = (high[axis], low[axis]) if flip else (low[axis], high[axis])
-        a[1 - axis], b[1 - axis] = rng.uniform(low[1 - axis], high[1 - axis], 2)
-        trip_s = math.dist(a, b) / speed_mps
-        if last_s - first_s <= trip_s:
-            raise ConfigError(f"{name}: shorter than a trip of {trip_s:.0f} s; give a longer one")
-        t0 = rng.uniform(first_s, last_s - trip_s)
-        # Who is recorded during the trip; those who come later are left out.
-        present = [t for t in tracks if t[0][0] <= t0 + 1.5 * trip_s and t[0][-1] >= t0]
-        t = np.arange(0.0, trip_s, 0.1)
-        robot = a + (t / trip_s)[:, None] * (b - a)
-        centers = np.array([position(track, t0 + t) for track in present]).reshape(-1, t.size, 2)
-        inside = ((centers >= low) & (centers <= high)).all(axis=2).any(axis=1)
-        if inside.sum() < LEAST_PEOPLE:
-            continue
-        away = np.linalg.norm(centers - robot, axis=2)
-        free_m = radius_m + ROBOT_RADIUS_M + FREE_M
-        at_goal = np.linalg.norm(centers[:, -20:] - b, axis=2)
-        if away.min() > NEAR_M or away[:, 0].min() < free_m or at_goal.min() < free_m:
-            continue
-        return Scenario(
-            name=f"{name}-{number}",
-            start_m=_point(a),
-            goal_m=_point(b),
-            robot_radius_m=ROBOT_RADIUS_M,
-            obstacles=tuple(
-                obstacle_along((times - t0).tolist(), [_point(p) for p in points], radius_m)
-                if times[0] <= t0
-                else _later(times - t0, points, radius_m)
-                for times, points in present
-            ),
-            time_limit_s=LIMIT_S,
-        )
-    raise ConfigError(f"{name}: no crossing found in {TRIES} tries; give a denser recording")
+    found = draw_crossing(name, tracks, speed_mps, number, seed, radius_m, positions=straight_on)
+    return Scenario(
+        name=f"{name}-{number}",
+        start_m=found.start_m,
+        goal_m=found.goal_m,
+        robot_radius_m=ROBOT_RADIUS_M,
+        obstacles=tuple(
+            obstacle_along((times - found.t0_s).tolist(), [_point(p) for p in points], radius_m)
+            if times[0] <= found.t0_s
+            else _later(times - found.t0_s, points, radius_m)
+            for times, points in found.tracks
+        ),
+        time_limit_s=LIMIT_S,
+    )
 
 
 def _later(times: np.ndarray, points: np.ndarray, radius_m: float) -> Obstacle:

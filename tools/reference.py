@@ -228,7 +228,7 @@ def _allowed(entry: dict[str, Any]) -> str:
         return next(_allowed(kind) for kind in entry["anyOf"] if kind.get("type") != "null")
     if entry["type"] == "array":
         if "prefixItems" in entry:
-            return "[x, y]"
+            return "[x, y]" if len(entry["prefixItems"]) == 2 else "[t, x, y]"
         return f"list of {_allowed(entry['items'])}"
     if entry["type"] == "number":
         low = f"> {entry['exclusiveMinimum']:g}" if "exclusiveMinimum" in entry else ""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from keyword import iskeyword
 
 from .. import __version__
 from ..core.errors import ConfigError
@@ -28,7 +29,8 @@ COMMANDS = {
     "sensitivity": "vary what the paper leaves open, and compare the results",
     "scenarios": "list the shipped scenarios",
     "options": "list the options of --set",
-    "sweep": "run planners in many generated worlds: success, gap to the optimum",
+    "import": "make scenario files of Gazebo worlds, recordings and other formats",
+    "sweep": "run planners in many worlds, generated or your own: success, gap to the optimum",
     "show": "explain one run of a sweep: pictures, text, bag",
     "tables": "reproduce the paper's tables: our value, printed value, verdict",
 }
@@ -45,7 +47,8 @@ def main(args: list[str]) -> int:
         return 0
     if first not in COMMANDS:
         raise ConfigError(f"{first}: unknown command; {did_you_mean(first, list(COMMANDS))}")
-    code: int = import_module(f"{__name__}.{first}").main(args[1:])
+    module = f"{first}_" if iskeyword(first) else first
+    code: int = import_module(f"{__name__}.{module}").main(args[1:])
     return code
 
 

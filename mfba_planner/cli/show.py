@@ -62,7 +62,8 @@ def _list_failures(swept: ReadSweep) -> int:
     failed = [(k, row) for k, row in enumerate(swept.rows) if not row["success"]]
     print(f"{len(failed)} of {len(swept.rows)} runs without success")
     for k, row in failed[:LISTED]:
-        print(f"{k:>7}  {Run(*(row[n] for n in Run._fields))}  {_failure_text(row)}")
+        name = f"  {row['scenario']}" if "scenario" in row else ""
+        print(f"{k:>7}  {Run(*(row[n] for n in Run._fields))}{name}  {_failure_text(row)}")
     if len(failed) > LISTED:
         print(f"{'...':>7}  and {len(failed) - LISTED} more")
     return 0
@@ -78,11 +79,12 @@ def _show_run(swept: ReadSweep | None, argument: str, out: Path | None, *, bag: 
     run, row = _find_run(swept, argument)
     setting = swept.spec.setting_of(run.planner) if swept else _default_setting(run)
     # Raises ConfigError for a bad run.
-    SweepSpec(suite=run.suite, planners=(run.planner,), worlds=1, setting=setting)
+    SweepSpec(suite=run.suite, planners=(run.planner,), worlds=1, first=run.world, setting=setting)
     directory = refuse_existing(out or new_run_directory(stem="show"))
     with _time_limit(setting.patience_s):
         completed = run_one(run, setting)
-    lines = [str(run), *explain(completed), *_oracle_lines(completed, setting)]
+    name = f"  {completed.episode.scenario.name}" if setting.scenarios else ""
+    lines = [f"{run}{name}", *explain(completed), *_oracle_lines(completed, setting)]
     if swept is not None and swept.code_changed:
         lines.append("note: the code has changed since the sweep; its result may differ")
     if row is not None and not _is_same(row, run_row(run, completed)):

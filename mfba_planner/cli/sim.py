@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import statistics
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +14,13 @@ from ..core.errors import ConfigError, MfbaError
 from ..evaluation.metrics import Result, evaluate
 from ..launcher.run_arguments import RunRequest, add_world_arguments, read_config
 from ..launcher.run_result import show, why_no_success
+from ..planning.planner_params import Method
+from ..planning.planner_registry import PLANNERS
 from ..scenarios.run_config import Driver, RunConfig
+from ..simulation.episode import Episode
 from ..simulation.run_episode import simulate
 
+_METHODS = [method.value for method in Method]
 _DESCRIPTION = "Simulate episodes without ROS: same decisions as `mfba run`, no bag."
 _HEAD = "    seed  outcome       length     time  clearance  collisions"
 _ROW = "{:>8}  {:<12}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"
@@ -24,7 +29,8 @@ _ROW = "{:>8}  {:<12}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"
 def main(args: list[str]) -> int:
     """Simulate; 0 when every run reached the goal without collision."""
     parser = Parser(prog="mfba sim", description=_DESCRIPTION)
-    add_world_arguments(parser)
+    peers = [name for name in PLANNERS if name not in _METHODS]
+    add_world_arguments(parser, peers)
     parser.add_argument(
         "--seeds",
         type=int,
@@ -37,6 +43,13 @@ def main(args: list[str]) -> int:
     )
     parsed = parser.parse(args)
     _check(parsed)
+    if parsed.planner not in (None, *_METHODS):
+        from .support.simulate_peer import Peer
+
+        peer = Peer(parsed)
+        if parsed.out is not None:
+            return peer.write(parsed.out)
+        return _run(peer.config, parsed.seeds, peer.simulate)
     config = read_config(parsed, driver=Driver.CORE)
     if config.scenario.robots:
         from .support import simulate_fleet
@@ -46,9 +59,7 @@ def main(args: list[str]) -> int:
         from ..launcher.execute_run import execute
 
         return execute(RunRequest(config=config, out=parsed.out, node_args={}))
-    if parsed.seeds == 1:
-        return _one(config)
-    return _many([replace(config, seed=config.seed + k) for k in range(parsed.seeds)])
+    return _run(config, parsed.seeds, _simulate)
 
 
 def _check(parsed: argparse.Namespace) -> None:
@@ -58,10 +69,20 @@ def _check(parsed: argparse.Namespace) -> None:
         raise ConfigError(f"--out {parsed.out}: holds one run; leave out --seeds")
 
 
-def _one(config: RunConfig) -> int:
-    episode = simulate(
+def _simulate(config: RunConfig) -> Episode:
+    return simulate(
         config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed
     )
+
+
+def _run(config: RunConfig, seeds: int, simulate_one: Callable[[RunConfig], Episode]) -> int:
+    if seeds == 1:
+        return _one(simulate_one(config))
+    configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
+    return _many(configs, simulate_one)
+
+
+def _one(episode: Episode) -> int:
     result = evaluate(episode)
     show(episode, result)
     if not result.success:
@@ -69,14 +90,11 @@ def _one(config: RunConfig) -> int:
     return 0
 
 
-def _many(configs: list[RunConfig]) -> int:
+def _many(configs: list[RunConfig], simulate_one: Callable[[RunConfig], Episode]) -> int:
     print(_HEAD)
     results = []
     for config in configs:
-        episode = simulate(
-            config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed
-        )
-        results.append(evaluate(episode))
+        results.append(evaluate(simulate_one(config)))
         print(_row(config.seed, results[-1]), flush=True)
     good = [result for result in results if result.success]
     print(_summary(good, len(results)))

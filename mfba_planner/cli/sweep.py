@@ -8,34 +8,41 @@ import shlex
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..core.argument_parser import Parser
+from ..core.errors import MfbaError
 from ..core.option_specs import Scalar, flatten
 from ..core.output_files import new_run_directory, write_same
 from ..evaluation.study.compute_chunks import check_workers
 from ..evaluation.suites import suite_names
+from ..evaluation.suites.scenario_suite import are_files, read_scenario_files
 from ..evaluation.sweep.run_sweep import SweepResult, dask_executor, open_store, sweep
 from ..evaluation.sweep.sweep_chunks import chunks_of
 from ..evaluation.sweep.sweep_spec import (
     DEFAULT_PERCEPTION,
     PATIENCE_S,
     PERCEPTIONS,
-    Setting,
     SweepSpec,
     default_setting,
     own_preset,
 )
-from ..evaluation.sweep.table import write
-from ..evaluation.sweep.table_columns import COLUMNS, TIMINGS
+from ..evaluation.sweep.table import kinds_of, write
+from ..evaluation.sweep.table_columns import COLUMNS, SCENARIO, TIMINGS
 from ..launcher.set_option import add_set_argument, with_settings
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD
 from ..planning.planner_registry import PLANNERS
+from ..simulation.lidar_perception import OWN_ROBOT
 from .support.study_progress import add_work_arguments, print_status, progress
 
+WORLDS = 100  # of a built-in suite
 _DESCRIPTION = """Run planners in the worlds of a suite and compare them.
+
+A suite is built in, or your own: a directory of scenario files, or a list of them. Their worlds
+are numbered from 0, sorted by file name.
 
 Writes a directory: the table (a row per run), timings.csv (computing times; all other files are
 the same on every machine), report.md, and the finished chunks of the runs: an interrupted command
@@ -47,16 +54,19 @@ _PERCEPTION = """lidar: 360 beams of 3.5 m, as `mfba sim` with robot.lidar.beams
 lidar-differential: the same on a differential drive; lidar-realistic: that with errors: ranges
 2 cm, odometry 2 cm and 0.02 rad (standard deviations), scans 0.1 s old; known: told the truth,
 the circles within SR with their velocities; sectors: the paper's bits only; scan-N: N beams that
-see no farther than SR, to hold SR equal"""
+see no farther than SR, to hold SR equal; scenario: the robot of each scenario file, as `mfba
+sim`"""
 
 
 def main(args: list[str]) -> int:
     """Run the sweep."""
     parsed = _parser().parse(args)
     check_workers(parsed.workers)
-    spec = _sweep_spec(parsed)
+    spec, left_out = _sweep_spec(parsed)
     directory = parsed.out or new_run_directory(stem="sweep")
     store = open_store(directory, spec)
+    for line in left_out:
+        print_status(f"left out: {line}")
     with _executor(parsed.scheduler) as executor, progress(chunks_of(spec), directory) as done:
         swept = sweep(
             spec,
@@ -67,29 +77,41 @@ def main(args: list[str]) -> int:
             warn=print_status,
         )
     names = [f"table.{parsed.format}", "timings.csv"]
-    write(directory / names[0], swept.rows, COLUMNS)
+    write(directory / names[0], swept.rows, kinds_of(spec))
     write(directory / names[1], swept.timings, TIMINGS)
     _report(swept, directory)
     print(f"wrote {directory}: {', '.join([*names, 'report.md'])}")
     print(f"sorted hash {swept.hash}")
+    if left_out:
+        raise MfbaError(
+            f"{len(left_out)} scenario file{'s' * (len(left_out) > 1)} left out, see above; mend "
+            "them and sweep into another --out"
+        )
     return 0
 
 
 def _parser() -> Parser:
-    lines = [f"  {name:<19} {meaning}" for name, (_, meaning) in {**COLUMNS, **TIMINGS}.items()]
+    columns = {**COLUMNS, **SCENARIO, **TIMINGS}
+    lines = [f"  {name:<19} {meaning}" for name, (_, meaning) in columns.items()]
     parser = Parser(
         prog="mfba sweep",
         description=_DESCRIPTION,
         epilog="columns of the table, and of timings.csv:\n" + "\n".join(lines),
     )
-    parser.add_argument("suite", metavar="SUITE", help=f"one of {', '.join(suite_names())}")
+    parser.add_argument(
+        "suite", nargs="+", metavar="SUITE | DIR | FILE",
+        help=f"one of {', '.join(suite_names())}; or a directory of scenario files; or files",
+    )  # fmt: skip
+    parser.add_argument(
+        "--worlds", type=int, metavar="N",
+        help=f"number of worlds (default: {WORLDS}; of scenario files, all)",
+    )  # fmt: skip
     parser.add_argument(
         "--planner", action="append", default=[], metavar="NAME", dest="planners",
         help=f"one of {', '.join(PLANNERS)}, or MODULE:NAME; may be repeated "
         f"(default: {DEFAULT_METHOD.value})",
     )  # fmt: skip
     for name, default, what in (
-        ("--worlds", 100, "number of worlds"),
         ("--first", 0, "number of the first world"),
         ("--seeds", 1, "seeds per world and planner"),
         ("--suite-seed", 0, "seed of all worlds"),
@@ -99,8 +121,8 @@ def _parser() -> Parser:
             name, type=int, default=default, metavar="N", help=f"{what} (default: {default})"
         )
     parser.add_argument(
-        "--perception", choices=PERCEPTIONS, default=DEFAULT_PERCEPTION, metavar="NAME",
-        help=f"{_PERCEPTION} (default: {DEFAULT_PERCEPTION})",
+        "--perception", choices=PERCEPTIONS, metavar="NAME",
+        help=f"{_PERCEPTION} (default: {DEFAULT_PERCEPTION}; of scenario files, {OWN_ROBOT})",
     )  # fmt: skip
     parser.add_argument(
         "--noise",
@@ -128,8 +150,16 @@ def _parser() -> Parser:
     return parser
 
 
-def _sweep_spec(parsed: argparse.Namespace) -> SweepSpec:
-    default = default_setting(parsed.suite).params
+def _sweep_spec(parsed: argparse.Namespace) -> tuple[SweepSpec, list[str]]:
+    """The sweep, and a line for each scenario file that is left out."""
+    name, worlds, left_out = parsed.suite[0], WORLDS, list[str]()
+    if are_files(parsed.suite):
+        scenarios, left_out = read_scenario_files(parsed.suite)
+        name, worlds = scenarios.name, max(1, scenarios.count - max(0, parsed.first))
+        setting = default_setting(name, scenarios)
+    else:
+        setting = default_setting(name)
+    default = setting.params
     planners = tuple(parsed.planners or [DEFAULT_METHOD.value])
     params, sensor = with_settings(default, SensorParams(), parsed.settings)
     # --set overrides every planner's own preset.
@@ -137,17 +167,18 @@ def _sweep_spec(parsed: argparse.Namespace) -> SweepSpec:
         name: with_settings(own_preset(name, default), sensor, parsed.settings)[0]
         for name in planners
     }
-    return SweepSpec(
-        suite=parsed.suite,
+    spec = SweepSpec(
+        suite=name,
         planners=planners,
-        worlds=parsed.worlds,
+        worlds=worlds if parsed.worlds is None else parsed.worlds,
         first=parsed.first,
         seeds=parsed.seeds,
         oracle=not parsed.no_oracle,
-        setting=Setting(
+        setting=replace(
+            setting,
             params=params,
             sensor=sensor,
-            perception=parsed.perception,
+            perception=parsed.perception or setting.perception,
             noise_m=parsed.noise,
             latency_ticks=parsed.latency,
             suite_seed=parsed.suite_seed,
@@ -155,6 +186,7 @@ def _sweep_spec(parsed: argparse.Namespace) -> SweepSpec:
         ),
         own={name: preset for name, preset in own.items() if preset != params},
     )
+    return spec, left_out
 
 
 @contextmanager
@@ -168,11 +200,13 @@ def _executor(scheduler: str | None) -> Iterator[Executor | None]:
 
 def command_line(spec: SweepSpec) -> str:
     """The shortest `mfba sweep` command line for this sweep."""
-    setting, default = spec.setting, default_setting(spec.suite)
-    arguments = ["mfba", "sweep", spec.suite]
+    setting, scenarios = spec.setting, spec.setting.scenarios
+    default = default_setting(spec.suite, scenarios)
+    arguments = ["mfba", "sweep", *(scenarios.sources if scenarios else [spec.suite])]
     for planner in spec.planners:
         arguments += ["--planner", planner]
-    arguments += ["--worlds", str(spec.worlds)]
+    if scenarios is None or spec.worlds != scenarios.count - spec.first:
+        arguments += ["--worlds", str(spec.worlds)]
     for name, value, unset in (
         ("--first", spec.first, 0),
         ("--seeds", spec.seeds, 1),

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -101,8 +102,11 @@ def read_request(args: list[str], prog: str) -> RunRequest:
     return _build_request(parser.parse(args))
 
 
-def add_world_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that define an episode, for any driver: scenario, seed, planner, --set."""
+def add_world_arguments(parser: argparse.ArgumentParser, peers: Collection[str] = ()) -> None:
+    """Add the arguments that define an episode, for any driver: scenario, seed, planner, --set.
+
+    With peers --planner takes those names too, and MODULE:NAME; the caller checks it.
+    """
     parser.add_argument(
         "scenario",
         nargs="?",
@@ -120,11 +124,13 @@ def add_world_arguments(parser: argparse.ArgumentParser) -> None:
         help="interpretation of the paper's path planning: "
         f"{', '.join(readings_of_paper.PLANNERS)} (default: {readings_of_paper.DEFAULT_METHOD})",
     )
+    others = f"; or {', '.join(peers)}, or MODULE:NAME, as `mfba sweep`" if peers else ""
     parser.add_argument(
         "--planner",
-        choices=[method.value for method in Method],
-        help="paper: Algorithm 1; predictive: predicts obstacles, with its own step and swarm "
-        f"(default: {DEFAULT_METHOD.value}; "
+        choices=None if peers else [method.value for method in Method],
+        metavar="NAME" if peers else None,
+        help="paper: Algorithm 1; predictive: predicts obstacles, with its own step and swarm"
+        f"{others} (default: {DEFAULT_METHOD.value}; "
         f"{Method.PAPER.value} with --algorithm, --reading or --swarm)",
     )
     parser.add_argument(

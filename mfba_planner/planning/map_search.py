@@ -137,7 +137,15 @@ class MapSearch:
             x, y = swarm.best_x
             best = ((x, y), max(math.hypot(x, y) / speed_mps, tick_s))
             best_cost = swarm.best_value
-        return Found(best[0], best[1], best_cost, here, closed, tuple(swarm.candidates), False)
+        return Found(
+            best[0],
+            best[1],
+            best_cost,
+            here,
+            closed,
+            tuple((x, y) for x, y in swarm.candidates),
+            False,
+        )
 
     def _heading(self, q: Point) -> int:
         return (round(math.atan2(q[1], q[0]) * self._n / (2.0 * math.pi)) - 1) % self._n
@@ -150,8 +158,8 @@ class MapSearch:
         if to_go.is_straight:
             dx, dy = to_go.goal[0] - position[0], to_go.goal[1] - position[1]
             away = math.sqrt(dx * dx + dy * dy)
-            share = min(1.0, self._reach_m / max(away, 1e-9))
-            return [(dx * share, dy * share)]
+            part = min(1.0, self._reach_m / max(away, 1e-9))
+            return [(dx * part, dy * part)]
         x, y = np.array([position[0]]), np.array([position[1]])
         way = []
         for _ in range(round(self._reach_m / _STEP_M)):

@@ -22,6 +22,7 @@ from mfba_planner.core.geometry import Point, bearing, distance, towards
 from mfba_planner.core.planner_types import Bits, Decision, Mode
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.obstacle_motion import Obstacle, center_at
+from mfba_planner.simulation.recorded_motion import is_present
 
 from . import style
 from .run_events import Pass, encounter_ticks, is_finite, span_s, stretches, track
@@ -85,16 +86,20 @@ def _track(ax: Axes, episode: Episode, view: View, obstacle: Obstacle, moment: P
     walls = episode.scenario.walls
     t0, t1 = span_s(episode)
     kind, longest = "track", _LONG * (view.width + view.height)
-    if walls and obstacle.top_speed_mps * (t1 - t0) > longest:
+    if (walls or obstacle.trajectory) and obstacle.top_speed_mps * (t1 - t0) > longest:
         reach = 0.5 * longest / obstacle.top_speed_mps
         t0, t1 = max(t0, moment.time_s - reach), min(t1, moment.time_s + reach)
         kind = "track_near_pass"
     if obstacle.top_speed_mps * (t1 - t0) <= 0.0:
         return
     points = track(obstacle, walls, t0, t1)
+    if not points:
+        return
     line(ax, points, f"{kind}:{moment.number}", zorder=Z_TRACK, **style.TRACK)
     for t in np.linspace(t1, t0, _ARROW_TRIES, endpoint=False).tolist():
         tip = center_at(obstacle, t, walls)
+        if not is_present(obstacle, t):
+            continue
         if view.holds(tip) and distance(tip, moment.center_m) > obstacle.radius_m:
             tail = center_at(obstacle, t - _ARROW_M / obstacle.top_speed_mps, walls)
             if tail == tip:  # the obstacle stands still at that time

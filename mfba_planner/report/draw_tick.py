@@ -11,6 +11,7 @@ from matplotlib.patches import Circle, FancyArrowPatch
 from mfba_planner.evaluation.metrics import within_range
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.obstacle_motion import bounce_times, center_at
+from mfba_planner.simulation.recorded_motion import is_present
 
 from . import style
 from .draw_scene import (
@@ -62,14 +63,20 @@ def draw_track(ax: Axes, episode: Episode, index: int, number: int) -> None:
     obstacle, start_s = scenario.obstacles[number - 1], span_s(episode)[0]
     if obstacle.top_speed_mps > 0.0 and time_s > start_s:
         points = track(obstacle, scenario.walls, start_s, time_s)
-        line(ax, points, f"past:{number}", zorder=Z_TRACK, **style.TRACK)
+        if points:
+            line(ax, points, f"past:{number}", zorder=Z_TRACK, **style.TRACK)
 
 
 def draw_obstacle(ax: Axes, episode: Episode, index: int, number: int, label: str) -> None:
-    """Draw obstacle `number` (from 1) at a tick: body, enlarged edge, arrow of its next 4 s."""
+    """Draw obstacle `number` (from 1), if it is there at a tick.
+
+    Its body, the enlarged edge, and an arrow of its next 4 s.
+    """
     scenario, tick = episode.scenario, episode.ticks[index]
     obstacle = scenario.obstacles[number - 1]
     time_s = episode.time_s(tick.stamp_ns)
+    if not is_present(obstacle, time_s):
+        return
     center = center_at(obstacle, time_s, scenario.walls)
     sensed = number in within_range(episode, tick)
     edge = style.SENSED if sensed else style.ENLARGED

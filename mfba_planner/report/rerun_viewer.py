@@ -195,15 +195,16 @@ class _RunLogger:
             self._log("world/segments", segments, static=True)
 
     def _log_obstacles(self, xs: Any, ys: Any, time_s: float) -> None:
-        obstacles = self.scenario.obstacles[: len(self.names)]
-        if not obstacles:
+        if not self.names:
             return
-        rr = self.rr
-        centers = [(x, y, 0.0) for x, y, _ in zip(xs.tolist(), ys.tolist(), self.names)]
-        radii = [obstacle.radius_m for obstacle in obstacles]
+        rr, named = self.rr, zip(self.scenario.obstacles, self.names, xs.tolist(), ys.tolist())
+        there = [entry for entry in named if not math.isnan(entry[2])]
+        obstacles = [obstacle for obstacle, *_ in there]
+        centers = [(x, y, 0.0) for _, _, x, y in there]
+        radii, labels = [o.radius_m for o in obstacles], [name for _, name, *_ in there]
         self._log(
             "world/obstacles",
-            rr.Points3D(centers, radii=radii, colors=_rgb(_GREY), labels=list(self.names)),
+            rr.Points3D(centers, radii=radii, colors=_rgb(_GREY), labels=labels),
         )
         edges = [
             _ring(center, self.scenario.enlarged_radius(obstacle))

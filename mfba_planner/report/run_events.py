@@ -13,8 +13,10 @@ from mfba_planner.core.geometry import Point, distance
 from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.evaluation.metrics import steps_driven, tick_clearances
 from mfba_planner.simulation.episode import Episode
-from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, bounce_times, center_at
+from mfba_planner.simulation.obstacle_motion import Obstacle, Walls, center_at, pieces
+from mfba_planner.simulation.recorded_motion import is_present
 
+_JUMP_M = 1e-6  # between two pieces of a track: nearer is rounding
 _INTERVALS = 64  # per tick; in 0.3 m of robot path the error is below 3 mm
 
 
@@ -67,12 +69,14 @@ def encounter_ticks(episode: Episode) -> list[Decision]:
 
 
 def closest_passes(episode: Episode) -> list[Pass]:
-    """The closest pass of each obstacle, sorted by obstacle number; without the walls."""
+    """The closest pass of each obstacle that was ever there, by number; without the walls."""
     columns = zip(*tick_clearances(episode))
-    return [
+    passes = [
         _closest_within(episode, index, min(range(len(gaps)), key=gaps.__getitem__))
         for index, (_, gaps) in enumerate(zip(episode.scenario.obstacles, columns))
     ]
+    scenario = episode.scenario
+    return [p for p in passes if is_present(scenario.obstacles[p.number - 1], p.time_s)]
 
 
 def _closest_within(episode: Episode, index: int, step: int) -> Pass:
@@ -91,10 +95,21 @@ def _pass(episode: Episode, index: int, time_s: float, robot_m: Point) -> Pass:
     obstacle = episode.scenario.obstacles[index]
     center = center_at(obstacle, time_s, episode.scenario.walls)
     gap = distance(robot_m, center) - episode.scenario.enlarged_radius(obstacle)
+    if not is_present(obstacle, time_s):
+        gap = math.inf
     return Pass(number=index + 1, time_s=time_s, robot_m=robot_m, center_m=center, gap_m=gap)
 
 
 def track(obstacle: Obstacle, walls: Walls | None, t0_s: float, t1_s: float) -> list[Point]:
-    """Corner points of an obstacle's track from t0 to t1: both ends and every bounce."""
-    times = [t0_s, *bounce_times(obstacle, t0_s, t1_s, walls), t1_s]
-    return [center_at(obstacle, t, walls) for t in times]
+    """Corner points of an obstacle's track from t0 to t1: both ends, every bounce and knot.
+
+    Only while it is there; a point of NaN, where a line breaks, lies before each jump.
+    """
+    found: list[Point] = []
+    for _, _, here, there in pieces(obstacle, t0_s, t1_s, walls):
+        if not found:
+            found.append(here)
+        elif distance(found[-1], here) > _JUMP_M:
+            found += [(math.nan, math.nan), here]
+        found.append(there)
+    return found

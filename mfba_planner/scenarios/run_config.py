@@ -21,6 +21,7 @@ from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PerceptionInput, PlannerParams
 from ..planning.stopping_distance import too_fast_for_lidar, too_fast_for_sectors
 from ..simulation.fleet import robot_seed, scenarios_with_others
+from ..simulation.recorded_motion import ALWAYS, presence
 from ..simulation.robot_model import DEFAULT_BEAMS
 from ..simulation.scenario import Scenario
 from .scenario_json import scenario_to_json, segments_text
@@ -102,6 +103,22 @@ def run_facts(config: RunConfig) -> dict[str, Scalar]:
     }
 
 
+def _radii(scenario: Scenario) -> list[float]:
+    """Radii for virtual_sensor: of each obstacle, or one for all where some are absent at times.
+
+    Raises ConfigError for different radii then: the obstacles topic does not say which are there.
+    """
+    radii = [obstacle.radius_m for obstacle in scenario.obstacles]
+    if all(presence(obstacle) == ALWAYS for obstacle in scenario.obstacles):
+        return radii
+    if len(set(radii)) > 1 and not scenario.robot.lidar.beams:
+        raise ConfigError(
+            f"scenario {scenario.name!r}: obstacles of different radii, some absent at times, "
+            "need a robot with a lidar in ROS 2; set robot.lidar.beams, or one radius for all"
+        )
+    return radii[:1]
+
+
 def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     """Parameters of each node: {node: {parameter: value}}.
 
@@ -117,7 +134,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     dated = {"use_sim_time": True} if not lockstep and config.speed_factor <= 1.0 else {}
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
     robot = config.scenario.robot
-    radii = [obstacle.radius_m for obstacle in config.scenario.obstacles]
+    radii = _radii(config.scenario)
     segments = config.scenario.segments_m if not robot.lidar.beams else ()
     return {
         "world_sim": viewed

@@ -15,6 +15,7 @@ from ..core.shipped_files import scenario_names, scenario_path
 from ..simulation.scenario import Scenario
 from .scenario_json import EXAMPLE, UnusualError, as_written
 from .text_files import read_text
+from .trajectory_file import with_trajectory_files
 
 
 def load_scenario(source: str) -> Scenario:
@@ -42,7 +43,7 @@ def _parse_file(path: Path, origin: str) -> Scenario:
 
 
 def parse_scenario(text: str, origin: str, directory: Path = Path()) -> Scenario:
-    """Turn YAML or JSON text into a Scenario; a map's path is relative to the directory.
+    """Turn YAML or JSON text into a Scenario; files that it names are searched in directory.
 
     Raises ConfigError naming origin, value, reason and remedy.
     """
@@ -52,6 +53,7 @@ def parse_scenario(text: str, origin: str, directory: Path = Path()) -> Scenario
     if not isinstance(data, dict):
         raise ConfigError(f"{origin}: a {type(data).__name__}, not a mapping; {EXAMPLE}")
     try:
+        data = with_trajectory_files(data, directory)
         with suppress(UnusualError):
             return as_written(data)
         from .yaml_schema import checked

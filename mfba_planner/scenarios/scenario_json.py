@@ -14,6 +14,7 @@ from ..core.geometry import Point
 from ..core.option_specs import override
 from ..core.segments import Segment
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
+from ..simulation.recorded_motion import Knot
 from ..simulation.robot_model import Robot
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
 
@@ -21,6 +22,8 @@ EXAMPLE = "compare config/scenarios/case1.yaml"
 
 
 LIMIT = 1e6  # no number in a scenario is larger
+# Keys of an obstacle that are left out where unused.
+OPTIONAL = ("turns", "trajectory", "loop", "stays", "appears_s", "vanishes_s")
 
 
 def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
@@ -36,8 +39,9 @@ def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
     if not scenario.segments_m:
         del plain["segments_m"]
     for obstacle in plain["obstacles"]:
-        if not obstacle["turns"]:
-            del obstacle["turns"]
+        for name in OPTIONAL:
+            if obstacle[name] in ([], False, None, 0.0):
+                del obstacle[name]
     return plain
 
 
@@ -143,14 +147,31 @@ def _kidnapping(data: Any) -> Kidnapping:
 
 
 def _obstacle(data: Any) -> Obstacle:
-    _require_keys(data, Obstacle, "turns")
+    _require_keys(data, Obstacle, *OPTIONAL)
     return Obstacle(
         center_m=_point(data["center_m"]),
         radius_m=_positive(data["radius_m"]),
         speed_mps=_not_negative(data["speed_mps"]),
         heading_rad=_number(data["heading_rad"]),
         turns=tuple(_turn(entry) for entry in _list(data.get("turns", []))),
+        trajectory=tuple(_knot(entry) for entry in _list(data.get("trajectory", []))),
+        loop=_flag(data.get("loop", False)),
+        stays=_flag(data.get("stays", False)),
+        appears_s=_not_negative(data.get("appears_s", 0.0)),
+        vanishes_s=_positive(data["vanishes_s"]) if "vanishes_s" in data else None,
     )
+
+
+def _knot(data: Any) -> Knot:
+    if len(_list(data)) != 3:
+        raise UnusualError
+    return (_number(data[0]), _number(data[1]), _number(data[2]))
+
+
+def _flag(value: Any) -> bool:
+    if type(value) is not bool:
+        raise UnusualError
+    return value
 
 
 def _turn(data: Any) -> Turn:

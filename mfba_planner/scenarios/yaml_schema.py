@@ -28,6 +28,7 @@ from .schema_types import Point as _Point
 from .schema_types import Positive as _Positive
 from .schema_types import default as _default
 
+_Knot = tuple[_Number, _Number, _Number]
 # Names appear in messages and file names.
 _Name = Annotated[str, Field(max_length=100, pattern=r"^\w[\w .+-]*$")]
 
@@ -64,6 +65,12 @@ class _Obstacle(_Heading):
     radius_m: _Positive
     speed_mps: _NotNegative = _default(Obstacle, "speed_mps")
     turns: list[_Turn] = []
+    # A file's name is replaced by its points before: trajectory_file.py.
+    trajectory: list[_Knot] = []
+    loop: bool = _default(Obstacle, "loop")
+    stays: bool = _default(Obstacle, "stays")
+    appears_s: _NotNegative = _default(Obstacle, "appears_s")
+    vanishes_s: _Positive | None = _default(Obstacle, "vanishes_s")
 
     def build(self) -> Obstacle:
         return Obstacle(
@@ -72,6 +79,11 @@ class _Obstacle(_Heading):
             speed_mps=self.speed_mps,
             heading_rad=self.heading(),
             turns=tuple(turn.build() for turn in self.turns),
+            trajectory=tuple(self.trajectory),
+            loop=self.loop,
+            stays=self.stays,
+            appears_s=self.appears_s,
+            vanishes_s=self.vanishes_s,
         )
 
 
@@ -146,13 +158,19 @@ _MEANINGS = {
     "obstacles": "circles at rest or moving",
     "walls": "a rectangle that reflects obstacles; the robot may cross it",
     "time_limit_s": "simulated time after which the run fails, s",
-    "center_m": "centre at t = 0, m",
+    "center_m": "centre at t = 0, m; left out with a trajectory",
     "radius_m": "radius, m",
     "speed_mps": "speed, m/s",
     "heading_deg": "heading, degrees from +x, counter-clockwise",
     "heading_rad": "heading in radians, instead",
     "robots": "several robots in one world; leave out start_m and goal_m above",
     "turns": "changes of speed and heading, sorted by time",
+    "trajectory": "instead of center_m and speed: points [t, x, y] in s and m, sorted by time, "
+    "straight in between, or the name of a CSV file of them; there from the first to the last one",
+    "loop": "the trajectory begins anew at its end",
+    "stays": "it stands at the ends of its trajectory before and afterwards",
+    "appears_s": "simulated time from which it is there, s",
+    "vanishes_s": "simulated time until which it is there, s",
     "at_s": "simulated time since the start, s",
     "robot": "base, lidar and noise, where they differ from the paper",
     "kidnappings": "times at which the robot is moved elsewhere, sorted by time",
@@ -178,7 +196,7 @@ def checked(data: dict[Any, Any], directory: Path = Path()) -> Scenario:
     Raises ConfigError: key, value, reason, remedy.
     """
     try:
-        return _Scenario.model_validate(_with_ends(data)).build(directory)
+        return _Scenario.model_validate(_with_centers(_with_ends(data))).build(directory)
     except ValidationError as error:
         raise ConfigError(_explain(error)) from None
 
@@ -190,6 +208,26 @@ def _with_ends(data: dict[Any, Any]) -> dict[Any, Any]:
         return data
     ends = {key: robots[0][key] for key in ("start_m", "goal_m") if key in robots[0]}
     return ends | data
+
+
+def _with_centers(data: dict[Any, Any]) -> dict[Any, Any]:
+    """Fill in the centre of an obstacle from the first point of its trajectory."""
+    obstacles = data.get("obstacles")
+    if not isinstance(obstacles, list):
+        return data
+    return data | {"obstacles": [_with_center(entry) for entry in obstacles]}
+
+
+def _with_center(entry: Any) -> Any:
+    if not isinstance(entry, dict) or not entry.get("trajectory") or "center_m" in entry:
+        return entry
+    points = entry["trajectory"]
+    first = points[0] if isinstance(points, list) else None
+    is_knot = isinstance(first, list) and len(first) == 3
+    numbers = first[1:] if is_knot and isinstance(first, list) else []
+    are_finite = bool(numbers) and all(isinstance(v, int | float) and v - v == 0 for v in numbers)
+    # Points that are none are refused as such.
+    return entry | {"center_m": numbers if are_finite else [0.0, 0.0]}
 
 
 _REMEDIES = {

@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from .obstacle_motion import bounce_times, center_at
+from .obstacle_motion import pieces
 from .scenario import Scenario
 
 
@@ -31,14 +30,16 @@ class UniformSegments(NamedTuple):
 
 
 def uniform_segments(scenario: Scenario, until_s: float) -> UniformSegments:
-    """Cut the motion of every obstacle in [0, until_s] at its bounces and turns."""
+    """Cut the motion of every obstacle in [0, until_s] at its bounces, turns and knots.
+
+    An obstacle has no segment while it is absent.
+    """
     rows = []
     for index, obstacle in enumerate(scenario.obstacles):
         radius = scenario.enlarged_radius(obstacle)
-        times = [0.0, *bounce_times(obstacle, 0.0, until_s, scenario.walls), until_s]
-        for t0, t1 in pairwise(times):
-            x0, y0 = center_at(obstacle, t0, scenario.walls)
-            x1, y1 = center_at(obstacle, t1, scenario.walls)
+        for t0, t1, (x0, y0), (x1, y1) in pieces(obstacle, 0.0, until_s, scenario.walls):
+            if t0 == t1:
+                continue
             vx, vy = (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
             rows.append((t0, t1, x0, y0, vx, vy, radius, index))
     table = np.array(rows, dtype=np.float64).reshape(-1, 8)

@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 from ..core.geometry import Point, closest_approach
-from .obstacle_motion import Obstacle, bounce_times, center_at
+from .obstacle_motion import Obstacle, pieces
 from .scenario import Scenario
 
 
@@ -16,8 +15,8 @@ def step_clearances(
 ) -> list[float]:
     """Smallest gap (m) to each obstacle while the robot moves uniformly from start to end.
 
-    Continuous in time, and exact through bounces and turns: between two of them both motions
-    are uniform. Negative means contact.
+    Continuous in time, and exact through bounces, turns and knots: between two of them both
+    motions are uniform. Negative means contact; inf, that the obstacle is absent.
     """
     return [
         clearance(scenario, obstacle, t0_s, t1_s, start, end) for obstacle in scenario.obstacles
@@ -28,17 +27,11 @@ def clearance(
     scenario: Scenario, obstacle: Obstacle, t0_s: float, t1_s: float, start: Point, end: Point
 ) -> float:
     """step_clearances, for one obstacle."""
-    times = [t0_s, *bounce_times(obstacle, t0_s, t1_s, scenario.walls), t1_s]
     smallest = math.inf
     duration = t1_s - t0_s
-    for ta, tb in pairwise(times):
+    for ta, tb, here, there in pieces(obstacle, t0_s, t1_s, scenario.walls):
         sa, sb = ((t - t0_s) / duration if duration else 0.0 for t in (ta, tb))
-        gap = closest_approach(
-            _between(start, end, sa),
-            _between(start, end, sb),
-            center_at(obstacle, ta, scenario.walls),
-            center_at(obstacle, tb, scenario.walls),
-        )
+        gap = closest_approach(_between(start, end, sa), _between(start, end, sb), here, there)
         smallest = min(smallest, gap)
     return smallest - scenario.enlarged_radius(obstacle)
 

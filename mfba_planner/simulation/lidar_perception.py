@@ -2,7 +2,7 @@
 """Robots that perceive by their lidar alone, as `mfba sim` simulates them, for sweeps.
 
 The robot of a perception replaces that of the world; observe_scan() then gives the planner what
-the sensors of that robot measure, and nothing else.
+the sensors of that robot measure, and nothing else. With OWN_ROBOT the world keeps its robot.
 """
 
 from __future__ import annotations
@@ -43,11 +43,16 @@ LIDAR_ROBOTS: dict[str, LidarRobot] = {
         scan_age_s=0.1,
     ),
 }
+# The robot of the scenario itself, as in `mfba sim`; without a lidar it gets the default one.
+OWN_ROBOT = "scenario"
+LIDAR_PERCEPTIONS = (*LIDAR_ROBOTS, OWN_ROBOT)
 
 
 def with_lidar(scenario: Scenario, name: str, noise_m: float = 0.0) -> Scenario:
     """The same task for the robot of that perception; noise_m deviates ranges further."""
-    robot = LIDAR_ROBOTS[name].robot
+    robot = scenario.robot if name == OWN_ROBOT else LIDAR_ROBOTS[name].robot
+    if not robot.lidar.beams:
+        robot = replace(robot, lidar=replace(robot.lidar, beams=DEFAULT_BEAMS))
     if noise_m:
         noise = replace(robot.noise, scan_m=math.hypot(robot.noise.scan_m, noise_m))
         robot = replace(robot, noise=noise)
@@ -65,7 +70,8 @@ class LidarPerception:
         """Start before tick 0; latency_ticks are added to the age of the robot's scans."""
         if latency_ticks < 0:
             raise ConfigError(f"latency_ticks={latency_ticks}: give a whole number from 0 up")
-        self._age_s, self._ticks = LIDAR_ROBOTS[name].scan_age_s, latency_ticks
+        self._age_s = 0.0 if name == OWN_ROBOT else LIDAR_ROBOTS[name].scan_age_s
+        self._ticks = latency_ticks
         self._past: deque[Observation] = deque()
 
     def __call__(self, world: World, sensor: SensorParams) -> Observation:

@@ -38,8 +38,8 @@ class NearbyObstacles:
     def at(self, tick: int, position: Point, reach_m: float) -> Nearby:
         """Indices, and (centre, enlarged radius), of all obstacles whose edge is within reach.
 
-        Ascending indices. May hold others too; none is missing. A position that is not finite
-        counts as near to all.
+        Ascending indices. May hold others too; none is missing, but those that are absent. A
+        position that is not finite counts as near to all.
         """
         k = tick - self._picked_from
         dx, dy = position[0] - self._picked_at[0], position[1] - self._picked_at[1]
@@ -50,7 +50,11 @@ class NearbyObstacles:
         ):
             self._pick(tick, position, reach_m)
             k = 0
-        return self._which, list(zip(zip(self._xs[k], self._ys[k]), self._radii))
+        circles = list(zip(zip(self._xs[k], self._ys[k]), self._radii))
+        if not self._motion.has_absent:
+            return self._which, circles
+        kept = [n for n, (center, _) in enumerate(circles) if not math.isnan(center[0])]
+        return [self._which[n] for n in kept], [circles[n] for n in kept]
 
     def _pick(self, tick: int, position: Point, reach_m: float) -> None:
         k = tick - self._centers_from
@@ -75,7 +79,9 @@ class NearbyObstacles:
         self._roam_m = roam_m if ROAM_M < roam_m < math.inf else ROAM_M
         with np.errstate(invalid="ignore", over="ignore"):
             dx, dy = centers[0] - position[0], centers[1] - position[1]
-            square = (dx * dx + dy * dy).min(axis=0)
+            squares = dx * dx + dy * dy
+            gone = np.isnan(centers[0])
+            square = np.where(gone, np.inf, squares).min(axis=0) if gone.any() else squares.min(0)
             far = self._motion.radius_m + (reach_m + self._roam_m + 1e-6)
             away = np.isfinite(square) & (square > far * far)
-        return np.flatnonzero(~away)
+        return np.flatnonzero(~(away | gone.all(axis=0)))

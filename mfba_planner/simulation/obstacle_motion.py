@@ -11,6 +11,16 @@ from operator import attrgetter
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
+from .recorded_motion import (
+    ALWAYS,
+    Knot,
+    Piece,
+    point_at,
+    presence,
+    top_speed,
+    trajectory_pieces,
+    velocity_along,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +36,8 @@ class Turn:
 class Obstacle:
     """A row of Table 4 or 6: centre at t = 0 (m), radius (m), speed (m/s), heading (rad).
 
-    turns change speed and heading, sorted by time; the paper has none.
+    turns change speed and heading, sorted by time; the paper has none. With a trajectory of knots
+    (t, x, y) the obstacle follows that instead, and walls do not stop it (recorded_motion.py).
     """
 
     center_m: Point
@@ -34,6 +45,11 @@ class Obstacle:
     speed_mps: float = 0.0
     heading_rad: float = 0.0
     turns: tuple[Turn, ...] = ()
+    trajectory: tuple[Knot, ...] = ()
+    loop: bool = False
+    stays: bool = False
+    appears_s: float = 0.0
+    vanishes_s: float | None = None
 
     def __hash__(self) -> int:
         """Hash without the turns, for speed: stretches_of caches by obstacle."""
@@ -42,6 +58,8 @@ class Obstacle:
     @property
     def top_speed_mps(self) -> float:
         """The highest speed of the whole motion in m/s."""
+        if self.trajectory:
+            return top_speed(self.trajectory)
         return max([self.speed_mps, *(turn.speed_mps for turn in self.turns)])
 
     @property
@@ -93,7 +111,12 @@ def _stretch(obstacle: Obstacle, t_s: float, walls: Walls | None) -> tuple[float
 
 
 def center_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
-    """Centre at time t in metres, closed form: straight, or reflected by the walls."""
+    """Centre at time t in metres, closed form: straight, or reflected by the walls.
+
+    Of one that is absent it is where it would be.
+    """
+    if obstacle.trajectory:
+        return point_at(obstacle, t_s)
     if obstacle.turns:
         since_s, obstacle = _stretch(obstacle, t_s, walls)
         t_s -= since_s
@@ -125,6 +148,8 @@ def _fold(value: float, low: float, high: float) -> float:
 
 def velocity_at(obstacle: Obstacle, t_s: float, walls: Walls | None = None) -> Point:
     """(vx, vy) at time t in m/s; at a wall or a turn, the velocity after it."""
+    if obstacle.trajectory:
+        return velocity_along(obstacle, t_s)
     if obstacle.turns:
         since_s, obstacle = _stretch(obstacle, t_s, walls)
         t_s -= since_s
@@ -148,7 +173,30 @@ def _folded_speed(position: float, speed: float, t_s: float, low: float, high: f
 
 
 def bounce_times(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:
-    """Times strictly within (t0, t1) at which the obstacle meets a wall or turns, ascending."""
+    """Times strictly within (t0, t1) at which the obstacle meets a wall or turns, ascending.
+
+    Also those of its knots, and at which it appears or vanishes.
+    """
+    if obstacle.trajectory or presence(obstacle) != ALWAYS:
+        found = {t for piece in pieces(obstacle, t0_s, t1_s, walls) for t in piece[:2]}
+        return sorted(t for t in found if t0_s < t < t1_s)
+    return _bounces(obstacle, t0_s, t1_s, walls)
+
+
+def pieces(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[Piece]:
+    """The obstacle's motion within [t0, t1] in pieces of uniform motion, while it is there."""
+    begin, end = presence(obstacle)
+    a, b = max(t0_s, begin), min(t1_s, end)
+    if a > b:
+        return []
+    if obstacle.trajectory:
+        return list(trajectory_pieces(obstacle, a, b))
+    times = [a, *_bounces(obstacle, a, b, walls), b]
+    points = [center_at(obstacle, t, walls) for t in times]
+    return list(zip(times, times[1:], points, points[1:]))
+
+
+def _bounces(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) -> list[float]:
     if obstacle.turns:
         return _kinks(obstacle, t0_s, t1_s, walls)
     if walls is None:
@@ -179,6 +227,6 @@ def _kinks(obstacle: Obstacle, t0_s: float, t1_s: float, walls: Walls | None) ->
         a = max(t0_s, since_s) if number else t0_s
         b = min(t1_s, turn_times[number]) if number < len(turn_times) else t1_s
         if a < b:
-            bounces = bounce_times(plain, a - since_s, b - since_s, walls)
+            bounces = _bounces(plain, a - since_s, b - since_s, walls)
             times.update(t for t in (since_s + t for t in bounces) if t0_s < t < t1_s)
     return sorted(times)

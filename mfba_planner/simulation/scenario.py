@@ -14,9 +14,11 @@ from ..core.planner_types import ROBOT_RADIUS_M
 from ..core.segments import Segment, Segments, segments_of
 from ..planning.planner_params import PlannerParams
 from .obstacle_motion import Obstacle, Walls, center_at
+from .recorded_motion import check_motion, is_present
 from .robot_model import Robot
 
 TOUCH_M = 1e-9  # a robot that starts in touch with a wall is not inside it
+NOWHERE: Point = (math.nan, math.nan)  # centre of an obstacle that is absent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,13 +87,9 @@ class Scenario:
         if self.start_m == self.goal_m:
             raise ConfigError(f"goal_m={list(self.goal_m)}: equal to start_m; move one of them")
         for number, obstacle in enumerate(self.obstacles, start=1):
-            gap = distance(self.start_m, obstacle.center_m) - self.enlarged_radius(obstacle)
-            if gap < 0.0:
-                raise ConfigError(
-                    f"start_m={list(self.start_m)}: the robot starts {-gap:.3g} m inside obstacle "
-                    f"{number} (radii added); move start_m or the obstacle"
-                )
-            if self.walls is not None:
+            check_motion(number, obstacle)
+            _check_start(self, number, obstacle)
+            if self.walls is not None and not obstacle.trajectory:
                 _check_inside(number, obstacle, self.walls)
             _check_turns(number, obstacle)
         _check_kidnappings(self)
@@ -109,15 +107,27 @@ class Scenario:
         return obstacle.radius_m + self.robot_radius_m
 
     def centers(self, t_s: float) -> list[Point]:
-        """Centres of all obstacles at time t, in scenario order."""
-        return [center_at(obstacle, t_s, self.walls) for obstacle in self.obstacles]
-
-    def enlarged(self, t_s: float) -> list[tuple[Point, float]]:
-        """(centre, enlarged radius) of all obstacles at time t."""
+        """Centres of all obstacles at time t, in scenario order; NaN of one that is absent."""
         return [
-            (center_at(obstacle, t_s, self.walls), self.enlarged_radius(obstacle))
+            center_at(obstacle, t_s, self.walls) if is_present(obstacle, t_s) else NOWHERE
             for obstacle in self.obstacles
         ]
+
+    def enlarged(self, t_s: float) -> list[tuple[Point, float]]:
+        """(centre, enlarged radius) of all obstacles at time t; centres as in centers()."""
+        return list(zip(self.centers(t_s), map(self.enlarged_radius, self.obstacles)))
+
+
+def _check_start(scenario: Scenario, number: int, obstacle: Obstacle) -> None:
+    if not is_present(obstacle, 0.0):
+        return
+    center = center_at(obstacle, 0.0) if obstacle.trajectory else obstacle.center_m
+    gap = distance(scenario.start_m, center) - scenario.enlarged_radius(obstacle)
+    if gap < 0.0:
+        raise ConfigError(
+            f"start_m={list(scenario.start_m)}: the robot starts {-gap:.3g} m inside obstacle "
+            f"{number} (radii added); move start_m or the obstacle"
+        )
 
 
 def _check_place(scenario: Scenario) -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, distance
 from ..core.planner_types import NANO
@@ -57,8 +59,8 @@ class World:
         return self._nearby.at(self.tick, position or self.pose.position, reach_m)
 
     def centers(self) -> list[Point]:
-        """Present centres of all obstacles, in scenario order."""
-        return self.scenario.centers(self.time_s)
+        """Present centres of the obstacles that are there, in scenario order."""
+        return [center for center in self.scenario.centers(self.time_s) if not isnan(center[0])]
 
     @property
     def distance_to_goal_m(self) -> float:

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner_types import Decision, Mode, Observation, observe
+from ..core.planner_types import NANO, Decision, Mode, Observation, observe
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sense_segments import sense_circles_and_segments
 from ..perception.sensory_vector import sensory_vector
@@ -35,6 +35,7 @@ from ..recording.from_messages import (
 from ..recording.from_messages import decision as read_decision
 from ..recording.run_parameters import Setup, read_setup, read_setups
 from ..simulation.decision_digest import digest
+from ..simulation.recorded_motion import is_present
 from .compare_decisions import Divergence, first_divergence
 from .tick_records import (
     DECISION,
@@ -244,7 +245,10 @@ def _sectors_match_sensor(setup: Setup, tick: Tick, decision: Decision) -> bool:
     except InputError:
         return not decision.ranges_m  # a blind sensor has no ranges
     position = pose.position
-    radii = [o.radius_m + scenario.robot_radius_m for o in scenario.obstacles]
+    time_s = (decision.stamp_ns - setup.planner.tick_ns) * NANO
+    radii = [
+        o.radius_m + scenario.robot_radius_m for o in scenario.obstacles if is_present(o, time_s)
+    ]
     if len(radii) != len(centers):
         return False
     ranges = sense_circles_and_segments(

@@ -138,9 +138,12 @@ def test_a_crossing_has_the_people_of_its_moment(
     ("text", "reason"),
     [
         ("a,b\n1,2\n", "no column t_s; give t_s, person, x_m, y_m"),
-        ("t_s,person,x_m,y_m\n0,1,zero,0\n", "line 2: not three numbers"),
-        ("t_s,person,x_m,y_m\n0,1,nan,0\n", "line 2: not finite"),
-        ("t_s,person,x_m,y_m\n0,1,0,0\n0,1,1,0\n", "person 1 is at two places at once"),
+        ("t_s,person,x_m,y_m\n0,1,zero,0\n", "line 2: value='zero': not a number"),
+        ("t_s,person,x_m,y_m\n0,1,nan,0\n", "line 2: value=nan: not finite"),
+        (
+            "t_s,person,x_m,y_m\n0,1,0,0\n0,1,1,0\n",
+            "person 1: time 0 s after 0 s; sort",
+        ),
         ("t_s,person,x_m,y_m\n0,1,0,0\n", "no person with two samples"),
     ],
 )

@@ -177,20 +177,20 @@ def test_the_command_line_of_a_report_gives_the_same_sweep() -> None:
     assert words[:2] == ["mfba", "sweep"]
     from mfba_planner.cli.sweep import _parser, _sweep_spec
 
-    assert _sweep_spec(_parser().parse(words[2:])) == spec
+    assert _sweep_spec(_parser().parse(words[2:]))[0] == spec
 
 
 def test_predictive_has_its_own_step_and_swarm_unless_others_are_given() -> None:
     from mfba_planner.cli.sweep import _parser, _sweep_spec
 
     args = ["random-3", "--planner", "paper", "--planner", "predictive", "--worlds", "1"]
-    spec = _sweep_spec(_parser().parse(args))
+    spec = _sweep_spec(_parser().parse(args))[0]
     usual = PlannerParams(speed_mps=SPEED_MPS)
     assert spec.setting_of("paper").params == usual
     assert spec.setting_of("predictive").params == preset(usual)
     assert command_line(spec) == "mfba sweep " + " ".join(args)
     args += ["--set", "planner.step_length_m=0.3"]
-    spec = _sweep_spec(_parser().parse(args))
+    spec = _sweep_spec(_parser().parse(args))[0]
     assert spec.setting_of("paper").params == usual
     assert spec.setting_of("predictive").params == replace(preset(usual), step_length_m=0.3)
     assert command_line(spec) == "mfba sweep " + " ".join(args)
@@ -200,11 +200,11 @@ def test_a_suite_s_speed_and_the_lidar_are_the_defaults() -> None:
     from mfba_planner.cli.sweep import _parser, _sweep_spec
 
     args = ["fast-10", "--planner", "orca", "--worlds", "1"]
-    spec = _sweep_spec(_parser().parse(args))
+    spec = _sweep_spec(_parser().parse(args))[0]
     assert (spec.setting.params.speed_mps, spec.setting.perception) == (1.0, "lidar")
     assert command_line(spec) == "mfba sweep " + " ".join(args)
     args += ["--perception", "known", "--set", "planner.speed_mps=0.8"]
-    spec = _sweep_spec(_parser().parse(args))
+    spec = _sweep_spec(_parser().parse(args))[0]
     assert (spec.setting.params.speed_mps, spec.setting.perception) == (0.8, "known")
     assert command_line(spec) == "mfba sweep " + " ".join(args)
 

@@ -405,8 +405,8 @@ def test_seeds_of_a_world_are_a_single_case() -> None:
         (
             {"planners": ("paper", "dwa"), "setting": Setting(perception="sectors")},
             "--perception sectors: planner dwa uses none of it; "
-            "give --perception lidar or lidar-differential or lidar-realistic or known or "
-            "scan-12 or scan-360",
+            "give --perception lidar or lidar-differential or lidar-realistic or scenario or "
+            "known or scan-12 or scan-360",
         ),
         ({"worlds": 0}, "--worlds=0: out of range; give at least 1"),
         ({"first": -1}, "--first=-1: out of range; give at least 0"),

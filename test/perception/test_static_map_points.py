@@ -83,7 +83,8 @@ def test_the_field_holds_the_distances_to_the_points(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(-2.5, 2.5, (2, n))
     center = rng.uniform(-1.0, 1.0, 2)
-    field = distance_field(x, y, (float(center[0]), float(center[1])), 3.0, CELL_M, 0.8)
+    low, high = tuple((center - 1.5).tolist()), tuple((center + 1.5).tolist())
+    field = distance_field(x, y, low, high, CELL_M, 0.8)
     at = center[:, None] + rng.uniform(-1.4, 1.4, (2, 200))
     away = np.hypot(at[0][:, None] - x, at[1][:, None] - y).min(axis=1, initial=0.8)
     error = field.at(at[0], at[1]) - away
@@ -93,5 +94,5 @@ def test_the_field_holds_the_distances_to_the_points(seed: int, n: int) -> None:
 
 
 def test_a_point_outside_the_window_counts() -> None:
-    field = distance_field(np.array([1.2]), np.array([0.0]), (0.0, 0.0), 2.0, CELL_M, 0.8)
+    field = distance_field(np.array([1.2]), np.array([0.0]), (-1.0, -1.0), (1.0, 1.0), CELL_M, 0.8)
     assert field.at(np.array([0.9]), np.array([0.0]))[0] == pytest.approx(0.3, abs=0.005)

@@ -18,6 +18,7 @@ from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.scenario import Scenario
 
 GOAL_TOLERANCE_M = 0.05  # larger than the tolerance of any planner here
+_INSTANT_S = 1e-9  # rounding of a sum of times
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,10 +85,13 @@ def _goal_covered(
         )
         furthest = np.maximum(furthest, np.hypot(x - gx, y - gy))
     covers = furthest + GOAL_TOLERANCE_M < segments.radius
-    return any(
-        covers[(segments.obstacle == obstacle) & active].all()
-        for obstacle in set(segments.obstacle[active].tolist())
-    )
+    shared_s = np.minimum(segments.t1, end_s) - np.maximum(segments.t0, start_s)
+    for obstacle in set(segments.obstacle[active].tolist()):
+        own = (segments.obstacle == obstacle) & active
+        # It must be there all the time.
+        if covers[own].all() and shared_s[own].sum() >= end_s - start_s - _INSTANT_S:
+            return True
+    return False
 
 
 def _axes(scenario: Scenario, p: ReachParams) -> tuple[np.ndarray, np.ndarray]:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The oracle's independent check: shares no formula with simulation's motion or contact.
 
-Obstacles are followed from event to event (a wall reverses a velocity, a turn replaces it);
-simulation folds coordinates. The distance is the minimum of a quadratic; simulation projects onto
-a segment.
+Obstacles are followed from event to event (a wall reverses a velocity, a turn or knot replaces
+it); simulation folds coordinates and times. The distance is the minimum of a quadratic;
+simulation projects onto a segment.
 """
 
 from __future__ import annotations
@@ -23,7 +23,37 @@ SLACK = 1e-9
 
 
 def pieces(obstacle: Obstacle, walls: Walls | None, until_s: float) -> Iterator[Piece]:
-    """The obstacle's motion in [0, until_s] between events; metres, seconds."""
+    """The obstacle's motion in [0, until_s] between events, while it is there; m, s."""
+    begin = obstacle.appears_s
+    end = until_s if obstacle.vanishes_s is None else min(until_s, obstacle.vanishes_s)
+    found = _recorded(obstacle, until_s) if obstacle.trajectory else _moved(obstacle, walls, end)
+    for since, until, x, y, vx, vy in found:
+        a, b = max(since, begin), min(until, end)
+        if a < b:
+            yield a, b, x + vx * (a - since), y + vy * (a - since), vx, vy
+
+
+def _recorded(obstacle: Obstacle, until_s: float) -> Iterator[Piece]:
+    """From knot to knot; loops are laid out one lap after the other."""
+    knots = list(obstacle.trajectory)
+    if obstacle.stays:
+        knots.insert(0, (min(0.0, knots[0][0]) - 1.0, *knots[0][1:]))
+        knots.append((max(until_s, knots[-1][0]) + 1.0, *knots[-1][1:]))
+    late = 0.0
+    while True:
+        for (t, x, y), (u, x1, y1) in pairwise(knots):
+            start, end = max(0.0, t + late), min(until_s, u + late)
+            if start < end:
+                vx, vy = (x1 - x) / (u - t), (y1 - y) / (u - t)
+                since = start - (t + late)
+                yield start, end, x + vx * since, y + vy * since, vx, vy
+        late += knots[-1][0] - knots[0][0]
+        if not obstacle.loop or knots[0][0] + late >= until_s:
+            return
+
+
+def _moved(obstacle: Obstacle, walls: Walls | None, until_s: float) -> Iterator[Piece]:
+    """From wall to wall and from turn to turn."""
     (x, y), (vx, vy) = obstacle.center_m, _polar(obstacle.speed_mps, obstacle.heading_rad)
     t = 0.0
     due = list(obstacle.turns)

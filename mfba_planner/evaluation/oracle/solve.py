@@ -102,14 +102,16 @@ class _Task:
             yield self.straight
             return
         self.active |= touched
-        if found := self._refined(self._by_tangents(segments), segments):
+        if found := self._refined(self._by_tangents(segments, horizon_s), segments):
             yield from self._compared_with_lattice(found, segments)
             return
         segments = uniform_segments(self.scenario, limit_s)
         self.proof = unreachable(self.scenario, self.v, segments)
         if self.proof:
             return
-        if horizon_s < limit_s and (found := self._refined(self._by_tangents(segments), segments)):
+        if horizon_s < limit_s and (
+            found := self._refined(self._by_tangents(segments, limit_s), segments)
+        ):
             yield from self._compared_with_lattice(found, segments)
             return
         for times in (1.25, 2.5, 5.0):
@@ -143,7 +145,7 @@ class _Task:
         gap = gaps(path[None], self.v, segments)[0]
         return set(segments.obstacle[(gap < CLEAR_M / 2.0).any(axis=0)].tolist())
 
-    def _by_tangents(self, segments: UniformSegments) -> list[np.ndarray]:
+    def _by_tangents(self, segments: UniformSegments, until_s: float) -> list[np.ndarray]:
         """Shortest paths among active obstacles; obstacles the best one touches become active.
 
         A path shortest among some obstacles and free of all is shortest among all.
@@ -151,7 +153,8 @@ class _Task:
         start, goal = self.scenario.start_m, self.scenario.goal_m
         while True:
             subset = segments.select(sorted(self.active))
-            paths = Search(start, goal, self.v, subset, self.params, self.inside).paths()
+            search = Search(start, goal, self.v, subset, self.params, self.inside, until_s)
+            paths = search.paths()
             if not paths:
                 return []
             touched = self._touched(paths[0], segments)

@@ -76,8 +76,12 @@ class Search:
         segments: UniformSegments,
         params: SearchParams,
         inside: Walls | None = None,
+        until_s: float | None = None,
     ) -> None:
-        """Prepare; speed in m/s; all paths stay within the rectangle inside, if given."""
+        """Prepare; speed in m/s; all paths stay within the rectangle inside, if given.
+
+        until_s is until when the segments tell the whole motion; None: until the last one ends.
+        """
         self.start, self.goal, self.v, self.segments = start, goal, speed_mps, segments
         self.params, self.inside = params, inside
         self.inner = segments._replace(radius=segments.radius + CLEAR_M)
@@ -86,7 +90,7 @@ class Search:
         self.end_y = segments.y + segments.vy * (segments.t1 - segments.t0)
         same = segments.obstacle[1:] == segments.obstacle[:-1]
         self.kinked = np.append(same, False)  # the next segment is of the same obstacle
-        self.horizon = float(segments.t1.max())
+        self.horizon = float(segments.t1.max()) if until_s is None else until_s
         fast = segments.vx**2 + segments.vy**2 >= speed_mps**2
         self.roots = (1.0, -1.0) if fast.any() else (1.0,)
 

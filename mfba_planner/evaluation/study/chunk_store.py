@@ -20,6 +20,11 @@ from .chunk import Chunk, Columns
 SCHEMA_VERSION = 1
 MANIFEST, CHUNKS = "study.json", "chunks"
 _ANOTHER = "give another --out"
+# Said of facts that are too long to show.
+_CHANGED = {
+    "code": "the code has changed since",
+    "scenarios": "the scenario files have changed since",
+}
 
 
 class Store:
@@ -112,8 +117,8 @@ def _compare(directory: Path, wanted: Mapping[str, Any], command: str) -> None:
     for name, value in wanted.items():
         if found.get(name) != value:
             shown = f"{name}={found.get(name)!r}, now {value!r}"
-            if name in ("chunks", "samples", "code"):
-                shown = {"code": "the code has changed since"}.get(name, "what is run differs")
+            if name in ("chunks", "samples", *_CHANGED):
+                shown = _CHANGED.get(name, "what is run differs")
             raise OutputError(
                 f"{directory}: results of another version or configuration ({shown}); {_ANOTHER}"
             )

@@ -37,6 +37,7 @@ class Suite:
     number: int
     make: _Make
     distinct: int | None = None  # number of different worlds; None: all differ
+    count: int | None = None  # number of worlds; None: no end
     speed_mps: float = SPEED_MPS
     seed: int = 0
 
@@ -47,11 +48,15 @@ class Suite:
     def world(self, k: int, speed_mps: float | None = None) -> Scenario:
         """World k for a robot of this speed (only adversarial worlds depend on it).
 
-        None is the suite's own speed. Raises ConfigError for a negative k, or a speed that is
-        not above 0.
+        None is the suite's own speed. Raises ConfigError for a k that is negative or
+        past the end, or a speed that is not above 0.
         """
         if k < 0:
             raise ConfigError(f"k={k}: negative; worlds are counted from 0")
+        if self.count is not None and k >= self.count:
+            raise ConfigError(
+                f"world {k}: {self.name} has {self.count} worlds; give 0 to {self.count - 1}"
+            )
         speed_mps = self.speed_mps if speed_mps is None else speed_mps
         if not (math.isfinite(speed_mps) and speed_mps > 0.0):
             raise ConfigError(f"speed_mps={speed_mps}: no speed; give a number above 0")

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.geometry import distance
 from ...simulation.constant_velocity_segments import UniformSegments, uniform_segments
+from ...simulation.obstacle_motion import Walls
 from ...simulation.scenario import Scenario
 from .task_geometry import ROOM
 
@@ -24,14 +25,23 @@ class Survivability:
     positions: int
 
 
-def survivability(scenario: Scenario, speed_mps: float) -> Survivability:
+def area_of(scenario: Scenario) -> Walls:
+    """The box of start and goal; a side shorter than half the longer one is widened to that."""
+    ends = list(zip(scenario.start_m, scenario.goal_m))
+    half = 0.25 * max(abs(a - b) for a, b in ends)
+    corners = [(min(a, b, 0.5 * (a + b) - half), max(a, b, 0.5 * (a + b) + half)) for a, b in ends]
+    return Walls(lower_m=(corners[0][0], corners[1][0]), upper_m=(corners[0][1], corners[1][1]))
+
+
+def survivability(scenario: Scenario, speed_mps: float, area: Walls = ROOM) -> Survivability:
     """Survivability over a 10 x 10 raster of positions, for the time of the straight trip.
 
-    The trip is driven at speed_mps. Positions inside an obstacle at t = 0 are left out; without
+    The raster covers the scenario's walls, without them the area. The trip is driven at
+    speed_mps. Positions inside an obstacle at t = 0 are left out; without
     any other, the share is 0.
     """
     horizon_s = distance(scenario.start_m, scenario.goal_m) / speed_mps
-    positions = _raster(scenario)
+    positions = _raster(scenario.walls or area)
     first = first_contact_s(uniform_segments(scenario, horizon_s), positions)
     free = first > 0.0
     if not free.any():
@@ -44,9 +54,8 @@ def survivability(scenario: Scenario, speed_mps: float) -> Survivability:
     )
 
 
-def _raster(scenario: Scenario) -> np.ndarray:
-    """Centres of the cells of the walled area, or of the box of the generated worlds, (n, 2)."""
-    area = scenario.walls or ROOM
+def _raster(area: Walls) -> np.ndarray:
+    """Centres of the cells of the area, (n, 2)."""
     cells = (np.arange(_CELLS) + 0.5) / _CELLS
     xs = area.lower_m[0] + cells * (area.upper_m[0] - area.lower_m[0])
     ys = area.lower_m[1] + cells * (area.upper_m[1] - area.lower_m[1])

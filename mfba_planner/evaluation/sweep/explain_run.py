@@ -81,14 +81,18 @@ def explain(completed: CompletedRun) -> list[str]:
 
 def _contact_step(episode: Episode, index: int, number: int) -> str:
     """The step of the first contact, with an obstacle or the walls."""
-    time_s, ttc = (
-        episode.time_s(episode.ticks[index].stamp_ns),
-        _time_to_contact(episode, index, number),
+    time_s = episode.time_s(episode.ticks[index].stamp_ns)
+    ttc = _time_to_contact(episode, index, number)
+    gap = _gap(episode, index, number)
+    at_tick = (
+        "the obstacle was absent at the tick"
+        if math.isnan(gap)
+        else f"gap at the tick {gap:.3f} m"
     )
     return (
         f"contact: in the step after tick {index} ({time_s:.2f} s)"
         + (f", {ttc:.2f} s into it" if math.isfinite(ttc) else "")
-        + f"; gap at the tick {_gap(episode, index, number):.3f} m"
+        + f"; {at_tick}"
     )
 
 
@@ -142,7 +146,9 @@ def _table(episode: Episode, index: int, number: int) -> Iterator[str]:
         if number:
             ttc = _time_to_contact(episode, k, number)
             ttc_text = f"{ttc:>6.2f}s" if math.isfinite(ttc) else f"{'-':>7}"
-            line += f" {_gap(episode, k, number):>6.3f}m {ttc_text}"
+            gap = _gap(episode, k, number)
+            gap_text = f"{'absent':>7}" if math.isnan(gap) else f"{gap:>6.3f}m"
+            line += f" {gap_text} {ttc_text}"
         yield f"{line}  {tick.reason}{_bits(tick)}"
 
 

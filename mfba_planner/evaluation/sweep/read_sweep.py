@@ -12,6 +12,7 @@ from ...core.option_specs import override
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ..study.chunk_store import code_digest, read_chunk, read_manifest
+from ..suites.scenario_suite import from_facts
 from .run_sweep import COMMAND, PACKAGES
 from .sweep_chunks import chunks_of
 from .sweep_spec import Setting, SweepSpec
@@ -52,6 +53,7 @@ def _spec(facts: dict[str, Any]) -> SweepSpec:
     setting = dict(facts["setting"])
     params = override(PlannerParams(), setting.pop("params"))
     sensor = override(SensorParams(), setting.pop("sensor"))
+    scenarios = from_facts(facts["scenarios"]) if "scenarios" in facts else None
     return SweepSpec(
         suite=facts["suite"],
         planners=tuple(facts["planners"]),
@@ -59,6 +61,6 @@ def _spec(facts: dict[str, Any]) -> SweepSpec:
         first=facts["first"],
         seeds=facts["seeds"],
         oracle=facts["oracle"],
-        setting=Setting(params=params, sensor=sensor, **setting),
+        setting=Setting(params=params, sensor=sensor, scenarios=scenarios, **setting),
         own={name: override(PlannerParams(), options) for name, options in facts["own"].items()},
     )

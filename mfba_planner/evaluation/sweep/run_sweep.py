@@ -42,14 +42,17 @@ class SweepResult:
 
 def spec_facts(spec: SweepSpec) -> dict[str, Any]:
     """The specification as plain data, for the manifest."""
+    setting, scenarios = spec.setting.facts(), spec.setting.scenarios
+    setting.pop("scenarios", None)
     return {
+        **({} if scenarios is None else {"scenarios": scenarios.facts()}),
         "suite": spec.suite,
         "planners": list(spec.planners),
         "first": spec.first,
         "worlds": spec.worlds,
         "seeds": spec.seeds,
         "oracle": spec.oracle,
-        "setting": spec.setting.facts(),
+        "setting": setting,
         "own": {name: flatten(params) for name, params in spec.own.items()},
     }
 

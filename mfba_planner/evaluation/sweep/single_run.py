@@ -14,7 +14,7 @@ from ...planning.planner_registry import find_factory
 from ...planning.predictive_planner import Predictive
 from ...planning.supervised_planner import SupervisedPlanner
 from ...simulation.episode import Episode, Outcome
-from ...simulation.lidar_perception import LIDAR_ROBOTS
+from ...simulation.lidar_perception import LIDAR_PERCEPTIONS
 from ...simulation.planner_observations import Observe, observe_sectors
 from ...simulation.run_episode import always_continue, episode_generator, run_to_end
 from .planner_sandbox import HungError, PlannerFault, PlannerSandbox
@@ -121,7 +121,9 @@ def _decision_by_decision(
 def _as_on_a_robot(run: Run, setting: Setting) -> PathPlanner:
     """The planner; from a lidar one that can drive a robot is supervised, as in `mfba sim`."""
     path_planner = setting.make_planner(run)
-    if setting.perception in LIDAR_ROBOTS and isinstance(path_planner, (Algorithm1, Predictive)):
+    if setting.perception in LIDAR_PERCEPTIONS and isinstance(
+        path_planner, (Algorithm1, Predictive)
+    ):
         return SupervisedPlanner(path_planner)
     return path_planner
 

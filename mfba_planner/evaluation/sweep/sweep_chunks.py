@@ -4,15 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
 from ...core.errors import MfbaError
+from ...simulation.scenario import Scenario
 from ..oracle import solve
 from ..study.chunk import Columns
-from ..suites import suite
-from ..suites.survivability import survivability
+from ..suites.scenario_suite import ScenarioSet
+from ..suites.survivability import area_of, survivability
+from ..suites.task_geometry import ROOM
 from .single_run import generates_paths_together, run_one, run_together
 from .sweep_spec import Run, Setting, SweepSpec
 from .table_columns import Row, lost_row, run_row, timing_row
@@ -82,6 +84,7 @@ class OracleChunk:
     suite_seed: int
     worlds: tuple[int, ...]
     speed_mps: float
+    scenarios: ScenarioSet | None = None
 
     @property
     def name(self) -> str:
@@ -95,7 +98,13 @@ class OracleChunk:
 
     def facts(self) -> Mapping[str, Any]:
         """All inputs that determine the result."""
-        return {"suite_seed": self.suite_seed, "speed_mps": self.speed_mps}
+        facts = {"suite_seed": self.suite_seed, "speed_mps": self.speed_mps}
+        return facts if self.scenarios is None else {**facts, "scenarios": self.scenarios.digest()}
+
+    def world(self, number: int) -> Scenario:
+        """The world with this number."""
+        setting = Setting(suite_seed=self.suite_seed, scenarios=self.scenarios)
+        return setting.suite(self.suite).world(number, self.speed_mps)
 
     def run(self) -> Columns:
         """Solve the worlds. Raises MfbaError for a world that takes too long."""
@@ -114,13 +123,14 @@ class OracleChunk:
 
 def solve_world(world: int, optima: OracleChunk) -> Row:
     """The oracle's columns of one world."""
-    scenario = suite(optima.suite, optima.suite_seed).world(world, optima.speed_mps)
+    scenario = optima.world(world)
     solution = solve(scenario, optima.speed_mps)
+    area = ROOM if optima.scenarios is None else area_of(scenario)
     return {
         "world": world,
         "certificate": solution.certificate.value,
         "optimum_m": round(solution.length_m, DIGITS),
-        "survivability": survivability(scenario, optima.speed_mps).share,
+        "survivability": survivability(scenario, optima.speed_mps, area).share,
     }
 
 
@@ -135,21 +145,30 @@ def chunks_of(spec: SweepSpec) -> list[RunsChunk | OracleChunk]:
                 RunsChunk(
                     name=f"{spec.suite}-{_plain(planner)}-{first}-{len(worlds)}",
                     runs=tuple(spec.runs(planner, worlds)),
-                    setting=spec.setting_of(planner),
+                    setting=_with_worlds(spec.setting_of(planner), worlds),
                 )
             )
     return chunks
 
 
+def _with_worlds(setting: Setting, worlds: range) -> Setting:
+    """The setting with the content of these worlds only."""
+    if setting.scenarios is None:
+        return setting
+    return replace(setting, scenarios=setting.scenarios.only(worlds))
+
+
 def _optima(spec: SweepSpec) -> Iterator[OracleChunk]:
-    worlds = suite(spec.suite, spec.setting.suite_seed)
+    worlds, scenarios = spec.setting.suite(spec.suite), spec.setting.scenarios
     numbers = sorted({worlds.world_number(k) for k in spec.world_range})
     for first in range(0, len(numbers), WORLDS_AT_ONCE):
+        some = tuple(numbers[first : first + WORLDS_AT_ONCE])
         yield OracleChunk(
             suite=spec.suite,
             suite_seed=spec.setting.suite_seed,
-            worlds=tuple(numbers[first : first + WORLDS_AT_ONCE]),
+            worlds=some,
             speed_mps=spec.setting.params.speed_mps,
+            scenarios=scenarios and scenarios.only(some),
         )
 
 

@@ -7,7 +7,7 @@ import importlib
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 from ...core.errors import ConfigError
@@ -16,16 +16,22 @@ from ...core.planner_types import PathPlanner
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ...planning.planner_registry import Factory, find_factory, preset_of
-from ...simulation.lidar_perception import LIDAR_ROBOTS, LidarPerception, with_lidar
+from ...simulation.lidar_perception import (
+    LIDAR_PERCEPTIONS,
+    OWN_ROBOT,
+    LidarPerception,
+    with_lidar,
+)
 from ...simulation.planner_observations import INPUTS, Observe, Perception
 from ...simulation.scenario import Scenario
-from ..suites import suite
+from ..suites import Suite, suite
 from ..suites.named_suites import SPEED_MPS
+from ..suites.scenario_suite import ScenarioSet
 
 PATIENCE_S, LONGEST_S = 60.0, 86_400.0
 DEFAULT_PERCEPTION = "lidar"
 # What a planner can be given instead of its input, as listed in reports and in --help.
-PERCEIVED = dict.fromkeys(LIDAR_ROBOTS, "scan") | INPUTS
+PERCEIVED = dict.fromkeys(LIDAR_PERCEPTIONS, "scan") | INPUTS
 PERCEPTIONS = tuple(PERCEIVED)
 
 
@@ -47,7 +53,8 @@ class Setting:
 
     perception: a robot of simulation.lidar_perception, or a name of
     simulation.planner_observations.Perception. patience_s is the wall time after which a run
-    counts as hung; nothing else in a run depends on a clock.
+    counts as hung; nothing else in a run depends on a clock. scenarios are the worlds of the
+    user's own suite; None: those of a built-in one.
     """
 
     params: PlannerParams = field(default_factory=lambda: PlannerParams(speed_mps=SPEED_MPS))
@@ -57,6 +64,7 @@ class Setting:
     latency_ticks: int = 0
     suite_seed: int = 0
     patience_s: float = PATIENCE_S
+    scenarios: ScenarioSet | None = None
 
     def __post_init__(self) -> None:
         """Raise ConfigError for an invalid value."""
@@ -70,16 +78,22 @@ class Setting:
                 f"--patience={self.patience_s:g}: out of range; give 0 to {LONGEST_S:g} s"
             )
 
+    def suite(self, name: str) -> Suite:
+        """The suite of the runs. Raises ConfigError for an unknown name."""
+        if self.scenarios is None or name != self.scenarios.name:
+            return suite(name, self.suite_seed)
+        return self.scenarios.suite()
+
     def scenario(self, run: Run) -> Scenario:
         """The world of a run, with the robot of the perception."""
-        world = suite(run.suite, self.suite_seed).world(run.world, self.params.speed_mps)
-        if self.perception not in LIDAR_ROBOTS:
+        world = self.suite(run.suite).world(run.world, self.params.speed_mps)
+        if self.perception not in LIDAR_PERCEPTIONS:
             return world
         return with_lidar(world, self.perception, self.noise_m)
 
     def observer(self, seed: int, *, sectors: bool = True) -> Observe:
         """The perception of a run with this seed; a lidar's always computes the sectors."""
-        if self.perception in LIDAR_ROBOTS:
+        if self.perception in LIDAR_PERCEPTIONS:
             return LidarPerception(self.perception, self.latency_ticks)
         return Perception(
             self.perception,
@@ -94,17 +108,22 @@ class Setting:
         return make_planner(run.planner, self.params, self.sensor, run.seed)
 
     def facts(self) -> dict[str, Any]:
-        """All values as plain data."""
-        return {
-            **asdict(self),
-            "params": flatten(self.params),
-            "sensor": flatten(self.sensor),
-        }
+        """All values as plain data; of scenarios their digest."""
+        plain = {item.name: getattr(self, item.name) for item in fields(self)}
+        plain |= {"params": flatten(self.params), "sensor": flatten(self.sensor)}
+        scenarios = plain.pop("scenarios")
+        return plain if scenarios is None else {**plain, "scenarios": scenarios.digest()}
 
 
-def default_setting(suite_name: str) -> Setting:
-    """The setting of a suite without any option: its robot's speed. Raises ConfigError."""
-    return Setting(params=PlannerParams(speed_mps=suite(suite_name).speed_mps))
+def default_setting(suite_name: str, scenarios: ScenarioSet | None = None) -> Setting:
+    """The setting of a suite without any option: its robot's speed. Raises ConfigError.
+
+    In the user's own scenarios it is the robot of `mfba sim`.
+    """
+    if scenarios is None:
+        return Setting(params=PlannerParams(speed_mps=suite(suite_name).speed_mps))
+    params = PlannerParams(speed_mps=scenarios.suite().speed_mps)
+    return Setting(params=params, perception=OWN_ROBOT, scenarios=scenarios)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +152,17 @@ class SweepSpec:
         ):
             if not least <= value < 2**31:
                 raise ConfigError(f"{name}={value}: out of range; give at least {least}")
-        found = suite(self.suite, self.setting.suite_seed)
+        found = self.setting.suite(self.suite)
+        if found.count is not None and self.first + self.worlds > found.count:
+            raise ConfigError(
+                f"--first={self.first} --worlds={self.worlds}: {self.suite} has {found.count} "
+                "worlds, counted from 0; give fewer, or leave both out"
+            )
+        if self.setting.scenarios is not None and self.setting.suite_seed:
+            raise ConfigError(
+                f"--suite-seed={self.setting.suite_seed}: scenario files are not drawn from a "
+                "seed; leave it out"
+            )
         if found.distinct is not None and self.seeds > 1:
             raise ConfigError(
                 f"--seeds={self.seeds}: {self.suite} has {found.distinct} worlds, which --worlds "
@@ -160,7 +189,7 @@ class SweepSpec:
 
     def run_seeds(self, world: int) -> range:
         """Seeds of a world's runs."""
-        distinct = suite(self.suite, self.setting.suite_seed).distinct
+        distinct = self.setting.suite(self.suite).distinct
         first = 0 if distinct is None else world // distinct
         return range(first, first + self.seeds)
 

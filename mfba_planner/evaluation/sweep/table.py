@@ -15,10 +15,9 @@ from typing import Any
 from ...core.errors import ConfigError, OutputError
 from ...core.output_files import write_same
 from ..study.chunk import Columns
-from ..suites import suite
 from .sweep_chunks import OracleChunk, RunsChunk, gather
 from .sweep_spec import SweepSpec
-from .table_columns import COLUMNS, TIMINGS, Row, with_optimum
+from .table_columns import COLUMNS, SCENARIO, TIMINGS, Row, with_optimum
 
 Kinds = Mapping[str, tuple[type, str]]
 
@@ -29,15 +28,26 @@ def build(
     """Rows of the table and of the timings, sorted by suite, world, planner, seed."""
     runs, optima = gather(chunks, found)
     by_world = {row["world"]: row for row in optima}
-    worlds = suite(spec.suite, spec.setting.suite_seed)
+    worlds, kinds = spec.setting.suite(spec.suite), kinds_of(spec)
     rank = {name: k for k, name in enumerate(spec.planners)}
     runs.sort(key=lambda row: (row["world"], rank[row["planner"]], row["seed"]))
     speed = spec.setting.params.speed_mps
     rows = []
     for row in runs:
         optimum = by_world.get(worlds.world_number(row["world"])) if spec.oracle else None
-        rows.append(_columns_of(with_optimum(row, optimum, speed), COLUMNS))
+        row = {**row, **_scenario_name(spec, row["world"])}
+        rows.append(_columns_of(with_optimum(row, optimum, speed), kinds))
     return rows, [_columns_of(row, TIMINGS) for row in runs]
+
+
+def kinds_of(spec: SweepSpec) -> Kinds:
+    """The columns of the table: with the scenarios' names in a suite of files."""
+    return COLUMNS if spec.setting.scenarios is None else {**COLUMNS, **SCENARIO}
+
+
+def _scenario_name(spec: SweepSpec, world: int) -> Row:
+    scenarios = spec.setting.scenarios
+    return {} if scenarios is None else {"scenario": scenarios.names[world]}
 
 
 def _columns_of(row: Row, kinds: Kinds) -> Row:

@@ -69,6 +69,9 @@ _ORACLE: dict[str, tuple[type, str]] = {
 _FROM_MOTION = [field.name for field in fields(RunMotion) if field.name in _RUN]
 _FROM_RESULT = [field.name for field in fields(Result) if field.name in _RUN]
 COLUMNS = {**_KEY, **_RUN, **_ORACLE}
+SCENARIO: dict[str, tuple[type, str]] = {
+    "scenario": (str, "name of the scenario, in a suite of scenario files")
+}
 # Wall times differ from run to run, so these are in a separate table.
 TIMINGS: dict[str, tuple[type, str]] = {
     **_KEY,

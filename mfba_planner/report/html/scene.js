@@ -202,7 +202,7 @@ class Scene {
     this.moveTo(group, x, y);
     const first = indexAt(this.times, this.times[now] - BEHIND);
     const trail = line(obstacle.x, obstacle.y, this.keptOf[i], first, now);
-    set(this.trails[i], { d: `${trail}L${x} ${-y}` });
+    set(this.trails[i], { d: x === null ? "" : `${trail}L${x} ${-y}` }); // null: it is absent
     const [vx, vy] = [obstacle.vx[now], obstacle.vy[now]];
     const edge = obstacle.radius / (Math.hypot(vx, vy) || 1);
     set(motion, { d: this.arrow(edge * vx, edge * vy, AHEAD * vx, AHEAD * vy) });

@@ -68,8 +68,11 @@ def world_markers(world: World, stamp_ns: int, frame_id: str) -> MarkerArray:
     now = world.scenario.centers(world.time_s)
     later = world.scenario.centers(world.time_s + ARROW_S)
     for number, (obstacle, a, b) in enumerate(zip(world.scenario.obstacles, now, later)):
+        if math.isnan(a[0]):  # absent: take away what was drawn of it
+            marks += [_deleted(namespace, number) for namespace in ("obstacles", "velocities")]
+            continue
         marks.append(_disc("obstacles", number, a, obstacle.radius_m, GREY))
-        if a != b:
+        if a != b and not math.isnan(b[0]):
             marks.append(_arrow("velocities", number, [a, b], VERMILION))
     ends = [
         (x, y) for x0, y0, x1, y1 in world.scenario.segments_m for x, y in ((x0, y0), (x1, y1))
@@ -152,6 +155,10 @@ def _array(marks: list[Marker], stamp_ns: int, frame_id: str) -> MarkerArray:
     for mark in marks:
         mark.header = head
     return MarkerArray(markers=marks)
+
+
+def _deleted(namespace: str, number: int) -> Marker:
+    return Marker(ns=namespace, id=number, action=Marker.DELETE)
 
 
 def _disc(namespace: str, number: int, center: Point, radius: float, rgba: Rgba) -> Marker:
