@@ -47,6 +47,7 @@ setup(
     # Each has its line in docs/dependencies.md. rclpy and the messages are not here: a sourced
     # workspace brings its own, requirements-ros.txt the wheels.
     install_requires=[
+        "eikonalfm>=0.9.9",
         "matplotlib>=3.8",
         "mcap>=1.5",
         "mcap-ros2-support>=0.5.5",

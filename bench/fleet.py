@@ -21,7 +21,8 @@ from mfba_planner.evaluation.statistics import share_interval
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.algorithm_1 import Algorithm1
 from mfba_planner.planning.peers.orca import Orca
-from mfba_planner.planning.planner_params import PlannerParams
+from mfba_planner.planning.planner_factory import make_planner
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive_planner import Predictive, PredictiveParams, preset
 from mfba_planner.planning.trajectory_cost import RiskParams
 from mfba_planner.simulation.episode import Outcome
@@ -32,7 +33,7 @@ from mfba_planner.simulation.planner_observations import (
     observe_scan,
     observe_sectors,
 )
-from mfba_planner.simulation.robot_model import Lidar, Robot
+from mfba_planner.simulation.robot_model import DEFAULT_BEAMS, Lidar, Robot
 from mfba_planner.simulation.scenario import FleetRobot, Scenario
 
 JITTER_DEG = 8.0  # of 36 between two robots
@@ -76,6 +77,10 @@ def _predictive(params: PlannerParams, sensor: SensorParams) -> MakePlanner:
     return lambda seed: Predictive(params, sensor, seed)
 
 
+def _as_run(params: PlannerParams, sensor: SensorParams) -> MakePlanner:
+    return lambda seed: make_planner(params, sensor, seed)
+
+
 def _wide(params: PlannerParams, sensor: SensorParams) -> MakePlanner:
     return lambda seed: Predictive(params, sensor, seed, WIDE)
 
@@ -87,7 +92,7 @@ def _orca(params: PlannerParams, sensor: SensorParams) -> MakePlanner:
 # Robots of a fleet do not keep their velocities: pass them at 0.2 m rather than at 0.015 m.
 WIDE = PredictiveParams(risk=RiskParams(margin_m=0.2, close_m=3.0))
 FAR = SensorParams(sensing_range_m=3.0)
-LIDAR = Robot(lidar=Lidar(beams=360))
+LIDAR = Robot(lidar=Lidar(beams=DEFAULT_BEAMS))
 
 
 def _known() -> Observe:
@@ -95,6 +100,12 @@ def _known() -> Observe:
 
 
 CONFIGURATIONS: dict[str, Configuration] = {
+    "predictive, lidar (mfba sim swap)": Configuration(
+        planner=preset(PlannerParams(method=Method.PREDICTIVE)),
+        robot=LIDAR,
+        make=_as_run,
+        observe=lambda: observe_scan,
+    ),
     "paper, sectors": Configuration(planner=PlannerParams(), make=_paper),
     "paper, sectors, step 0.08 m": Configuration(
         planner=replace(PlannerParams(), step_length_m=0.08), make=_paper
@@ -107,12 +118,6 @@ CONFIGURATIONS: dict[str, Configuration] = {
         planner=preset(), sensor=FAR, make=_predictive, observe=_known
     ),
     "predictive, known, wide berth": Configuration(planner=preset(), make=_wide, observe=_known),
-    "predictive, lidar, tracked": Configuration(
-        planner=preset(),
-        robot=LIDAR,
-        make=_predictive,
-        observe=lambda: observe_scan,
-    ),
     "orca, known within 3 m": Configuration(
         planner=preset(), sensor=FAR, make=_orca, observe=_known
     ),

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors of the obstacle tracker against ground truth, and its time.
+"""Errors of the obstacle tracker against ground truth, its time, and its memory.
 
-Run: python bench/tracking.py [--seeds N] [--only TEXT]. Each row is a set of scenes of 3 s: a
+Run: python bench/tracking.py [--seeds N] [--only TEXT], or --memory TICKS for the memory of a
+process that simulates, tracks and decides for so many ticks. Each row is a set of scenes of 3 s: a
 robot at 0.8 m/s, a lidar of 10 m, a scan every 0.1 s, ten discs within 1 to 6 m that keep their
 velocities and do not overlap. The first 0.5 s of every disc in view count only for the delay.
 Position and radius are compared relative to the pose that the tracker was given. The circles'
@@ -13,20 +14,29 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import statistics
 import time
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner_types import Circle, Observation
+from mfba_planner.core.planner_types import Circle, Mode, Observation
+from mfba_planner.evaluation.suites.named_suites import suite
 from mfba_planner.perception.obstacle_tracker import Tracker
 from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.differential_drive import command
+from mfba_planner.planning.planner_factory import make_planner
+from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive_planner import Predictive, preset
+from mfba_planner.simulation.lidar_perception import with_lidar
+from mfba_planner.simulation.planner_observations import observe_scan
 from mfba_planner.simulation.robot_model import Lidar
 from mfba_planner.simulation.simulated_lidar import cast_rays, scan_at
+from mfba_planner.simulation.world import World
 
 TICK_S = 0.1
 TICK_NS = 100_000_000
@@ -34,6 +44,7 @@ TICKS = 30
 SETTLED = 5  # scans in view after which errors count
 ROBOT_MPS = 0.8
 REACH_M = 10.0
+MEMORY_WORLD, LONGEST_TRIP = 70000, 1000  # ticks
 
 
 @dataclass(frozen=True)
@@ -261,13 +272,39 @@ def timing(rounds: int) -> None:
         print(f"| {name} | {1e6 * median:.1f} | {1e6 * late:.1f} | {median / floor:.0f} |")
 
 
+def memory(ticks: int) -> None:
+    """Print the resident memory of a trip to and fro through a crowd, ten times."""
+    scenario = with_lidar(suite("random-20").world(MEMORY_WORLD), "lidar")
+    params = scenario.planner_params(
+        preset(PlannerParams(method=Method.PREDICTIVE, speed_mps=ROBOT_MPS))
+    )
+    planner, sensor = make_planner(params), SensorParams()
+    world = World(scenario, params.tick_ns, params.goal_tolerance_m)
+    goals, arrived, since = [scenario.goal_m, scenario.start_m], 0, 0
+    print("\n| tick | MB | trips |\n|---|---|---|")
+    for tick in range(1, ticks + 1):
+        decision = planner.plan(replace(observe_scan(world, sensor), goal=goals[0]))
+        if decision.mode is Mode.ARRIVED or tick - since > LONGEST_TRIP:
+            arrived, since = arrived + (decision.mode is Mode.ARRIVED), tick
+            goals.reverse()
+        world.step(command(decision, scenario.robot, params.tick_ns))
+        if tick % (ticks // 10) == 0:
+            pages = int(Path("/proc/self/statm").read_text().split()[1])
+            megabytes = 1e-6 * pages * os.sysconf("SC_PAGE_SIZE")
+            print(f"| {tick} | {megabytes:.2f} | {arrived} |", flush=True)
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seeds", type=int, default=40)
     parser.add_argument("--only", default="", help="rows whose name holds this")
     parser.add_argument("--rounds", type=int, default=20, help="of the timing; 0: none")
+    parser.add_argument("--memory", type=int, default=0, metavar="TICKS", help="only memory")
     found = parser.parse_args()
+    if found.memory:
+        memory(found.memory)
+        return
     table(found.seeds, found.only)
     if found.rounds:
         timing(found.rounds)

@@ -17,9 +17,8 @@ from .scan_beams import Beams
 
 Array = np.ndarray
 
-_LAGS_S = (0.6, 0.25)  # ages of the scans that are compared, the nearest above
+_LAGS_S = (0.6, 0.25)  # ages of the scans that are compared, or the next older
 _EVERY_S = 0.09  # scans nearer in time to the last one kept are not kept
-_KEPT = 9
 _MARGIN_M = 0.08
 _WIDEST_SPACING_M = 0.12  # between beams farther apart nothing is judged
 
@@ -40,23 +39,29 @@ class _Past:
         dx, dy = x - self._x, y - self._y
         d = np.sqrt(dx * dx + dy * dy)
         index = beams.index_of(np.arctan2(dy, dx) + self._turn)
-        inside = (index >= 0) & (index < beams.count)
-        clear = self._clear()[np.where(inside, index, 0)]
-        judged = inside & (d * beams.spacing_rad <= _WIDEST_SPACING_M)
-        passed: Array = judged & (clear > d + margin_m)
+        passed: Array = d * beams.spacing_rad <= _WIDEST_SPACING_M
+        if not beams.turns:
+            inside = index < beams.count
+            passed &= inside
+            index *= inside
+        d += margin_m
+        passed &= self._clear().take(index) > d
         return passed
 
     def _clear(self) -> Array:
         """Free length (count,) of each beam and those beside it."""
         if self._clear_m is None:
             beams = self._beams
-            clear = np.zeros(beams.count)
-            clear[beams.number] = np.minimum(beams.range_m, beams.longest_m)
+            reach = np.minimum(beams.range_m, beams.longest_m)
+            clear = reach
+            if reach.size < beams.count:
+                clear = np.zeros(beams.count)
+                clear[beams.number] = reach
             beside = 1 + math.floor(2.0 * self._turn_sd / beams.spacing_rad)
+            around = np.concatenate((clear[-beside:], clear, clear[:beside]))
             least = clear.copy()
-            for k in range(1, beside + 1):
-                for shifted in (np.roll(clear, k), np.roll(clear, -k)):
-                    np.minimum(least, shifted, out=least)
+            for k in range(2 * beside + 1):
+                np.minimum(least, around[k : k + clear.size], out=least)
             if not beams.turns:
                 least[:beside] = least[least.size - beside :] = 0.0
             self._clear_m = least
@@ -66,9 +71,10 @@ class _Past:
 class FreeSpace:
     """The last scans, as free lengths along their beams."""
 
-    def __init__(self) -> None:
-        """Start without scans."""
-        self._past: deque[_Past] = deque(maxlen=_KEPT)
+    def __init__(self, lags_s: tuple[float, ...] = _LAGS_S, margin_m: float = _MARGIN_M) -> None:
+        """Start without scans; the lags are the ages of the scans that are compared."""
+        self._lags_s, self._margin_m = lags_s, margin_m
+        self._past: deque[_Past] = deque(maxlen=math.ceil(max(lags_s) / _EVERY_S) + 2)
 
     def clear(self) -> None:
         """Drop all scans."""
@@ -88,13 +94,13 @@ class FreeSpace:
         """Whether each point (k,) lies where a past scan saw farther on."""
         found = np.zeros(x.size, dtype=bool)
         for past in self._compared():
-            found |= past.passed(x, y, _MARGIN_M + noise_m)
+            found |= past.passed(x, y, self._margin_m + noise_m)
         return found
 
     def _compared(self) -> list[_Past]:
         """For each lag the newest scan at least so old, or else the oldest."""
         chosen: list[_Past] = []
-        for lag in _LAGS_S:
+        for lag in self._lags_s:
             older = [past for past in self._past if past.age_s >= lag - 0.5 * _EVERY_S]
             candidate = older[-1] if older else (self._past[0] if self._past else None)
             if candidate is not None and candidate not in chosen:

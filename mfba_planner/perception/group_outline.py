@@ -22,7 +22,7 @@ class Outline:
     """What the fit needs of each group of segments."""
 
     returns: Returns
-    start: Array  # (g, 3)
+    start: Array  # (3, g)
     width_m: Array  # (g,) between the outermost returns
     whole: Array  # (g,) both edges are sure
     half: Array  # (g,) at least one is
@@ -41,45 +41,44 @@ def outline_of(
     highest[group] = order
     ends = np.concatenate((found.first[lowest], found.last[highest]))
     gap = np.concatenate((found.right_gap_rad[lowest], found.left_gap_rad[highest]))
-    side = np.concatenate((np.full(groups, -1.0), np.full(groups, 1.0)))  # right, left
-    beam = found.beam[ends]
-    x, y = beams.origin_x[beam], beams.origin_y[beam]
+    beam = found.beam.take(ends)
+    places = np.array((beams.origin_x.take(beam), beams.origin_y.take(beam)))
     # The tangent lies in the middle of the gap; turned exactly, by half the tangent of the half.
-    t = 0.25 * side * gap
+    t = 0.25 * gap
+    t[:groups] *= -1.0
     scale = 1.0 / (1.0 + t * t)
     turn_cos, turn_sin = (1.0 - t * t) * scale, 2.0 * t * scale
-    cos, sin = beams.cos[beam], beams.sin[beam]
-    cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
+    cos, sin = beams.cos.take(beam), beams.sin.take(beam)
+    directions = np.array((cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin))
+    right, left = directions[:, :groups], directions[:, groups:]
+    normals = np.concatenate((right[::-1], left[::-1]), axis=1)
+    normals[1, :groups] *= -1.0
+    normals[0, groups:] *= -1.0
     sure = gap > 0.0
     edges = sure.nonzero()[0]
-    of_return = group[found.segment]
-    outward = side[edges]
+    of_return = group.take(found.segment)
     returns = Returns(
-        x=found.x,
-        y=found.y,
+        xy=found.xy,
         group=of_return,
-        edge_x=x[edges],
-        edge_y=y[edges],
-        normal_x=-outward * sin[edges],
-        normal_y=outward * cos[edges],
-        edge_gap_m=(gap * found.range_m[ends])[edges],
+        edge_xy=places.take(edges, axis=1),
+        normal=normals.take(edges, axis=1),
+        edge_gap_m=(gap * found.range_m.take(ends)).take(edges),
         edge_group=edges % groups,
         count=np.bincount(of_return, minlength=groups).astype(np.float64),
     )
     nearest = np.full(groups, np.inf)
     np.minimum.at(nearest, group, np.minimum.reduceat(found.range_m, found.first))
-    directions = np.array((cos, sin)).T
-    origin = 0.5 * np.array((x[:groups] + x[groups:], y[:groups] + y[groups:])).T
+    origin = places[:, :groups] + places[:, groups:]
+    origin *= 0.5
     whole = sure[:groups] & sure[groups:]
-    end_x, end_y, time_s = found.x[ends], found.y[ends], beams.time_s[beam]
-    dx, dy = end_x[groups:] - end_x[:groups], end_y[groups:] - end_y[:groups]
-    right, left = directions[:groups], directions[groups:]
+    outermost, time_s = found.xy.take(ends, axis=1), beams.time_s.take(beam)
+    dx, dy = outermost[:, groups:] - outermost[:, :groups]
     return Outline(
         returns=returns,
         start=start_of(origin, nearest, right, left, whole, radius_m),
         width_m=np.sqrt(dx * dx + dy * dy),
         whole=whole,
-        alone=found.alone[lowest] & found.alone[highest],
+        alone=found.alone.take(lowest) & found.alone.take(highest),
         half=sure[:groups] | sure[groups:],
         time_s=0.5 * (time_s[:groups] + time_s[groups:]),
     )
@@ -90,7 +89,7 @@ def thinned(found: Segments, wall: Array) -> list[Point]:
     index = np.flatnonzero(wall)
     if not index.size:
         return []
-    x, y, of = found.x[index], found.y[index], found.segment[index]
+    (x, y), of = found.xy[:, index], found.segment[index]
     step = np.zeros(index.size)
     step[1:] = np.sqrt((x[1:] - x[:-1]) ** 2 + (y[1:] - y[:-1]) ** 2)
     along = np.floor(np.cumsum(step) / _POINT_SPACING_M)

@@ -42,7 +42,7 @@ class Beams:
         """Number of the beam nearest to each bearing; outside the scan's angles it is beyond."""
         turn = 2.0 * math.pi
         off = np.remainder(bearing_rad - self.angle_min_rad + 0.5 * self.spacing_rad, turn)
-        index: Array = np.floor(off / self.spacing_rad).astype(np.int64)
+        index: Array = (off / self.spacing_rad).astype(np.int64)
         return index % self.count if self.turns else index
 
 
@@ -52,7 +52,9 @@ class BeamReader:
     def __init__(self) -> None:
         """Start without directions."""
         self._key: tuple[int, float] = (0, 0.0)
-        self._cos, self._sin = np.empty(0), np.empty(0)
+        self._cos, self._sin, self._all = np.empty(0), np.empty(0), np.empty(0, dtype=np.int64)
+        self._first: float | None = None  # direction of the first beam in odom, of these:
+        self._turned = self._cos, self._sin
 
     def read(self, pose: Pose2D, velocity: tuple[float, float, float], scan: Scan) -> Beams:
         """The beams of a scan in a frame aligned with odom, whose origin is at the pose.
@@ -66,15 +68,24 @@ class BeamReader:
             angles = [k * step for k in range(count)]
             self._cos = np.array([math.cos(a) for a in angles])
             self._sin = np.array([math.sin(a) for a in angles])
-            self._key = (count, step)
-        number = np.flatnonzero(usable_beams(scan))
-        reach = np.where(np.isneginf(r), scan.range_min_m, r)[number]
-        c0, s0 = math.cos(scan.angle_min_rad), math.sin(scan.angle_min_rad)
-        base_c, base_s = self._cos[number], self._sin[number]
-        c, s = c0 * base_c - s0 * base_s, s0 * base_c + c0 * base_s
-        time_s = number * scan.time_increment_s
-        x, y = np.full(number.size, pose.x), np.full(number.size, pose.y)
+            self._all = np.arange(count)
+            self._key, self._first = (count, step), None
+        if scan.angle_min_rad != self._first:  # a robot that does not turn keeps it
+            self._first = scan.angle_min_rad
+            c0, s0 = math.cos(self._first), math.sin(self._first)
+            self._turned = c0 * self._cos - s0 * self._sin, s0 * self._cos + c0 * self._sin
+        number, (c, s) = self._all, self._turned
+        usable = usable_beams(scan)
+        if not usable.all():
+            number = usable.nonzero()[0]
+            r, c, s = r[number], c[number], s[number]
+        reach = np.maximum(r, scan.range_min_m)  # -inf is nearer than that
+        k = number.size
+        x: Array = np.full(k, pose.x)
+        y: Array = np.full(k, pose.y)
+        time_s: Array = np.zeros(k)
         if scan.time_increment_s:
+            time_s = number * scan.time_increment_s
             vx, vy, wz = velocity
             turned = wz * time_s
             ct, st = 1.0 - 0.5 * turned * turned, turned * (1.0 - turned * turned / 6.0)

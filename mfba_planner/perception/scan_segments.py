@@ -30,8 +30,7 @@ class Segments:
     edge is sure if the beam beside it went on for at least 0.1 m: there the surface ends.
     """
 
-    x: Array  # (k,) m, returns in odom
-    y: Array
+    xy: Array  # (2, k) m, returns in odom
     beam: Array  # (k,) index in Beams
     range_m: Array  # (k,) m
     segment: Array  # (k,) int, ascending
@@ -50,14 +49,13 @@ class Segments:
 def no_segments() -> Segments:
     """Of a scan without returns."""
     none, empty = np.empty(0, dtype=np.int64), np.empty(0)
-    return Segments(empty, empty, none, empty, none, none, none, empty, empty, none > 0)
+    return Segments(np.empty((2, 0)), none, empty, none, none, none, empty, empty, none > 0)
 
 
 def segments(
     beams: Beams,
     taken: Array,
-    x: Array,
-    y: Array,
+    xy: Array,
     label: Array,
     known: Array,
     join_m: float,
@@ -65,35 +63,41 @@ def segments(
 ) -> Segments:
     """Cut the returns of a scan.
 
-    taken (k,) are the indices of beams with a return, from taken_from_a_gap(), and x, y where
-    they are. label (k,) is the number of the obstacle at which a return is expected, or -1:
-    where it changes from one obstacle to another there is a cut, and where it changes to none
-    from one whose outline is known (m,): something else begins there.
+    taken (k,) are the indices of beams with a return, from taken_from_a_gap(), and xy (2, k)
+    where they are. label (k,) is the number of the obstacle at which a return is expected, or
+    -1: where it changes from one obstacle to another there is a cut, and where it changes to
+    none from one whose outline is known (m,): something else begins there.
     """
     if not taken.size:
         return no_segments()
-    r = beams.range_m[taken]
-    dx, dy = x[1:] - x[:-1], y[1:] - y[:-1]
-    lower = np.minimum(r[1:], r[:-1])
-    lower *= _JOIN_SPACINGS * beams.spacing_rad
-    limit = np.maximum(np.minimum(lower, _JOIN_MOST_M), join_m)
-    number = beams.number[taken]
-    missing = (number[1:] - number[:-1]) % beams.count
-    cut = dx * dx + dy * dy > limit * limit
-    cut |= (taken[1:] - taken[:-1]) % beams.range_m.size != 1
-    cut |= missing > _MOST_MISSING
+    r = beams.range_m.take(taken)
+    squares = xy[:, 1:] - xy[:, :-1]
+    squares *= squares
+    limit = np.minimum(r[1:], r[:-1])
+    limit *= _JOIN_SPACINGS * beams.spacing_rad
+    np.minimum(limit, _JOIN_MOST_M, out=limit)
+    np.maximum(limit, join_m, out=limit)
+    limit *= limit
+    cut = squares[0] + squares[1] > limit
+    size = beams.range_m.size
+    step = taken[1:] - taken[:-1]
+    cut |= (step != 1) & (step != 1 - size)  # with something between that met nothing
+    if size < beams.count:
+        number = beams.number.take(taken)
+        cut |= (number[1:] - number[:-1]) % beams.count > _MOST_MISSING
     if known.size:
         one, other = label[1:], label[:-1]
         surely = known[np.maximum(one, other)]  # of the obstacle, if the other is none
         cut |= (one != other) & ((np.minimum(one, other) >= 0) | surely)
     _cut_at_humps(r, cut, hump_m)
-    last = np.concatenate((cut.nonzero()[0], [r.size - 1]))
-    first = np.concatenate(([0], last[:-1] + 1))
+    ends = cut.nonzero()[0]
+    first, last = np.zeros((2, ends.size + 1), dtype=np.int64)
+    last[:-1], last[-1] = ends, r.size - 1
+    np.add(ends, 1, out=first[1:])
     segment = np.zeros(r.size, dtype=np.int64)
-    segment[first[1:]] = 1
-    segment = np.cumsum(segment)
+    np.add.accumulate(cut, dtype=np.int64, out=segment[1:])
     right, left, alone = _edges(beams, taken, first, last)
-    return Segments(x, y, taken, r, segment, first, last, right, left, alone)
+    return Segments(xy, taken, r, segment, first, last, right, left, alone)
 
 
 def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
@@ -106,12 +110,18 @@ def _cut_at_humps(r: Array, cut: Array, hump_m: float) -> None:
         return
     joined = ~cut
     smooth = r.copy()  # the mean of three, where all are of one segment
-    inner = joined[1:] & joined[:-1]
-    smooth[1:-1] = np.where(inner, (r[:-2] + r[1:-1] + r[2:]) / 3.0, r[1:-1])
+    mean = r[:-2] + r[1:-1]
+    mean += r[2:]
+    mean /= 3.0
+    np.copyto(smooth[1:-1], mean, where=joined[1:] & joined[:-1])
+    offset = np.zeros(r.size)
     for _ in range(_PASSES):
-        offset = np.concatenate(([0.0], np.cumsum(cut) * _APART))
-        before = np.minimum.accumulate(smooth - offset) + offset
-        after = (np.minimum.accumulate((smooth + offset)[::-1]))[::-1] - offset
+        np.add.accumulate(cut, dtype=np.float64, out=offset[1:])
+        offset *= _APART
+        before = np.minimum.accumulate(smooth - offset)
+        before += offset
+        after = np.minimum.accumulate((smooth + offset)[::-1])[::-1]
+        after -= offset
         height = smooth - np.maximum(before, after)
         high = (height > hump_m).nonzero()[0]
         if not high.size:
@@ -135,21 +145,25 @@ def _edges(beams: Beams, taken: Array, first: Array, last: Array) -> tuple[Array
     And whether both of these beams went on far behind.
     """
     size, n = beams.range_m.size, first.size
-    index = taken[np.concatenate((first, last))]
-    step = np.concatenate((np.full(n, -1), np.full(n, 1)))
-    beside = index + step
-    r = beams.range_m[index]
+    index = taken.take(np.concatenate((first, last)))
+    beside = index + 1
+    beside[:n] -= 2
+    r = beams.range_m.take(index)
     wrapped = beside % size
-    gap = ((beams.number[wrapped] - beams.number[index]) * step) % beams.count
+    behind = beams.range_m.take(wrapped)
+    behind -= r
+    gap = beams.number.take(wrapped)
+    gap -= beams.number.take(index)
+    gap[:n] *= -1
+    gap %= beams.count
     angle = gap * beams.spacing_rad
-    behind = beams.range_m[wrapped] - r
     sure = (behind > _EDGE_STEP_M) & (r < beams.longest_m - _LIMIT_M)
     sure &= angle < 0.5 * math.pi
     if not beams.turns:
         sure &= beside == wrapped
-    angle[~sure] = 0.0
-    far = sure & (behind > _ALONE_M)
-    return angle[:n], angle[n:], far[:n] & far[n:]
+    angle *= sure
+    sure &= behind > _ALONE_M
+    return angle[:n], angle[n:], sure[:n] & sure[n:]
 
 
 def taken_from_a_gap(beams: Beams) -> Array:
@@ -163,9 +177,8 @@ def taken_from_a_gap(beams: Beams) -> Array:
     if not beams.turns or taken.size < 2:
         return taken
     if taken.size < hit.size:
-        start = int(np.argmin(hit))
+        start = int(hit.argmin())  # all before it have a return, so it is a place in taken too
     else:
         r = beams.range_m
-        start = (int(np.argmax(np.abs(r[1:] - r[:-1]))) + 1) if r.size > 1 else 0
-    k = int(np.searchsorted(taken, start))
-    return np.concatenate((taken[k:], taken[:k])) if 0 < k < taken.size else taken
+        start = int(np.abs(r[1:] - r[:-1]).argmax()) + 1
+    return np.concatenate((taken[start:], taken[:start])) if 0 < start < taken.size else taken

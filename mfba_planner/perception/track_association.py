@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.geometry import Point
 from .scan_segments import Segments
+from .track_bank import RADIUS
 
 Array = np.ndarray
 
@@ -15,19 +17,26 @@ _ALONG_WEIGHT = 0.3  # of the distance between the middles, beside that from the
 _ON_CIRCLE_M = 0.1  # returns so near to a circle's surface are its own
 
 
-def expected_labels(x: Array, y: Array, state: Array, tolerance_m: Array) -> tuple[Array, Array]:
-    """Track (k,) on whose predicted surface each point (k,) lies, or -1; and distances (k, m)."""
-    if not state.shape[0] or not x.size:
-        return np.full(x.size, NONE), np.empty((x.size, state.shape[0]))
-    dx, dy = x[:, None] - state[:, 0], y[:, None] - state[:, 1]
-    off = np.abs(np.sqrt(dx * dx + dy * dy) - state[:, 4])
+def expected_labels(xy: Array, state: Array, tolerance_m: Array) -> tuple[Array, Array]:
+    """Track (k,) on whose predicted surface each of k points lies, or -1; distances (k, m)."""
+    (x, y), m = xy, state.shape[1]
+    if not m or not x.size:
+        return np.full(x.size, NONE), np.empty((x.size, m))
+    off, dy = x[:, None] - state[0], y[:, None] - state[1]
+    off *= off
+    dy *= dy
+    off += dy
+    np.sqrt(off, out=off)
+    off -= state[RADIUS]
+    np.abs(off, out=off)
     label = off.argmin(axis=1)
-    least = off[np.arange(x.size), label]
-    return np.where(least <= tolerance_m[label], label, NONE), off
+    least = off.ravel().take(label + m * np.arange(x.size))
+    label[least > tolerance_m.take(label)] = NONE
+    return label, off
 
 
 def associate(
-    found: Segments, off: Array, origin: Array, state: Array, sd_m: Array, gate_m: Array
+    found: Segments, off: Array, origin: Point, state: Array, sd_m: Array, gate_m: Array
 ) -> Array:
     """Track of each segment (n,), or -1. Each track gets at most one segment at first.
 
@@ -36,30 +45,26 @@ def associate(
     from the middle of the visible side. Then segments wholly on a track's circle, as when
     something thin stands before it, go to that track as well.
     """
-    n, m = found.count, state.shape[0]
+    n, m = found.count, state.shape[1]
     track = np.full(n, NONE)
     if not (n and m):
         return track
     middle = (found.first + found.last) // 2
-    dx, dy = state[:, 0] - origin[0], state[:, 1] - origin[1]
+    dx, dy = state[0] - origin[0], state[1] - origin[1]
     d = np.sqrt(dx * dx + dy * dy) + 1e-9
-    share = np.maximum(d - state[:, 4], 0.0) / d
-    fx = found.x[middle][:, None] - (origin[0] + dx * share)
-    fy = found.y[middle][:, None] - (origin[1] + dy * share)
-    cost = off[middle] + _ALONG_WEIGHT * np.sqrt(fx * fx + fy * fy)
-    gate = gate_m + _GATE_PER_RADIUS * np.minimum(state[:, 4], 1.0) + 2.0 * sd_m
-    cost[cost > gate] = np.inf
-    for _ in range(min(n, m)):
-        of_segment = cost.argmin(axis=1)  # nearest track of each segment
-        least = cost[np.arange(n), of_segment]
-        of_track = cost.argmin(axis=0)
-        mutual = np.flatnonzero((of_track[of_segment] == np.arange(n)) & np.isfinite(least))
-        if not mutual.size:
-            break
-        track[mutual] = of_segment[mutual]
-        cost[mutual] = np.inf
-        cost[:, of_segment[mutual]] = np.inf
-    rest = np.flatnonzero(track == NONE)
+    share = np.maximum(d - state[RADIUS], 0.0) / d
+    x, y = found.xy.take(middle, axis=1)
+    fx = x[:, None] - (origin[0] + dx * share)
+    fy = y[:, None] - (origin[1] + dy * share)
+    cost = off.take(middle, axis=0) + _ALONG_WEIGHT * np.sqrt(fx * fx + fy * fy)
+    gate = gate_m + _GATE_PER_RADIUS * np.minimum(state[RADIUS], 1.0) + 2.0 * sd_m
+    near = (cost <= gate).nonzero()
+    taken: set[int] = set()
+    for _, segment, of in sorted(zip(cost[near].tolist(), *(pair.tolist() for pair in near))):
+        if of not in taken and track[segment] == NONE:
+            track[segment] = of
+            taken.add(of)
+    rest = (track == NONE).nonzero()[0]
     if rest.size:
         worst = np.maximum.reduceat(off, found.first, axis=0)[rest]
         nearest = worst.argmin(axis=1)

@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..core.geometry import Point
 from .circle_fit import Fit
 from .group_outline import Outline
 from .scan_beams import Beams
-from .track_association import NONE
 from .track_bank import RADIUS, VX, VY, TrackBank
 from .tracking_params import TrackingParams
 
@@ -49,14 +49,15 @@ def judge_motion(
     """
     if not index.size:
         return
-    v = bank.state[index, 2:4]
-    speed2 = v[:, 0] ** 2 + v[:, 1] ** 2
-    P = bank.covariance[index]
-    variance = 0.5 * (P[:, VX, VX] + P[:, VY, VY])
+    squares = bank.state[VX:].take(index, axis=1) ** 2
+    speed2 = squares[0] + squares[1]
+    P = bank.covariance
+    variance = 0.5 * (P[VX, VX] + P[VY, VY])[index]
     significance = speed2 / variance
     moving = bank.moving[index]
     fast = speed2 > _LEAST_SPEED**2
-    begins = ~moving & (significance > _MOVES) & fast & (speed2 < _MOST_SPEED**2)
+    fast &= speed2 < _MOST_SPEED**2
+    begins = ~moving & (significance > _MOVES) & fast
     round_ = fitted.rms_m[group] < 0.02 + 2.0 * noise_m
     surely = (significance > _SURELY_MOVES) & outline.half[group]
     clean = round_ & (outline.whole[group] | surely)
@@ -68,7 +69,7 @@ def judge_motion(
     believed = lasts | (bank.appeared_s[index] < _APPEARED_S)
     # What has just turned moves on, though its velocity is not known well.
     still = (significance > _RESTS) | (variance > _UNKNOWN_SPEED_SD**2)
-    moving = np.where(moving, still & fast & (speed2 < _MOST_SPEED**2), begins & believed)
+    moving = np.where(moving, still & fast, begins & believed)
     bank.moving[index] = moving
 
 
@@ -76,14 +77,14 @@ def _look_for_free_space(
     bank: TrackBank, index: Array, group: Array, outline: Outline, appeared: Appeared
 ) -> None:
     returns = outline.returns
-    position = np.full(outline.start.shape[0], NONE)
-    position[group] = np.arange(group.size)
-    of = position[returns.group]
-    chosen = of != NONE
-    found = appeared(returns.x[chosen], returns.y[chosen])
-    share = np.bincount(of[chosen], found, group.size)
-    total = np.bincount(of[chosen], minlength=group.size)
-    bank.appeared_s[index[share >= np.maximum(0.3 * total, 1.0)]] = 0.0
+    chosen = np.zeros(returns.count.size, dtype=bool)
+    chosen[group] = True
+    index_of_return = chosen.take(returns.group).nonzero()[0]
+    x, y = returns.xy.take(index_of_return, axis=1)
+    found = np.bincount(returns.group.take(index_of_return), appeared(x, y), returns.count.size)[
+        group
+    ]
+    bank.appeared_s[index[found >= np.maximum(0.3 * returns.count[group], 1.0)]] = 0.0
 
 
 def fragments(group: Array, fitted: Fit, outline: Outline, wall: Array, noise_m: float) -> Array:
@@ -93,9 +94,9 @@ def fragments(group: Array, fitted: Fit, outline: Outline, wall: Array, noise_m:
     large = (~wall & (returns.count > 2.0)).nonzero()[0]
     if not (small.any() and large.size):
         return np.zeros(group.size, dtype=bool)
-    z = fitted.z[large]
-    dx, dy = returns.x[:, None] - z[:, 0], returns.y[:, None] - z[:, 1]
-    limit = z[:, 2] + _FRAGMENT_M + 2.0 * noise_m
+    x, y, r = fitted.z[:, large]
+    dx, dy = returns.xy[0, :, None] - x, returns.xy[1, :, None] - y
+    limit = r + _FRAGMENT_M + 2.0 * noise_m
     inside = (dx * dx + dy * dy < limit * limit).any(axis=1)
     outside = np.bincount(returns.group, ~inside, returns.count.size)
     fragment: Array = small & (outside[group] == 0.0)
@@ -105,7 +106,7 @@ def fragments(group: Array, fitted: Fit, outline: Outline, wall: Array, noise_m:
 def drop_lost(
     bank: TrackBank,
     beams: Beams,
-    origin: Array,
+    origin: Point,
     updated: Array,
     pose_sd_m: Array,
     params: TrackingParams,
@@ -114,19 +115,19 @@ def drop_lost(
     p = params
     unseen = np.zeros(bank.count, dtype=bool)
     unseen[: updated.size] = ~updated
-    index = np.flatnonzero(unseen)
+    index = unseen.nonzero()[0]
     if not index.size:
         return
-    state = bank.state[index]
-    dx, dy = state[:, 0] - origin[0], state[:, 1] - origin[1]
+    x, y = bank.state[:2, index]
+    dx, dy = x - origin[0], y - origin[1]
     bank.missed[index] += _beams_through(bank, beams, index, dx, dy, pose_sd_m[index])
-    other = bank.state[~unseen]
-    ox, oy = state[:, 0, None] - other[:, 0], state[:, 1, None] - other[:, 1]
-    covered = np.any(ox * ox + oy * oy < other[:, RADIUS] ** 2, axis=1)
+    other_x, other_y, other_r = bank.state[:VX, ~unseen]
+    ox, oy = x[:, None] - other_x, y[:, None] - other_y
+    covered = (ox * ox + oy * oy < other_r**2).any(axis=1)
     longest = np.where(bank.moving[index], p.forget_s, p.forget_standing_s)
     longest = np.minimum(longest, _NEW_S + 2.0 * bank.known_s[index])
-    P = bank.covariance[index]
-    lost = bank.moving[index] & (P[:, 0, 0] + P[:, 1, 1] > _LOST_VARIANCE)
+    P = bank.covariance
+    lost = bank.moving[index] & ((P[0, 0] + P[1, 1])[index] > _LOST_VARIANCE)
     few = bank.scans[index] < 3
     gone = (bank.missed[index] >= np.where(few, 1, _MOST_MISSED)) | covered | lost
     gone |= bank.unseen_s[index] > longest
@@ -152,7 +153,7 @@ def _beams_through(
     reach = np.zeros(beams.count)
     reach[beams.number] = np.minimum(beams.range_m, beams.longest_m)
     margin = _SEES_PAST_M + 2.0 * np.minimum(bank.position_sd_m[index], 0.15)
-    middle = _MIDDLE_SHARE * bank.state[index, RADIUS] - pose_sd_m
+    middle = _MIDDLE_SHARE * bank.state[RADIUS, index] - pose_sd_m
     any_beam, all_pass = np.zeros(index.size, dtype=bool), inside
     for beside in (-1, 0, 1):
         met = np.abs(off - beside * beams.spacing_rad) * d < middle

@@ -4,16 +4,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
 from ..core.planner_types import NANO, Bits, Decision, Mode, Observation
+from ..perception.near_returns import blind_ring, near_at_contact
 from ..perception.sensory_vector import SensorParams
 from .mode_transitions import Event, transition
 from .odometry_jump import OdometryJump, with_odometry_jump
 from .planner_params import PlannerParams
 from .stop_conditions import reason_to_stop
+from .stopping_distance import too_fast_for_lidar
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +66,10 @@ class BasePlanner:
         self._goal: Point | None = None
         self.forget()
 
+    def replan(self) -> None:
+        """Begin anew in the same surroundings, as the robot has made no progress."""
+        self.reset()
+
     def forget(self) -> None:
         """Drop the state of a subclass."""
 
@@ -73,13 +79,14 @@ class BasePlanner:
 
     def plan(self, obs: Observation) -> Decision:
         """Decide on one observation and update the mode; after an odometry jump, reset first."""
+        obs = _with_near_at_contact(obs, self.params.robot_radius_m)
         odometry_jump_reason = self._odometry_jump.detect(obs, self.params, self.mode)
         if odometry_jump_reason:
             self.reset()
         if obs.goal != self._goal:
             self.mode = transition(self.mode, Event.NEW_GOAL)
             self._goal = obs.goal
-        stop = reason_to_stop(obs, self.params, sectors=False) or self._missing_input(obs)
+        stop = reason_to_stop(obs, self.params, sectors=False) or self._unusable_input(obs)
         if stop is None and self.mode is not Mode.ARRIVED:
             assert obs.goal is not None
             move = self.move(obs, obs.goal)
@@ -91,10 +98,14 @@ class BasePlanner:
         self.mode = transition(self.mode, move.event)
         return with_odometry_jump(self._decision(obs, move), odometry_jump_reason)
 
-    def _missing_input(self, obs: Observation) -> tuple[Event, str] | None:
-        if not self.inputs or set(_given_inputs(obs)) & set(self.inputs):
+    def _unusable_input(self, obs: Observation) -> tuple[Event, str] | None:
+        """Nothing that shows obstacles, or a lidar within whose range the robot cannot stop."""
+        if self.inputs and not set(_given_inputs(obs)) & set(self.inputs):
+            return Event.INVALID, f"refused input: none of {', '.join(self.inputs)}"
+        if obs.scan is None or self._perception(obs) != "scan":
             return None
-        return Event.INVALID, f"refused input: none of {', '.join(self.inputs)}"
+        fault = too_fast_for_lidar(self.params, obs.scan.range_max_m)
+        return (Event.INVALID, f"refused input: {fault}") if fault else None
 
     def straight(self, position: Point, target: Point, speed_mps: float) -> Point:
         """Velocity towards the target, at most speed_mps, and not beyond the target in a tick."""
@@ -139,3 +150,9 @@ def _given_inputs(obs: Observation) -> list[str]:
         ("circles", obs.circles is not None),
     )
     return [name for name, is_given in given if is_given]
+
+
+def _with_near_at_contact(obs: Observation, robot_radius_m: float) -> Observation:
+    if obs.scan is None or not blind_ring(obs.scan, robot_radius_m):
+        return obs
+    return replace(obs, scan=near_at_contact(obs.scan, robot_radius_m))

@@ -17,11 +17,14 @@ from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
 from ..perception.scan_coverage import ScanCoverage
 from ..perception.sensory_vector import SensorParams, sense_circles
+from ..perception.static_map import StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
 from .differential_drive import Speeds, apply_command, command
+from .distance_to_go import RouteParams
 from .drive_rollout import DriveRollout
+from .map_planning import MapPlanning
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
@@ -38,9 +41,6 @@ LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a direction is needed
 HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
-# A differential drive cannot step aside when an obstacle beside it turns towards it: it passes
-# at a distance, and rather drives on than into the margin.
-TURNING_MARGIN_M, TURNING_CLOSE = 0.15, 7.0
 TOWARDS = math.cos(math.radians(80.0))
 UNOBSERVED = "no direction that the lidar has covered leads on"
 _FREE_M = 1e-9
@@ -71,6 +71,8 @@ class PredictiveParams:
     )  # fmt: skip
     memory: ObstacleMemoryParams = field(default_factory=ObstacleMemoryParams)
     tracking: TrackingParams = field(default_factory=TrackingParams)
+    map: StaticMapParams = field(default_factory=StaticMapParams)
+    route: RouteParams = field(default_factory=RouteParams)
     risk: RiskParams = field(default_factory=RiskParams)
 
     def __post_init__(self) -> None:
@@ -128,6 +130,7 @@ class Predictive(BasePlanner):
         self._waypoint: Point | None = None
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
+        self._map_planning: MapPlanning
         super().__init__(params, sensor, seed)
 
     def move(self, obs: Observation, goal: Point) -> Move:
@@ -137,6 +140,14 @@ class Predictive(BasePlanner):
         self._perceived = circles = self._circles(obs)
         self._by_sectors = obs.circles is None and obs.scan is None
         self._unobserved = None if obs.scan is None else self._coverage.unsafe(obs.pose_ns)
+        if obs.scan is not None and obs.circles is None:
+            among = self._map_planning.move(
+                obs, goal, circles, self._speeds, self._unobserved, last_waypoint, self.tick_s
+            )
+            if among is not None:
+                if among.event is Event.OBSTACLE:
+                    self._waypoint = among.waypoint
+                return among
         if not circles and self._is_observed((goal[0] - position[0], goal[1] - position[1])):
             self._changes.not_enclosed()
             straight = self.straight(position, goal, self.params.speed_mps)
@@ -163,13 +174,7 @@ class Predictive(BasePlanner):
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
         drive = self._drive_rollout(obs)
-        risk = self.options.risk
-        if drive is not None:
-            risk = replace(
-                risk,
-                margin_m=risk.margin_m + TURNING_MARGIN_M,
-                close_m=TURNING_CLOSE * risk.close_m,
-            )
+        risk = self.options.risk if drive is None else self.options.risk.for_turning()
         costs = TrajectoryCost(position, circles, risk, tick_s, speed, drive)
         share = min(1.0, speed * tick_s / goal_distance)
         waypoint, t1 = (to_goal[0] * share, to_goal[1] * share), share * goal_distance / speed
@@ -284,8 +289,13 @@ class Predictive(BasePlanner):
             _, self._speeds = apply_command(obs.pose, self._speeds, given, self.params, tick_ns)
         return decision
 
+    def replan(self) -> None:
+        """Drop the last waypoint; what has been perceived is kept."""
+        self._waypoint = None
+        self._changes = SectorChanges()
+
     def forget(self) -> None:
-        """Drop the last waypoint, the tracks and the remembered circles."""
+        """Drop the last waypoint, the map, the tracks and the remembered circles."""
         self._waypoint = None
         self._perceived = ()
         self._speeds = Speeds()
@@ -294,6 +304,10 @@ class Predictive(BasePlanner):
         self._changes = SectorChanges()
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
+        self._map_planning = MapPlanning(
+            self.params, self.options.map, self.options.route, self.options.risk,
+            self.options.headings, self.options.reach_m, self.options.search_m, self.seed,
+        )  # fmt: skip
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
         """Circles at obs.pose_ns: given and remembered, tracked, or one for each set sector."""
@@ -305,6 +319,7 @@ class Predictive(BasePlanner):
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
             self._coverage.update(stamp_ns, obs.scan)
+            self._map_planning.update(stamp_ns, obs, self._tracker)
             return self._tracker.circles(obs.pose_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 

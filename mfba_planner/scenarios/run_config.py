@@ -19,6 +19,7 @@ from ..core.option_specs import Scalar, check, flatten, option
 from ..core.planner_types import NANO
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PerceptionInput, PlannerParams
+from ..planning.stopping_distance import too_fast_for_lidar, too_fast_for_sectors
 from ..simulation.fleet import robot_seed, scenarios_with_others
 from ..simulation.recorded_motion import ALWAYS, presence
 from ..simulation.robot_model import DEFAULT_BEAMS
@@ -55,14 +56,27 @@ class RunConfig:
     )
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range, or an input timeout shorter than a tick."""
+        """Raise ConfigError for a value out of range, or options that contradict each other.
+
+        An input timeout shorter than a tick; a robot that cannot stop within what it sees.
+        """
         check(self)
+        fault = _too_fast(self.scenario, self.planner, self.sensor)
+        if fault:
+            raise ConfigError(fault)
         tick_s, timeout_s = self.planner.tick_ns * NANO, self.planner.input_timeout_s
         if self.real_time and timeout_s <= tick_s:
             raise ConfigError(
                 f"planner.input_timeout_s={timeout_s:g}: a tick takes {tick_s:g} s, so in real "
                 "time the robot would stop before each tick; give more, or a shorter step_length_m"
             )
+
+
+def _too_fast(scenario: Scenario, planner: PlannerParams, sensor: SensorParams) -> str:
+    params, lidar = scenario.planner_params(planner), scenario.robot.lidar
+    if lidar.beams and params.reads_scan:
+        return too_fast_for_lidar(params, lidar.range_max_m)
+    return too_fast_for_sectors(params, sensor.sensing_range_m)
 
 
 def with_perception(scenario: Scenario, planner: PlannerParams) -> tuple[Scenario, PlannerParams]:

@@ -42,8 +42,8 @@ def _parse_file(path: Path, origin: str) -> Scenario:
     return parse_scenario(text, origin, path.parent)
 
 
-def parse_scenario(text: str, origin: str, folder: Path = Path()) -> Scenario:
-    """Turn YAML or JSON text into a Scenario; files that it names are searched in folder.
+def parse_scenario(text: str, origin: str, directory: Path = Path()) -> Scenario:
+    """Turn YAML or JSON text into a Scenario; files that it names are searched in directory.
 
     Raises ConfigError naming origin, value, reason and remedy.
     """
@@ -53,12 +53,12 @@ def parse_scenario(text: str, origin: str, folder: Path = Path()) -> Scenario:
     if not isinstance(data, dict):
         raise ConfigError(f"{origin}: a {type(data).__name__}, not a mapping; {EXAMPLE}")
     try:
-        data = with_trajectory_files(data, folder)
+        data = with_trajectory_files(data, directory)
         with suppress(UnusualError):
             return as_written(data)
         from .yaml_schema import checked
 
-        return checked(data, folder)
+        return checked(data, directory)
     except ConfigError as error:
         raise ConfigError(f"{origin}: {error}") from None
 

@@ -196,8 +196,7 @@ def checked(data: dict[Any, Any], directory: Path = Path()) -> Scenario:
     Raises ConfigError: key, value, reason, remedy.
     """
     try:
-        checked_data = _with_centers(_with_ends(data))
-        return _Scenario.model_validate(checked_data).build(directory)
+        return _Scenario.model_validate(_with_centers(_with_ends(data))).build(directory)
     except ValidationError as error:
         raise ConfigError(_explain(error)) from None
 

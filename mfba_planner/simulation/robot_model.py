@@ -76,13 +76,21 @@ class Noise:
     odom_loss: float = option(0.0, "share of odometry lost: the last one again", minimum=0.0,
                               maximum=0.99)  # fmt: skip
     odom_latency_s: float = option(
-        0.0, "age of odometry, in whole ticks", unit="s", minimum=0.0, maximum=10.0
+        0.0,
+        "age of odometry that its stamp hides, in whole ticks",
+        unit="s",
+        minimum=0.0,
+        maximum=10.0,
     )
     scan_m: float = option(0.0, "deviation of a range", unit="m", minimum=0.0, maximum=10.0)
     scan_dropout: float = option(0.0, "share of beams lost: NaN", minimum=0.0, maximum=0.99)
     scan_loss: float = option(0.0, "share of scans lost: all NaN", minimum=0.0, maximum=0.99)
     scan_latency_s: float = option(
-        0.0, "age of scans, in whole ticks", unit="s", minimum=0.0, maximum=10.0
+        0.0,
+        "age of scans that their stamps hide, in whole ticks",
+        unit="s",
+        minimum=0.0,
+        maximum=10.0,
     )
 
     def __post_init__(self) -> None:

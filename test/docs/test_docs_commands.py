@@ -76,6 +76,8 @@ def test_commands_are_found_and_every_reduced_one_is_shown() -> None:
         ),
         ("python bench/fleet.py", "1 of 1"),
         ("python bench/tracking.py --seeds 30", "| decision with tracking |"),
+        ("python bench/static_map.py --worlds 5", "| fast-20 |"),
+        ("python bench/tracking.py --memory 100000", "| 20 |"),
     ],
 )
 def test_scripts_behind_tables_of_pages_run(line: str, expected: str, tmp_path: Path) -> None:

@@ -32,6 +32,10 @@ REDUCED = {
     "python bench/tracking.py --seeds 30": (
         "python bench/tracking.py --seeds 1 --only 1.5 --rounds 1"
     ),
+    "python bench/static_map.py --worlds 5": (
+        "python bench/static_map.py --worlds 1 --only fast-20"
+    ),
+    "python bench/tracking.py --memory 100000": "python bench/tracking.py --memory 20",
     "python bench/fleet.py": "python bench/fleet.py --seeds 1 --robots 3 --radius 3",
 }
 # Lines of a page with the name of the file for a block of YAML.

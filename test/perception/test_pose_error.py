@@ -8,9 +8,9 @@ import pytest
 
 from mfba_planner.perception.pose_error import PoseError
 
-ORIGIN = np.array([1.0, -2.0])
+ORIGIN = (1.0, -2.0)
 CENTERS = np.array([[4.0, 0.0], [0.0, 3.0], [-3.0, -2.0], [2.0, -6.0], [5.0, 4.0]])
-COVARIANCE = np.tile(1e-6 * np.eye(2), (5, 1, 1))
+COVARIANCE = np.tile(1e-6 * np.eye(2)[:, :, None], (1, 1, 5))
 
 
 def moved(x: float, y: float, turn: float) -> np.ndarray:
@@ -20,7 +20,9 @@ def moved(x: float, y: float, turn: float) -> np.ndarray:
 
 def estimate(error: PoseError, measured: np.ndarray, count: int = 5) -> None:
     settled = np.full(count, True)
-    error.estimate(measured[:count], CENTERS[:count], COVARIANCE[:count], settled, ORIGIN)
+    error.estimate(
+        measured[:count].T, CENTERS[:count].T, COVARIANCE[:, :, :count], settled, ORIGIN
+    )
 
 
 def test_a_common_motion_is_the_odometry_s_error() -> None:
@@ -67,6 +69,6 @@ def test_noise_left_is_that_of_a_rigid_motion() -> None:
     left = np.array([[4.0, 0.5, 0.2], [0.5, 3.0, -0.1], [0.2, -0.1, 0.3]])
     J = np.array([[1.0, 0.0, ORIGIN[1] - 4.0], [0.0, 1.0, 3.0 - ORIGIN[0]]])
     upper = (4.0, 0.5, 0.2, 3.0, -0.1, 0.3)
-    noise = PoseError.noise(np.array([[3.0, 4.0]]), upper, ORIGIN)
-    assert np.allclose(noise[0, :2, :2], J @ left @ J.T)
-    assert not noise[0, 2].any()
+    noise = PoseError.noise(np.array([[3.0], [4.0]]), upper, ORIGIN)
+    assert np.allclose(noise[:2, :2, 0], J @ left @ J.T)
+    assert not noise[2, :, 0].any()

@@ -35,9 +35,9 @@ def cut(scan: Scan, hump_m: float = 0.05) -> tuple[Beams, Segments]:
     beams = BeamReader().read(ORIGIN, AT_REST, scan)
     taken = taken_from_a_gap(beams)
     r = beams.range_m[taken]
-    x, y = r * beams.cos[taken], r * beams.sin[taken]
+    xy = r * (beams.cos[taken], beams.sin[taken])
     label, known = np.full(taken.size, -1), np.zeros(0, dtype=bool)
-    return beams, segments(beams, taken, x, y, label, known, 0.15, hump_m)
+    return beams, segments(beams, taken, xy, label, known, 0.15, hump_m)
 
 
 def test_a_scan_of_negative_increment_gives_the_same_beams() -> None:
@@ -85,7 +85,7 @@ def test_a_disc_is_one_segment_with_two_sure_edges(bearing: float) -> None:
 def test_two_people_abreast_that_touch_are_two_segments() -> None:
     _, found = cut(scan_of([(3.0, 0.25, 0.25), (3.0, -0.25, 0.25)]))
     assert found.count == 2
-    sides = [np.sign(found.y[found.segment == k]) for k in (0, 1)]
+    sides = [np.sign(found.xy[1, found.segment == k]) for k in (0, 1)]
     assert abs(sides[0].sum()) >= sides[0].size - 2  # but for the return between them
     assert abs(sides[1].sum()) >= sides[1].size - 2
 
@@ -102,8 +102,8 @@ def test_a_straight_wall_is_one_segment() -> None:
 def test_an_edge_beside_something_nearer_is_not_sure() -> None:
     _, found = cut(scan_of([(3.0, 0.0, 0.5), (1.5, 0.0, 0.1)]))
     parts = [k for k in range(found.count) if found.last[k] - found.first[k] > 3]
-    (right,) = (k for k in parts if found.y[found.last[k]] < -0.1)
-    (left,) = (k for k in parts if found.y[found.first[k]] > 0.1)
+    (right,) = (k for k in parts if found.xy[1, found.last[k]] < -0.1)
+    (left,) = (k for k in parts if found.xy[1, found.first[k]] > 0.1)
     assert (found.right_gap_rad[right] > 0.0, found.left_gap_rad[right]) == (True, 0.0)
     assert (found.right_gap_rad[left], found.left_gap_rad[left] > 0.0) == (0.0, True)
 

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """RunConfig: the parameters of each node, and refused configurations."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.option_specs import flatten
-from mfba_planner.planning.planner_params import PlannerParams
+from mfba_planner.core.robot_base import Drive
+from mfba_planner.planning.planner_params import Method, PlannerParams
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.scenarios.run_config import NODES, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.robot_model import Lidar, Robot
 
 CASE1 = load_scenario("case1")
 
@@ -35,10 +39,23 @@ def test_in_slow_motion_inputs_are_stale_later(speed_factor: float, timeout_s: f
 
 
 def test_in_real_time_a_timeout_within_a_tick_is_refused() -> None:
-    slow = PlannerParams(step_length_m=1.0, speed_mps=0.5)
+    slow = PlannerParams(step_length_m=0.5, speed_mps=0.25)
     RunConfig(scenario=CASE1, planner=slow)
     with pytest.raises(ConfigError, match=r"^planner.input_timeout_s=1: a tick takes 2 s, so in"):
         RunConfig(scenario=CASE1, planner=slow, real_time=True)
+
+
+def test_a_robot_that_cannot_stop_within_what_it_sees_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"sees only 0.80 m ahead: .* step_length_m to 0.8, or"):
+        RunConfig(scenario=CASE1, planner=PlannerParams(step_length_m=1.0))
+    fast = preset(PlannerParams(method=Method.PREDICTIVE, speed_mps=3.0))
+    robot = Robot(drive=Drive.DIFFERENTIAL, max_speed_mps=3.0, lidar=Lidar(beams=360))
+    RunConfig(scenario=replace(CASE1, robot=robot), planner=fast)
+    short = replace(robot, lidar=Lidar(beams=360, range_max_m=1.5))
+    with pytest.raises(ConfigError, match=r"^speed_mps=3: .* speed_mps to 2.36, or give a lidar"):
+        RunConfig(scenario=replace(CASE1, robot=short), planner=fast)
+    # The paper's planner reads the sectors of that lidar.
+    RunConfig(scenario=replace(CASE1, robot=short), planner=PlannerParams())
 
 
 def test_a_world_without_obstacles_leaves_the_sensor_its_default_radii() -> None:

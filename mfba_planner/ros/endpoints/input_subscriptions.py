@@ -11,6 +11,7 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...core.planner_types import Observation, Scan
+from ...perception.near_returns import blind_ring
 from ...perception.scan_to_sectors import aligned
 from ...planning.planner_params import PerceptionInput, PlannerParams
 from ...recording.from_messages import (
@@ -165,6 +166,8 @@ class InputSubscriptions:
             converted, conversion_fault = self._convert(
                 "scan", scan, convert, self._settings.scan_frame
             )
+            if not conversion_fault:
+                self._monitor.scan_note = blind_ring(converted, self._params.robot_radius_m)
             fault = fault or scan_fault or conversion_fault
             self._receive_sectors(sectors, fault, None if fault else converted)
 

@@ -10,6 +10,7 @@ from ...core.errors import InputError
 from ...core.geometry import Pose2D
 from ...core.planner_types import Ranges
 from ...core.segments import Segments
+from ...perception.near_returns import blind_ring
 from ...perception.scan_to_sectors import sense_scan
 from ...perception.sense_segments import sense_circles_and_segments
 from ...perception.sensory_vector import SensorParams, enlarged_radii, sensory_vector
@@ -123,6 +124,7 @@ class VirtualSensor(GraphNode):
         s = self.settings
         if s.source is Source.SCAN:
             scan = laser_scan(message, s.scan_frame, s.scan_no_return)
+            self._monitor.scan_note = blind_ring(scan, s.robot_radius_m)
             return sense_scan(scan, pose.yaw + s.scan_yaw, s.robot_radius_m, self.sensor)
         centers = obstacle_centers(message)
         radii = enlarged_radii(len(centers), self.radii, s.robot_radius_m)

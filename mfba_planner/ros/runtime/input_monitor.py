@@ -58,6 +58,7 @@ class InputMonitor:
         self._on_time_set_back = on_time_set_back
         self._receptions: dict[str, Reception] = {}
         self.timeout_s = timeout_s  # how far a stamp may be off
+        self.scan_note = ""  # what to warn of in the newest scan
         self.reset()
         node.on_time_set_back(on_time_set_back)
 
@@ -115,7 +116,7 @@ class InputMonitor:
     @property
     def note(self) -> str:
         """What to warn of although nothing is refused, "" otherwise."""
-        return self._stamps.note
+        return "; ".join(filter(None, (self._stamps.note, self.scan_note)))
 
     @property
     def values(self) -> dict[str, str]:

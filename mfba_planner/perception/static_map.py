@@ -1,0 +1,364 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Local map: what stands around the robot, marked by returns and cleared by rays.
+
+A rolling window of measured points, at most one per cell. What moves is kept out: tracks that
+move, and returns where a scan of a moment ago saw farther on. Each scan is matched to the map
+(scan_matching.py), so the noise of the odometry does not smear it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..core.geometry import Point, Pose2D
+from ..core.planner_types import NANO
+from .distance_field import DistanceField, distance_field
+from .free_space import FreeSpace
+from .moving_returns import MovingReturns
+from .occupancy_grid import ObservedCells, occupancy
+from .scan_beams import Beams
+from .scan_matching import ScanMatching
+from .scan_surfaces import Surfaces, surfaces
+from .static_map_params import StaticMapParams
+from .static_map_points import (  # fmt: skip
+    FIRST,
+    HITS,
+    LAST,
+    MISSED,
+    NX,
+    NY,
+    WEAK,
+    WIDTH,
+    MapPoints,
+    X,
+    Y,
+)
+
+__all__ = ["StaticMap", "StaticMapParams"]
+
+Array = np.ndarray
+
+_LAGS_S, _MARGIN_M = (1.2, 0.4), 0.05  # of the scans that tell what appeared
+_COARSE_M = 0.05  # where beams are farther apart, tracks that may move are not marked
+_FEWEST_HITS, _BRIEF_S = 3.0, 2.0  # points seen less often are dropped so long after
+_STANDING_HITS = 6.0  # points seen so often stand, whatever a track seems to do
+_YOUNG_S = 4.0  # a moving circle takes younger points with it
+_ESTABLISHED_S = 1.0  # scans are matched to points that are older
+_STILL_M = 5e-4  # points are not moved by less
+_ALIKE = 0.3  # cosine between normals of the same surface
+_CREEP_M, _CREEP_SD = 0.006, 2.0  # of the mean of a scan's returns from their point
+_MOST_HITS = 20.0  # that count in a point's mean
+_SAME_M, _SAME_SD, _MOST_SAME_M = 0.025, 2.5, 0.05  # returns nearer to a point are its own
+_ALONE_M = 0.006  # so near to a beam is a point that is thinner than the beams are apart
+_NOISE_SD = 2.5
+_FEWEST_WEAK = 3.0
+_LIMIT_M = 0.15  # returns so near to the longest range are not used
+_FIELD_M = 10.0  # side of the window in which distance() knows
+
+
+class StaticMap:
+    """Points that stand, in a frame of the map's own.
+
+    The map's frame is that of odom less the error of the pose that came with the last scan:
+    to_map() brings what is known by that pose into it. With an exact odometry they are the same.
+    version rises when the points change.
+    """
+
+    def __init__(self, params: StaticMapParams | None = None) -> None:
+        """Start with nothing known."""
+        self.params = params or StaticMapParams()
+        p = self.params
+        self._points = MapPoints(p.cell_m, p.size_m)
+        self._moving = MovingReturns(p.size_m)
+        self._matching = ScanMatching(p.cell_m)
+        self._free = FreeSpace(_LAGS_S, _MARGIN_M)
+        self._observed = ObservedCells(p.size_m)
+        self._stamp_ns: int | None = None
+        self._time_s = 0.0
+        self._origin: Point = (0.0, 0.0)
+        self._field: tuple[int, DistanceField] | None = None
+        self.version = 0
+
+    def forget(self) -> None:
+        """Drop all that is known, as after a jump of the odometry."""
+        for part in (self._points, self._moving, self._free, self._observed):
+            part.clear()
+        self._matching.reset()
+        self._stamp_ns, self._field = None, None
+        self.version += 1
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return self._points.count
+
+    @property
+    def noise_m(self) -> float:
+        """Standard deviation of a return from the surfaces of the map, as learnt."""
+        return self._matching.noise_m
+
+    def update(
+        self,
+        stamp_ns: int,
+        pose: Pose2D,
+        beams: Beams,
+        moving: Array | None = None,
+        surely: Array | None = None,
+        pose_error: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Update by the beams of a scan, taken from the pose, and by circles that move.
+
+        moving (m, 5) are rows (x, y, vx, vy, r) in odom by that pose and surely (m,) whether
+        they surely move, as Tracker.moving() gives them; those slower than moving_mps are
+        ignored. pose_error is what is known of the pose's error (Tracker.pose_error).
+        An older stamp drops the map, an equal one is ignored.
+        """
+        if self._stamp_ns is not None:
+            dt = (stamp_ns - self._stamp_ns) * NANO
+            if dt == 0.0:
+                return
+            if dt < 0.0:
+                self.forget()
+            else:
+                self._time_s += dt
+                self._free.pass_time(dt)
+        self._stamp_ns, self._origin = stamp_ns, pose.position
+        moving = np.empty((0, 5)) if moving is None else moving
+        surely = np.ones(moving.shape[0], dtype=bool) if surely is None else surely
+        vx, vy = moving[:, 2], moving[:, 3]
+        fast = vx * vx + vy * vy >= self.params.moving_mps**2
+        dx, dy = moving[:, 0] - pose.x, moving[:, 1] - pose.y
+        coarse_m = _COARSE_M / beams.spacing_rad
+        kept_out = fast & (surely | (dx * dx + dy * dy > coarse_m * coarse_m))
+        moving, surely = moving[kept_out], moving[fast & surely]
+        found = surfaces(beams)
+        changed = False
+        if found is not None:
+            changed = self._mark(found, beams, moving, pose_error)
+        changed |= self._clear(beams, surely)
+        x, y = self._robot
+        changed |= self._points.roll(x, y)
+        self._observed.update(self._time_s, x, y, self._matching.error[2], beams)
+        self._free.add(beams, self._matching.error, self._matching.sd_rad)
+        self.version += changed
+
+    @property
+    def _robot(self) -> Point:
+        """The robot's position in the map's frame."""
+        ex, ey, _ = self._matching.error
+        return (self._origin[0] - ex, self._origin[1] - ey)
+
+    def _mark(
+        self, found: Surfaces, beams: Beams, moving: Array, pose_error: tuple[float, float, float]
+    ) -> bool:
+        """Match the scan, and mark what stands; whether the points changed."""
+        p, points, matching, motion = self.params, self._points, self._matching, self._moving
+        in_track = motion.near_any(found.x, found.y, moving)
+        usable = found.range_m > 0.0
+        usable &= found.range_m < beams.longest_m - _LIMIT_M
+        usable &= found.range_m * beams.spacing_rad <= p.spacing_m
+        still = np.flatnonzero(usable & ~in_track)
+        matching.estimate(found, still, self._origin, self._nearest, pose_error)
+        x, y = matching.corrected(found.x, found.y, self._origin)
+        index, away = points.nearest(x, y)
+        same_m = min(_SAME_M + _SAME_SD * matching.noise_m, _MOST_SAME_M)
+        same = usable & (away <= same_m)
+        flagged = in_track | motion.spread(found, self._appeared(x, y, index, same))
+        motion.remember(x[flagged], y[flagged], self._time_s)
+        width = found.width_m[found.segment]
+        changed = self._average(found, index, x, y, width, same, same & ~flagged)
+        new = usable & ~flagged & ~same
+        if new.any():
+            settled = self._time_s - p.settle_s
+            new = new.nonzero()[0]
+            new = new[~motion.recent(x[new], y[new], settled)]
+            new = new[self._inside(x[new], y[new])]
+            added = points.add(
+                x[new], y[new], self._time_s, width[new], found.nx[new], found.ny[new]
+            )
+            changed |= added > 0
+        return changed
+
+    def _appeared(self, x: Array, y: Array, index: Array, same: Array) -> Array:
+        """Whether returns (k,) are in space that was seen free; where a point stands is none."""
+        standing = same.copy()
+        standing[same] = self._points.data[HITS][index[same]] >= _STANDING_HITS
+        asked = (~standing).nonzero()[0]
+        appeared = np.zeros(x.size, dtype=bool)
+        margin = 3.0 * self._matching.noise_m + 2.0 * self._matching.sd_m
+        appeared[asked] = self._free.appeared(x[asked], y[asked], margin)
+        return appeared
+
+    def _inside(self, x: Array, y: Array) -> Array:
+        rx, ry = self._robot
+        half = self.params.size_m * 0.5
+        inside: Array = (np.abs(x - rx) <= half) & (np.abs(y - ry) <= half)
+        return inside
+
+    def _nearest(
+        self, x: Array, y: Array, nx: Array, ny: Array, reach: int
+    ) -> tuple[Array, Array, Array]:
+        index, away = self._points.nearest(x, y, reach)
+        if not self.count:
+            return x, y, away
+        data = self._points.data
+        # What is seen from behind is another surface: walls are thin.
+        usable = data[NX][index] * nx + data[NY][index] * ny > _ALIKE
+        usable &= (data[FIRST] <= max(self._time_s - _ESTABLISHED_S, 0.0))[index]
+        return data[X][index], data[Y][index], np.where(usable, away, np.inf)
+
+    def _average(
+        self, found: Surfaces, index: Array, x: Array, y: Array, width: Array, hit: Array,
+        steady: Array,
+    ) -> bool:  # fmt: skip
+        """Count hits of points, and move them towards their returns, along the normals."""
+        points = self._points
+        data, n = points.data, points.count
+        of = index[hit]
+        if not of.size:
+            return False
+        data[HITS, of] += 1.0  # once per scan
+        data[LAST, of] = self._time_s
+        data[MISSED, of] = 0.0
+        data[NX, of], data[NY, of] = found.nx[hit], found.ny[hit]
+        np.maximum.at(data[WIDTH], of, width[hit])
+        chosen = np.flatnonzero(steady)
+        of = index[chosen]
+        if not of.size:
+            return False
+        c, s = math.cos(self._matching.error[2]), math.sin(self._matching.error[2])
+        nx, ny = found.nx[chosen], found.ny[chosen]
+        nx, ny = c * nx + s * ny, c * ny - s * nx
+        rest = nx * (x[chosen] - data[X][of]) + ny * (y[chosen] - data[Y][of])
+        count = np.bincount(of, minlength=n)
+        met = count.nonzero()[0]
+        dx = np.bincount(of, rest * nx, n)[met] / count[met]
+        dy = np.bincount(of, rest * ny, n)[met] / count[met]
+        # A point whose returns have left it follows them at once: what creeps is in the map too.
+        left = dx * dx + dy * dy > (_CREEP_M + _CREEP_SD * self._matching.noise_m) ** 2
+        data[HITS, met[left]] = 1.0
+        gain = 1.0 / np.minimum(data[HITS][met], _MOST_HITS)
+        dx *= gain
+        dy *= gain
+        far = np.abs(dx) + np.abs(dy) > _STILL_M
+        if not far.any():
+            return False
+        met = met[far]
+        points.move(met, data[X][met] + dx[far], data[Y][met] + dy[far])
+        return True
+
+    def _clear(self, beams: Beams, moving: Array) -> bool:
+        """Clear points that the beams see through, and young ones where something moves."""
+        points, p, m = self._points, self.params, self._matching
+        if not (points.count and beams.range_m.size):
+            return False
+        data, (ox, oy) = points.data, self._robot
+        reach = min(beams.longest_m, p.spacing_m / beams.spacing_rad)
+        dx, dy = data[X] - ox, data[Y] - oy
+        d2 = dx * dx + dy * dy
+        judged = np.flatnonzero((d2 < reach * reach) & (data[LAST] < self._time_s))
+        gone = np.zeros(points.count, dtype=bool)
+        if judged.size:
+            d = np.sqrt(d2[judged])
+            bearing = np.arctan2(dy[judged], dx[judged]) + m.error[2]
+            spacing_m = d * beams.spacing_rad
+            clear, off = _clear_lengths(beams, bearing, m.sd_rad)
+            passes = clear - d
+            unsure_m = off * d + m.sd_rad * d + m.sd_m
+            thin = (data[WIDTH][judged] < spacing_m) & (unsure_m > _ALONE_M)
+            margin = p.margin_m + 0.5 * spacing_m
+            strong = (passes > margin + _NOISE_SD * m.noise_m + m.sd_m) & ~thin
+            data[MISSED, judged] = np.where(strong, data[MISSED][judged] + 1.0, 0.0)
+            data[WEAK, judged] += (passes > 0.5 * margin + 0.01) & ~thin
+            gone[judged] = (data[MISSED][judged] >= p.scans) | (
+                data[WEAK][judged] >= _FEWEST_WEAK + 0.5 * data[HITS][judged]
+            )
+            cleared = judged[data[MISSED][judged] >= p.scans]
+            self._moving.remember(data[X][cleared], data[Y][cleared], self._time_s)
+        gone |= (data[HITS] < _FEWEST_HITS) & (data[LAST] < self._time_s - _BRIEF_S)
+        if moving.shape[0]:
+            young = (data[FIRST] > self._time_s - _YOUNG_S) & (data[HITS] < _STANDING_HITS)
+            young = young.nonzero()[0]
+            x, y = m.measured(data[X][young], data[Y][young], self._origin)
+            gone[young] |= self._moving.near_any(x, y, moving)
+        if not gone.any():
+            return False
+        points.keep(~gone)
+        return True
+
+    def to_map(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Positions (k,) in odom, by the pose of the last scan, in the map's frame."""
+        return self._matching.corrected(x, y, self._origin)
+
+    def points(self) -> Array:
+        """Points (n, 2) in odom, by the pose of the last scan."""
+        data = self._points.data
+        x, y = self._matching.measured(data[X], data[Y], self._origin)
+        return np.stack((x, y), axis=1)
+
+    def map_points(self) -> Array:
+        """Points (n, 2) in the map's frame."""
+        data: Array = self._points.data[:2].T
+        return data
+
+    def distance_field(self, center: Point, window_m: float, cell_m: float) -> DistanceField:
+        """Distances to the nearest point in a square around a position, in the map's frame.
+
+        Capped at widest_m; array[j, i] belongs to origin + ((i + 0.5) cell, (j + 0.5) cell).
+        """
+        half = 0.5 * window_m
+        low, high = (center[0] - half, center[1] - half), (center[0] + half, center[1] + half)
+        return self.rectangle_field(low, high, cell_m)
+
+    def rectangle_field(self, low: Point, high: Point, cell_m: float) -> DistanceField:
+        """distance_field() between two corners."""
+        data = self._points.data
+        return distance_field(data[X], data[Y], low, high, cell_m, self.params.widest_m)
+
+    def distance(self, x: Array, y: Array) -> Array:
+        """Distance to the nearest point at positions (k,) in odom, capped at widest_m.
+
+        Interpolated; beyond 5 m from the robot it is the cap.
+        """
+        if self._field is None or self._field[0] != self.version:
+            window = min(_FIELD_M, self.params.size_m)
+            field = self.distance_field(self._robot, window, self.params.cell_m)
+            self._field = (self.version, field)
+        return self._field[1].at(*self.to_map(x, y))
+
+    def occupancy_grid(self) -> tuple[Point, Array]:
+        """Origin (the map's frame) and cells (h, w) int8 as in nav_msgs/OccupancyGrid.
+
+        100 occupied, 0 seen free, -1 unknown. The window of size_m around the robot.
+        """
+        data = self._points.data
+        return occupancy(
+            data[X], data[Y], self._robot, self.params.size_m, self.params.cell_m, self._observed
+        )
+
+
+def _clear_lengths(beams: Beams, bearing: Array, turn_sd: float) -> tuple[Array, Array]:
+    """Least free length of the beams at and beside each bearing; angle to the nearest beam.
+
+    0 where one of them tells nothing.
+    """
+    clear = np.zeros(beams.count)
+    clear[beams.number] = np.minimum(beams.range_m, beams.longest_m)
+    beside = 1 + math.floor(2.0 * turn_sd / beams.spacing_rad)
+    least = clear.copy()
+    for k in range(1, beside + 1):
+        np.minimum(least[k:], clear[:-k], out=least[k:])
+        np.minimum(least[:-k], clear[k:], out=least[:-k])
+        if beams.turns:
+            np.minimum(least[:k], clear[-k:], out=least[:k])
+            np.minimum(least[-k:], clear[:k], out=least[-k:])
+    if not beams.turns:
+        least[:beside] = least[least.size - beside :] = 0.0
+    number = beams.index_of(bearing)
+    inside = (number >= 0) & (number < beams.count)
+    number[~inside] = 0
+    off = np.remainder(bearing - beams.angle_min_rad - number * beams.spacing_rad, 2.0 * math.pi)
+    off = np.minimum(off, 2.0 * math.pi - off)
+    return np.where(inside, least[number], 0.0), off

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Distance to go: length of the shortest way to the goal through the local map.
+
+In eq. 1 it takes the place of the straight line from a waypoint to the goal. It solves the
+eikonal equation |grad D| F = 1 by fast marching (Sethian 1996) from the goal; F is the share of
+the full speed, small near what stands. Unknown space counts as free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.geometry import Point, distance
+from ..core.option_specs import check, option
+from ..core.planner_types import NANO
+from ..perception.distance_field import DistanceField
+from ..perception.static_map import StaticMap
+
+Array = np.ndarray
+
+_CLEAR_M = 0.04  # beside the robot's radius: a straight line with so much room is driven
+_TOUCH_M = 0.01  # nearer than so much beyond the radius counts as closed
+_CLOSED = 0.02  # F there; not 0, so that the distance to go stays finite
+_SLOWEST, _ROOM_M = 0.5, 0.3  # F beside what stands, and from where it is 1
+_MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
+_MOST_CELLS = 20_000  # about 8 ms
+_SAME_GOAL_M = 0.1  # noise of the odometry moves the goal in the map's frame
+_CLOSED_NS = 1_500_000_000
+_FARTHEST_M = 20.0  # a goal farther away is replaced by a point on the line to it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RouteParams:
+    """Options of the distance to go."""
+
+    refresh_s: float = option(
+        0.3, "time after which the distance to go is computed again, if the map has changed",
+        unit="s", minimum=0.0, maximum=10.0,
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        check(self)
+
+
+class DistanceToGo:
+    """The distance to go to one goal, computed again when the map has changed.
+
+    All positions are in the map's frame. While the straight line from the robot is clear, the
+    distance to go is the straight line.
+    """
+
+    def __init__(self, params: RouteParams, radius_m: float) -> None:
+        """radius_m is the robot's."""
+        self._params, self._radius_m = params, radius_m
+        self.goal: Point = (0.0, 0.0)
+        self.is_straight = True
+        self.closed_by = ""  # what stands between robot and goal on every way, "" if one is open
+        self._closed_ns: int | None = None  # since when
+        self._computed: tuple[int, int, Point] | None = None  # stamp, map version, goal
+        self._field: DistanceField | None = None  # distances to what stands
+        self._to_go: Array | None = None
+        self._beyond_m = 0.0
+        self._step: Array | None = None  # unit vectors of the shortest way, complex
+        self._origin: Point = (0.0, 0.0)
+        self._cell_m = 1.0
+
+    def update(self, stamp_ns: int, known: StaticMap, position: Point, goal: Point) -> None:
+        """Take the map as it is now."""
+        self.goal = goal
+        self.is_straight = is_clear(known, position, goal, self._radius_m + _CLEAR_M)
+        if self.is_straight:
+            self.closed_by, self._closed_ns = "", None
+            return
+        if self._computed is not None:
+            then_ns, version, then_goal = self._computed
+            age_s = (stamp_ns - then_ns) * NANO
+            fresh = 0.0 <= age_s < self._params.refresh_s or version == known.version
+            same = distance(then_goal, goal) < _SAME_GOAL_M
+            if fresh and same and self._is_inside(position):
+                return
+        closed_by = self._compute(known, position, goal)
+        self._computed = (stamp_ns, known.version, goal)
+        if not closed_by or self._closed_ns is None:
+            self._closed_ns = stamp_ns if closed_by else None
+        # A person who passes a door closes it too, but not for long.
+        lasts = self._closed_ns is not None and stamp_ns - self._closed_ns >= _CLOSED_NS
+        self.closed_by = closed_by if lasts else ""
+
+    def _compute(self, known: StaticMap, position: Point, goal: Point) -> str:
+        """Compute the distance to go; what closes every way to the goal, "" if nothing."""
+        import eikonalfm  # only here: most runs in the open do not need it
+
+        target = goal
+        away = distance(position, goal)
+        if away > _FARTHEST_M:
+            share = _FARTHEST_M / away
+            target = (
+                position[0] + share * (goal[0] - position[0]),
+                position[1] + share * (goal[1] - position[1]),
+            )
+        self._beyond_m = distance(target, goal)
+        fine = known.params.cell_m
+        low, high, per_cell = _domain(position, target, fine)
+        self._cell_m = fine * per_cell
+        field = known.rectangle_field(low, high, fine)
+        self._origin = field.origin_m
+        speed = _speed(field.distance_m, self._radius_m)
+        speed = _widest(speed, per_cell)
+        height, width = speed.shape
+        i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
+        j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
+        to_go = eikonalfm.fast_marching(speed, (j, i), (self._cell_m, self._cell_m), 2)
+        self._to_go = to_go
+        dy, dx = np.gradient(to_go, self._cell_m)
+        step = dx + 1j * dy
+        self._step = -step / (np.abs(step) + 1e-12)
+        if self._beyond_m:
+            return ""  # the map does not reach so far
+        cell = (position[0] - self._origin[0]) / self._cell_m
+        row = (position[1] - self._origin[1]) / self._cell_m
+        return self._closed(field, (int(row), int(cell)), (j, i), goal)
+
+    def _closed(
+        self, field: DistanceField, start: tuple[int, int], end: tuple[int, int], goal: Point
+    ) -> str:
+        """What closes every way between two cells: none is as wide as the robot."""
+        from scipy.ndimage import label
+
+        nearest_m = float(field.at(np.array([goal[0]]), np.array([goal[1]]))[0])
+        if nearest_m < self._radius_m - _CLEAR_M:
+            return f"what stands {nearest_m:.2f} m from its middle"
+        open_ = _widest(field.distance_m, round(self._cell_m / field.cell_m)) > self._radius_m
+        open_[max(start[0] - 1, 0) : start[0] + 2, max(start[1] - 1, 0) : start[1] + 2] = True
+        open_[end] = True
+        number = label(open_, np.ones((3, 3)))[0]
+        if number[start] == number[end]:
+            return ""
+        inside = np.count_nonzero(number == number[end]) < np.count_nonzero(
+            number == number[start]
+        )
+        around = "the goal" if inside else "the robot"
+        return f"what stands around {around}, without a gap as wide as the robot"
+
+    def _is_inside(self, position: Point) -> bool:
+        if self._to_go is None:
+            return False
+        height, width = self._to_go.shape
+        u = (position[0] - self._origin[0]) / self._cell_m
+        v = (position[1] - self._origin[1]) / self._cell_m
+        return 10.0 <= u <= width - 10.0 and 10.0 <= v <= height - 10.0
+
+    def at(self, x: Array, y: Array) -> Array:
+        """Distance to go (m) at positions of any shape."""
+        if self.is_straight or self._to_go is None:
+            dx, dy = x - self.goal[0], y - self.goal[1]
+            straight: Array = np.sqrt(dx * dx + dy * dy)
+            return straight
+        return _bilinear(self._to_go, *self._cells(x, y)) + self._beyond_m
+
+    def direction(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Unit vector of the shortest way at positions of any shape."""
+        if self.is_straight or self._to_go is None:
+            step = (self.goal[0] - x) + 1j * (self.goal[1] - y)
+        else:
+            assert self._step is not None
+            step = _bilinear(self._step, *self._cells(x, y))
+        step = step / (np.abs(step) + 1e-12)
+        return step.real, step.imag
+
+    def _cells(self, x: Array, y: Array) -> tuple[Array, Array]:
+        assert self._to_go is not None
+        height, width = self._to_go.shape
+        u = (x - self._origin[0]) / self._cell_m - 0.5
+        v = (y - self._origin[1]) / self._cell_m - 0.5
+        np.maximum(u, 0.0, out=u)
+        np.minimum(u, width - 1.001, out=u)
+        np.maximum(v, 0.0, out=v)
+        np.minimum(v, height - 1.001, out=v)
+        return u, v
+
+
+def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:
+    """Whether no point of the map is nearer to the line than room_m; its ends may be."""
+    points = known.map_points()
+    if not points.shape[0]:
+        return True
+    x, y = points[:, 0] - start[0], points[:, 1] - start[1]
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length2 = dx * dx + dy * dy
+    if length2 == 0.0:
+        return True
+    share = np.clip((x * dx + y * dy) / length2, 0.0, 1.0)
+    x, y = x - share * dx, y - share * dy
+    near = x * x + y * y < room_m * room_m
+    # What stands beside the robot already does not close a line that leads away from it.
+    return not bool((near & (share > 0.0)).any())
+
+
+def _domain(position: Point, goal: Point, fine_m: float) -> tuple[Point, Point, int]:
+    """Corners of the rectangle, and how many cells of the map make one of its cells."""
+    margin, per_cell = _MARGIN_M, 2
+    while True:
+        low = (min(position[0], goal[0]) - margin, min(position[1], goal[1]) - margin)
+        high = (max(position[0], goal[0]) + margin, max(position[1], goal[1]) + margin)
+        cell = fine_m * per_cell
+        if (high[0] - low[0]) * (high[1] - low[1]) <= _MOST_CELLS * cell * cell:
+            return low, high, per_cell
+        if margin > _LEAST_MARGIN_M:
+            margin -= 0.5
+        else:
+            margin, per_cell = _MARGIN_M, per_cell + 1
+
+
+def _widest(values: Array, per_cell: int) -> Array:
+    """The largest value within each cell: the widest part decides, or narrow doors would close."""
+    height, width = (n // per_cell for n in values.shape)
+    whole = values[: height * per_cell, : width * per_cell]
+    largest: Array = whole.reshape(height, per_cell, width, per_cell).max(axis=(1, 3))
+    return largest
+
+
+def _speed(clearance_m: Array, radius_m: float) -> Array:
+    """Share of the full speed at distances from what stands."""
+    room = (clearance_m - radius_m - _TOUCH_M) / _ROOM_M
+    speed = _SLOWEST + (1.0 - _SLOWEST) * np.minimum(room, 1.0)
+    speed[room < 0.0] = _CLOSED
+    return speed
+
+
+def _bilinear(values: Array, u: Array, v: Array) -> Array:
+    flat, width = values.ravel(), values.shape[1]
+    i, j = u.astype(np.int64), v.astype(np.int64)
+    u, v = u - i, v - j
+    k = j * width + i
+    low = flat[k] * (1.0 - u) + flat[k + 1] * u
+    k += width
+    high = flat[k] * (1.0 - u) + flat[k + 1] * u
+    found: Array = low + v * (high - low)
+    return found

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Waypoint among what stands: eq. 1 with the distance to go, searched by headings and bats."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.geometry import Point
+from ..core.planner_types import NANO, Bits
+from ..perception.distance_field import DistanceField
+from ..perception.static_map import StaticMap
+from ..swarm.bat_swarm import BatSwarm
+from .distance_to_go import DistanceToGo, RouteParams
+from .map_rollout import FORBIDDEN_M, MapRollout
+from .trajectory_cost import RiskParams
+from .turn_delay import TurnDelay
+
+Array = np.ndarray
+
+LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of waypoints, in reach_m
+WAITS_S = (0.4, 1.0, 2.0)
+SPEEDS = (1e-6, 0.5)
+BATCH = 40  # candidates evaluated at once
+MARGIN_M = 0.1  # beside what stands, in which a path costs more
+WINDOW_M = 7.0  # side of the square in which clearances are known
+KEPT_S = 0.15  # contact is ruled out by the points themselves
+_KEPT_M = 0.5  # the window is used again until the robot is so far from its middle
+_STEP_M = 0.1
+SIGHT_M = (0.12, 0.07, 0.025)  # room beside a line of sight
+
+
+class Found(NamedTuple):
+    """The chosen waypoint, relative to the robot in the map's frame, and how it was found."""
+
+    waypoint: Point
+    t1: float
+    cost: float
+    to_go_m: float
+    closed: Bits
+    candidates: tuple[Point, ...]
+    free: bool
+
+
+class MapSearch:
+    """Keeps the distance to go and the clearances between decisions."""
+
+    def __init__(self, route: RouteParams, radius_m: float, headings: int, reach_m: float) -> None:
+        """radius_m is the robot's; headings is the number of bits."""
+        self._radius_m, self._n, self._reach_m = radius_m, headings, reach_m
+        self.to_go = DistanceToGo(route, radius_m)
+        angles = 2.0 * math.pi / headings * np.arange(1, headings + 1)
+        self._cos, self._sin = np.cos(angles), np.sin(angles)
+        lengths = np.array(LENGTHS) * reach_m
+        self._qx = (self._cos[:, None] * lengths).ravel()
+        self._qy = (self._sin[:, None] * lengths).ravel()
+        self._length = np.tile(lengths, headings)
+        self._clearance: tuple[int, int, Point, DistanceField] | None = None
+
+    def clearance(self, known: StaticMap, position: Point, stamp_ns: int) -> DistanceField:
+        """Distances to what stands around the robot; as of KEPT_S ago, where that will do."""
+        if self._clearance is not None:
+            then_ns, version, (x, y), field = self._clearance
+            near = abs(x - position[0]) < _KEPT_M and abs(y - position[1]) < _KEPT_M
+            fresh = 0.0 <= (stamp_ns - then_ns) * NANO < KEPT_S or version == known.version
+            if fresh and near:
+                return field
+        field = known.distance_field(position, WINDOW_M, known.params.cell_m)
+        self._clearance = (stamp_ns, known.version, position, field)
+        return field
+
+    def search(
+        self,
+        rollout: MapRollout,
+        position: Point,
+        risk: RiskParams,
+        speed_mps: float,
+        tick_s: float,
+        turn_delay: TurnDelay | None,
+        observed: Array | None,
+        last: Point | None,
+        swarm_at: Callable[[Point], BatSwarm],
+    ) -> Found:
+        """The cheapest waypoint.
+
+        observed (n,): headings that may be driven; None: all. last: the last waypoint.
+        """
+        evaluate = _Evaluation(rollout, position, risk, speed_mps, self.to_go, turn_delay)
+        (px, py), to_go = position, self.to_go
+        here = float(to_go.at(np.array([px]), np.array([py]))[0])
+        ahead = self._ahead(position)
+        if observed is not None:
+            ahead = [q for q in ahead if observed[self._heading(q)]] or ahead
+        ax, ay = np.array(ahead).T
+        at = np.maximum(np.sqrt(ax * ax + ay * ay) / speed_mps, tick_s)
+        best, best_cost = (ahead[0], float(at[0])), math.inf
+        if observed is None or observed[self._heading(ahead[0])]:
+            cost, harm = evaluate(ax, ay, at)
+            k = int(cost.argmin())
+            best, best_cost = (ahead[k], float(at[k])), float(cost[k])
+            if harm[k] <= 0.0:
+                return Found(*best, best_cost, here, (), (), True)
+        qx, qy, t = self._candidates(best[0], speed_mps, tick_s, last, waits=not rollout.alone)
+        if observed is not None:
+            headings = np.round(np.arctan2(qy, qx) * self._n / (2.0 * math.pi)).astype(int) - 1
+            kept = observed[headings % self._n]
+            qx, qy, t = qx[kept], qy[kept], t[kept]
+        lower = np.sqrt(qx * qx + qy * qy) + to_go.at(qx + px, qy + py)
+        lower += risk.waiting * (speed_mps * t - np.sqrt(qx * qx + qy * qy))
+        order = np.argsort(lower, kind="stable")
+        for start in range(0, order.size, BATCH):
+            batch = order[start : start + BATCH]
+            if lower[batch[0]] >= best_cost:
+                break
+            cost, _ = evaluate(qx[batch], qy[batch], t[batch])
+            k = int(cost.argmin())
+            if cost[k] < best_cost:
+                best_cost = float(cost[k])
+                i = int(batch[k])
+                best = ((float(qx[i]), float(qy[i])), float(t[i]))
+        closed = self._closed(evaluate, speed_mps, observed)
+        swarm = swarm_at(best[0])
+        for _ in range(swarm.horizon + 1):
+            asked = np.array(swarm.ask())
+            bx, by = asked[:, 0], asked[:, 1]
+            bt = np.maximum(np.sqrt(bx * bx + by * by) / speed_mps, tick_s)
+            cost, _ = evaluate(bx, by, bt)
+            if observed is not None:
+                headings = np.round(np.arctan2(by, bx) * self._n / (2.0 * math.pi)).astype(int) - 1
+                cost[~observed[headings % self._n]] = math.inf
+            swarm.tell(cost.tolist())
+        if swarm.best_value < best_cost:
+            x, y = swarm.best_x
+            best = ((x, y), max(math.hypot(x, y) / speed_mps, tick_s))
+            best_cost = swarm.best_value
+        return Found(
+            best[0],
+            best[1],
+            best_cost,
+            here,
+            closed,
+            tuple((x, y) for x, y in swarm.candidates),
+            False,
+        )
+
+    def _heading(self, q: Point) -> int:
+        return (round(math.atan2(q[1], q[0]) * self._n / (2.0 * math.pi)) - 1) % self._n
+
+    def _ahead(self, position: Point) -> list[Point]:
+        """The farthest points of the shortest way in line of sight, with more room and less."""
+        to_go, clearance = self.to_go, self._clearance
+        assert clearance is not None
+        field = clearance[3]
+        if to_go.is_straight:
+            dx, dy = to_go.goal[0] - position[0], to_go.goal[1] - position[1]
+            away = math.sqrt(dx * dx + dy * dy)
+            part = min(1.0, self._reach_m / max(away, 1e-9))
+            return [(dx * part, dy * part)]
+        x, y = np.array([position[0]]), np.array([position[1]])
+        way = []
+        for _ in range(round(self._reach_m / _STEP_M)):
+            ux, uy = to_go.direction(x, y)
+            x, y = x + _STEP_M * ux, y + _STEP_M * uy
+            way.append((float(x[0]) - position[0], float(y[0]) - position[1]))
+        ends = np.array(way)
+        share = np.linspace(0.0, 1.0, 26)[1:]
+        xs = position[0] + ends[:, :1] * share
+        ys = position[1] + ends[:, 1:] * share
+        now = float(field.at(np.array([position[0]]), np.array([position[1]]))[0])
+        least = field.at(xs, ys).min(axis=1)
+        found = set()
+        for room_m in SIGHT_M:
+            seen = least > min(self._radius_m + room_m, now - 0.005)
+            found.add(int(np.flatnonzero(seen)[-1]) if seen.any() else 0)
+        return [way[k] for k in sorted(found)]
+
+    def _candidates(
+        self, ahead: Point, speed_mps: float, tick_s: float, last: Point | None, waits: bool
+    ) -> tuple[Array, Array, Array]:
+        qx, qy, t = self._qx, self._qy, self._length / speed_mps
+        length = math.hypot(*ahead) or 1.0
+        ux, uy = ahead[0] / length * speed_mps, ahead[1] / length * speed_mps
+        extra = [(ux * s * w, uy * s * w, w) for s in SPEEDS for w in WAITS_S if waits]
+        if last is not None:
+            extra.append((*last, max(math.hypot(*last) / speed_mps, tick_s)))
+        ex, ey, et = np.array(extra).reshape(-1, 3).T
+        return np.concatenate((ex, qx)), np.concatenate((ey, qy)), np.concatenate((et, t))
+
+    def _closed(self, evaluate: _Evaluation, speed_mps: float, observed: Array | None) -> Bits:
+        """Bits: 1 for a heading whose shortest waypoint is not reached without contact."""
+        length = LENGTHS[0] * self._reach_m
+        t = np.full(self._n, length / speed_mps)
+        closed = evaluate.contact(length * self._cos, length * self._sin, t)
+        if observed is not None:
+            closed |= ~observed
+        return tuple(closed.astype(int).tolist())
+
+
+class _Evaluation:
+    """The cost of waypoints (m,): eq. 1 with the distance to go, waiting, turning and risk."""
+
+    def __init__(
+        self,
+        rollout: MapRollout,
+        position: Point,
+        risk: RiskParams,
+        speed_mps: float,
+        to_go: DistanceToGo,
+        turn_delay: TurnDelay | None,
+    ) -> None:
+        self._rollout, self._position = rollout, position
+        self._risk, self._speed, self._to_go = risk, speed_mps, to_go
+        self._turn_delay = turn_delay
+
+    def __call__(self, qx: Array, qy: Array, t1: Array) -> tuple[Array, Array]:
+        """Cost and risk, m."""
+        risk, speed = self._risk, self._speed
+        length = np.sqrt(qx * qx + qy * qy)
+        cost = length + self._to_go.at(qx + self._position[0], qy + self._position[1])
+        cost += risk.waiting * (speed * t1 - length)
+        if self._turn_delay is not None:
+            cost += risk.waiting * speed * self._turn_delay.towards_all(qx, qy)
+        paths = self._rollout.paths(qx, qy, t1)
+        standing = self._rollout.standing_risk(paths, risk, MARGIN_M)
+        harm = np.maximum(standing, self._rollout.moving_risk(paths, risk))
+        return cost + harm, harm
+
+    def contact(self, qx: Array, qy: Array, t1: Array) -> Array:
+        """Whether the way to each waypoint touches something."""
+        paths = self._rollout.paths(qx, qy, t1, float(t1.max()))
+        horizon_s = max(float(t1.max()), 0.1)
+        brief = replace(self._risk, horizon_s=horizon_s, close_m=0.0, fast_close_s=0.0)
+        standing = self._rollout.standing_risk(paths, brief, MARGIN_M) >= FORBIDDEN_M
+        moving = self._rollout.moving_risk(paths, brief) > 0.0
+        touches: Array = standing | moving
+        return touches
