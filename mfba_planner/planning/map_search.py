@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.geometry import Point
-from ..core.planner_types import NANO, Bits
+from ..core.planner_types import Bits
 from ..perception.distance_field import DistanceField
 from ..perception.static_map import StaticMap
 from ..swarm.bat_swarm import BatSwarm
@@ -27,9 +27,7 @@ WAITS_S = (0.4, 1.0, 2.0)
 SPEEDS = (1e-6, 0.5)
 BATCH = 40  # candidates evaluated at once
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
-WINDOW_M = 7.0  # side of the square in which clearances are known
-KEPT_S = 0.15  # contact is ruled out by the points themselves
-_KEPT_M = 0.5  # the window is used again until the robot is so far from its middle
+WINDOW_M = 6.5  # side of the square in which clearances are known
 _STEP_M = 0.1
 SIGHT_M = (0.12, 0.07, 0.025)  # room beside a line of sight
 
@@ -59,19 +57,14 @@ class MapSearch:
         self._qx = (self._cos[:, None] * lengths).ravel()
         self._qy = (self._sin[:, None] * lengths).ravel()
         self._length = np.tile(lengths, headings)
-        self._clearance: tuple[int, int, Point, DistanceField] | None = None
+        self._clearance: tuple[int, DistanceField] | None = None
 
     def clearance(self, known: StaticMap, position: Point, stamp_ns: int) -> DistanceField:
-        """Distances to what stands around the robot; as of KEPT_S ago, where that will do."""
-        if self._clearance is not None:
-            then_ns, version, (x, y), field = self._clearance
-            near = abs(x - position[0]) < _KEPT_M and abs(y - position[1]) < _KEPT_M
-            fresh = 0.0 <= (stamp_ns - then_ns) * NANO < KEPT_S or version == known.version
-            if fresh and near:
-                return field
-        field = known.distance_field(position, WINDOW_M, known.params.cell_m)
-        self._clearance = (stamp_ns, known.version, position, field)
-        return field
+        """Distances to what stands around the robot."""
+        if self._clearance is None or self._clearance[0] != stamp_ns:
+            field = known.distance_field(position, WINDOW_M, known.params.cell_m)
+            self._clearance = (stamp_ns, field)
+        return self._clearance[1]
 
     def search(
         self,
@@ -154,7 +147,7 @@ class MapSearch:
         """The farthest points of the shortest way in line of sight, with more room and less."""
         to_go, clearance = self.to_go, self._clearance
         assert clearance is not None
-        field = clearance[3]
+        field = clearance[1]
         if to_go.is_straight:
             dx, dy = to_go.goal[0] - position[0], to_go.goal[1] - position[1]
             away = math.sqrt(dx * dx + dy * dy)
