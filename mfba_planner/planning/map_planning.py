@@ -205,14 +205,14 @@ class MapPlanning:
         velocity = (share * (c * ux + s * uy), share * (c * uy - s * ux))
         waypoint = (obs.pose.x + c * qx + s * qy, obs.pose.y + c * qy - s * qx)
         percent = 1e2 * share * math.hypot(ux, uy) / params.speed_mps
-        way = _STRAIGHT
+        reason = _STRAIGHT
         if not found.free or not to_go.is_straight:
-            way = f"the way through the map is {found.to_go_m:.3g} m"
+            reason = f"the way through the map is {found.to_go_m:.3g} m"
             if not found.free:
-                way += f"; costs {found.cost - found.to_go_m:.3g} m more"
+                reason += f"; costs {found.cost - found.to_go_m:.3g} m more"
         return Move(
             velocity=velocity,
-            reason=f"{way}, at {percent:.0f} % speed",
+            reason=f"{reason}, at {percent:.0f} % speed",
             event=Event.CLEAR if found.free and to_go.is_straight else Event.OBSTACLE,
             vs=found.closed,
             vg=found.closed,

@@ -29,7 +29,7 @@ BATCH = 40  # candidates evaluated at once
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
 WINDOW_M = 6.5  # side of the square in which clearances are known
 _STEP_M = 0.1
-SIGHT_M = (0.12, 0.07, 0.025)  # room beside a line of sight
+SIDE_ROOM_M = (0.12, 0.07, 0.025)  # room beside a line of sight
 
 
 class Found(NamedTuple):
@@ -154,22 +154,22 @@ class MapSearch:
             part = min(1.0, self._reach_m / max(away, 1e-9))
             return [(dx * part, dy * part)]
         x, y = np.array([position[0]]), np.array([position[1]])
-        way = []
+        path = []
         for _ in range(round(self._reach_m / _STEP_M)):
             ux, uy = to_go.direction(x, y)
             x, y = x + _STEP_M * ux, y + _STEP_M * uy
-            way.append((float(x[0]) - position[0], float(y[0]) - position[1]))
-        ends = np.array(way)
+            path.append((float(x[0]) - position[0], float(y[0]) - position[1]))
+        ends = np.array(path)
         share = np.linspace(0.0, 1.0, 26)[1:]
         xs = position[0] + ends[:, :1] * share
         ys = position[1] + ends[:, 1:] * share
         now = float(field.at(np.array([position[0]]), np.array([position[1]]))[0])
         least = field.at(xs, ys).min(axis=1)
         found = set()
-        for room_m in SIGHT_M:
-            seen = least > min(self._radius_m + room_m, now - 0.005)
-            found.add(int(np.flatnonzero(seen)[-1]) if seen.any() else 0)
-        return [way[k] for k in sorted(found)]
+        for room_m in SIDE_ROOM_M:
+            clear = least > min(self._radius_m + room_m, now - 0.005)
+            found.add(int(np.flatnonzero(clear)[-1]) if clear.any() else 0)
+        return [path[k] for k in sorted(found)]
 
     def _candidates(
         self, ahead: Point, speed_mps: float, tick_s: float, last: Point | None, waits: bool
