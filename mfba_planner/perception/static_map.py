@@ -48,7 +48,7 @@ _YOUNG_S = 4.0  # a moving circle takes younger points with it
 _ESTABLISHED_S = 1.0  # scans are matched to points that are older
 _STILL_M = 5e-4  # points are not moved by less
 _ALIKE = 0.3  # cosine between normals of the same surface
-_CREEP_M, _CREEP_SD = 0.006, 2.0  # of the mean of a scan's returns from their point
+_CREEP_M, _CREEP_SD = 0.006, 3.0  # of the mean of a scan's returns from their point
 _MOST_HITS = 20.0  # that count in a point's mean
 _SAME_M, _SAME_SD, _MOST_SAME_M = 0.025, 2.5, 0.05  # returns nearer to a point are its own
 _ALONE_M = 0.006  # so near to a beam is a point that is thinner than the beams are apart
@@ -244,7 +244,8 @@ class StaticMap:
         dx = np.bincount(of, rest * nx, n)[met] / count[met]
         dy = np.bincount(of, rest * ny, n)[met] / count[met]
         # A point whose returns have left it follows them at once: what creeps is in the map too.
-        left = dx * dx + dy * dy > (_CREEP_M + _CREEP_SD * self._matching.noise_m) ** 2
+        noise_m = self._matching.noise_m / np.sqrt(count[met])
+        left = dx * dx + dy * dy > (_CREEP_M + _CREEP_SD * noise_m) ** 2
         data[HITS, met[left]] = 1.0
         data[FIRST, met[left]] = self._time_s
         gain = 1.0 / np.minimum(data[HITS][met], _MOST_HITS)

@@ -77,6 +77,8 @@ class MapPlanning:
         unobserved: np.ndarray | None,
         last_waypoint: Point | None,
         tick_s: float,
+        *,
+        bats: bool = True,
     ) -> Move | None:
         """The next move; None where nothing stands in the way."""
         known, params = self.map, self._params
@@ -119,7 +121,7 @@ class MapPlanning:
         observed = None if unobserved is None else ~unobserved
         found = self._search.search(
             rollout, position, self._risk, speed, tick_s, delay, observed, last,
-            lambda center: self._swarm(center, obs.stamp_ns),
+            lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
         )  # fmt: skip
         return self._as_move(obs, found, position, turn, points[away < 1.0], circles, tick_s)
 

@@ -76,11 +76,12 @@ class MapSearch:
         turn_delay: TurnDelay | None,
         observed: Array | None,
         last: Point | None,
-        swarm_at: Callable[[Point], BatSwarm],
+        swarm_at: Callable[[Point], BatSwarm | None],
     ) -> Found:
         """The cheapest waypoint.
 
         observed (n,): headings that may be driven; None: all. last: the last waypoint.
+        swarm_at: a swarm around a waypoint; None: no search by bats.
         """
         evaluate = _Evaluation(rollout, position, risk, speed_mps, self.to_go, turn_delay)
         (px, py), to_go = position, self.to_go
@@ -117,28 +118,36 @@ class MapSearch:
                 best = ((float(qx[i]), float(qy[i])), float(t[i]))
         closed = self._closed(evaluate, speed_mps, observed)
         swarm = swarm_at(best[0])
+        asked: tuple[Point, ...] = ()
+        if swarm is not None:
+            best, best_cost = self._refine(swarm, evaluate, observed, best, best_cost, tick_s)
+            asked = tuple((x, y) for x, y in swarm.candidates)
+        return Found(*best, best_cost, here, closed, asked, False)
+
+    def _refine(
+        self,
+        swarm: BatSwarm,
+        evaluate: _Evaluation,
+        observed: Array | None,
+        best: tuple[Point, float],
+        best_cost: float,
+        tick_s: float,
+    ) -> tuple[tuple[Point, float], float]:
+        """Waypoint, t1 and cost after a search by bats."""
         for _ in range(swarm.horizon + 1):
             asked = np.array(swarm.ask())
-            bx, by = asked[:, 0], asked[:, 1]
-            bt = np.maximum(np.sqrt(bx * bx + by * by) / speed_mps, tick_s)
-            cost, _ = evaluate(bx, by, bt)
+            x, y = asked[:, 0], asked[:, 1]
+            t = np.maximum(np.sqrt(x * x + y * y) / evaluate.speed_mps, tick_s)
+            cost, _ = evaluate(x, y, t)
             if observed is not None:
-                headings = np.round(np.arctan2(by, bx) * self._n / (2.0 * math.pi)).astype(int) - 1
+                headings = np.round(np.arctan2(y, x) * self._n / (2.0 * math.pi)).astype(int) - 1
                 cost[~observed[headings % self._n]] = math.inf
             swarm.tell(cost.tolist())
-        if swarm.best_value < best_cost:
-            x, y = swarm.best_x
-            best = ((x, y), max(math.hypot(x, y) / speed_mps, tick_s))
-            best_cost = swarm.best_value
-        return Found(
-            best[0],
-            best[1],
-            best_cost,
-            here,
-            closed,
-            tuple((x, y) for x, y in swarm.candidates),
-            False,
-        )
+        if swarm.best_value >= best_cost:
+            return best, best_cost
+        qx, qy = swarm.best_x
+        t1 = max(math.hypot(qx, qy) / evaluate.speed_mps, tick_s)
+        return ((qx, qy), t1), swarm.best_value
 
     def _heading(self, q: Point) -> int:
         return (round(math.atan2(q[1], q[0]) * self._n / (2.0 * math.pi)) - 1) % self._n
@@ -206,12 +215,12 @@ class _Evaluation:
         turn_delay: TurnDelay | None,
     ) -> None:
         self._rollout, self._position = rollout, position
-        self._risk, self._speed, self._to_go = risk, speed_mps, to_go
+        self._risk, self.speed_mps, self._to_go = risk, speed_mps, to_go
         self._turn_delay = turn_delay
 
     def __call__(self, qx: Array, qy: Array, t1: Array) -> tuple[Array, Array]:
         """Cost and risk, m."""
-        risk, speed = self._risk, self._speed
+        risk, speed = self._risk, self.speed_mps
         length = np.sqrt(qx * qx + qy * qy)
         cost = length + self._to_go.at(qx + self._position[0], qy + self._position[1])
         cost += risk.waiting * (speed * t1 - length)

@@ -103,6 +103,7 @@ class Predictive(BasePlanner):
     """
 
     reads_sectors = False
+    has_bats = True
     preset = staticmethod(preset)
     _perceived: Sequence[Circle] = ()
     _by_sectors = True
@@ -142,7 +143,14 @@ class Predictive(BasePlanner):
         self._unobserved = None if obs.scan is None else self._coverage.unsafe(obs.pose_ns)
         if obs.scan is not None and obs.circles is None:
             among = self._map_planning.move(
-                obs, goal, circles, self._speeds, self._unobserved, last_waypoint, self.tick_s
+                obs,
+                goal,
+                circles,
+                self._speeds,
+                self._unobserved,
+                last_waypoint,
+                self.tick_s,
+                bats=self.has_bats,
             )
             if among is not None:
                 if among.event is Event.OBSTACLE:

@@ -361,7 +361,8 @@ def test_the_cheapest_candidate_is_found_without_evaluating_all(
 def test_a_longer_candidate_in_the_same_direction_may_be_cheaper() -> None:
     """The risk of a slow approach is smaller if the segment ends later."""
     beside = Circle(center_m=(0.0, 0.74), radius_m=0.6, velocity_mps=(0.8, -0.05))
-    world = TrajectoryCost((0.0, 0.0), [beside], RiskParams(), 0.1, 0.8)
+    slow = RiskParams(fast_margin_s=0.0, fast_close_s=0.0)
+    world = TrajectoryCost((0.0, 0.0), [beside], slow, 0.1, 0.8)
     candidates = [(5.0, (1.0, 0.0), 1.25, 0), (5.0, (2.0, 0.0), 2.5, 0)]
     found = world.cheapest(candidates, (5.0, 0.0), 0.8, 5.06)
     assert found is not None

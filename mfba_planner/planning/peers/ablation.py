@@ -62,6 +62,8 @@ class BitsOnly(Predictive):
 class NoBats(Predictive):
     """The best candidate waypoint, not refined by bats."""
 
+    has_bats = False
+
     def _refine(self, *_: Any) -> Any:
         return SimpleNamespace(best_value=math.inf, best_x=(0.0, 0.0), candidates=())
 
