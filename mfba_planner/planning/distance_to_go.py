@@ -107,9 +107,7 @@ class DistanceToGo:
         to_go = eikonalfm.fast_marching(speed, (j, i), (self._cell_m, self._cell_m), 2)
         self._to_go = to_go
         self._speed = speed
-        dy, dx = np.gradient(to_go, self._cell_m)
-        step = dx + 1j * dy
-        self._step = -step / (np.abs(step) + 1e-12)
+        self._step = _downhill(to_go)
 
     def _is_inside(self, position: Point) -> bool:
         if self._to_go is None:
@@ -187,6 +185,22 @@ def _speed(clearance_m: Array, radius_m: float) -> Array:
     speed = _SLOWEST + (1.0 - _SLOWEST) * np.minimum(room, 1.0)
     speed[room < 0.0] = _CLOSED
     return speed
+
+
+def _downhill(to_go: Array) -> Array:
+    """Unit vectors (complex) down the distance to go; 0 at its least.
+
+    By differences to the lower neighbours alone, as in the scheme that computes it: central ones
+    would point across a narrow door, at what closes it.
+    """
+    padded = np.pad(to_go, 1, constant_values=np.inf)
+    left, right = to_go - padded[1:-1, :-2], to_go - padded[1:-1, 2:]
+    below, above = to_go - padded[:-2, 1:-1], to_go - padded[2:, 1:-1]
+    step = np.maximum(np.maximum(left, right), 0.0) * np.where(right > left, 1.0, -1.0) + 1j * (
+        np.maximum(np.maximum(below, above), 0.0) * np.where(above > below, 1.0, -1.0)
+    )
+    found: Array = step / (np.abs(step) + 1e-12)
+    return found
 
 
 def _bilinear(values: Array, u: Array, v: Array) -> Array:
