@@ -49,7 +49,8 @@ class MapPlanning:
         seed: int,
     ) -> None:
         """Start with an empty map."""
-        self._params, self._risk, self._seed = params, risk, seed
+        self._params, self._seed = params, seed
+        self._risk = risk.for_turning() if params.turns else risk
         self._search_m = search_m
         self.map = StaticMap(map_params)
         self._search = MapSearch(route, params.robot_radius_m, headings, reach_m)
@@ -80,6 +81,11 @@ class MapPlanning:
         position, turn = self._in_map(obs.pose.position)
         to_go = self._search.to_go
         to_go.update(obs.pose_ns, known, position, self._in_map(goal)[0])
+        if to_go.closed_by:
+            return Move(
+                velocity=(0.0, 0.0), reason=f"no way to the goal: closed by {to_go.closed_by}",
+                event=Event.NO_GAP,
+            )  # fmt: skip
         points = known.map_points()
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
         if to_go.is_straight and float(away.min()) > NEAR_M:

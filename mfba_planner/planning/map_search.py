@@ -232,7 +232,8 @@ class _Evaluation:
     def contact(self, qx: Array, qy: Array, t1: Array) -> Array:
         """Whether the way to each waypoint touches something."""
         paths = self._rollout.paths(qx, qy, t1, float(t1.max()))
-        brief = replace(self._risk, horizon_s=max(float(t1.max()), 0.1), close_m=0.0)
+        horizon_s = max(float(t1.max()), 0.1)
+        brief = replace(self._risk, horizon_s=horizon_s, close_m=0.0, fast_close_s=0.0)
         standing = self._rollout.standing_risk(paths, brief, MARGIN_M) >= FORBIDDEN_M
         moving = self._rollout.moving_risk(paths, brief) > 0.0
         touches: Array = standing | moving
