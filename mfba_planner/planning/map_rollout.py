@@ -30,6 +30,7 @@ FORBIDDEN_M = 1000.0  # cost of a contact before the waypoint with what stands
 CARROT_M = 0.4  # a differential base aims so far ahead along the shortest way
 SLOW_ROOM_M, SLOWEST = 0.15, 0.4  # room below which a differential base slows down, and to what
 _REACHED_M = 0.1
+_ROUNDING = 1.0 - 1e-9
 _LONGEST = 2.0  # horizons, waiting and turning included
 
 
@@ -250,7 +251,7 @@ class MapRollout:
         c = (a * at + 2.0 * b) * at + away
         driven = paths.driven_s[:, :-1]
         outer = (r + margin) ** 2
-        near = (b < 0.0) & (c < outer) & (driven < tau)
+        near = (b < 0.0) & (c < np.minimum(outer, away * _ROUNDING)) & (driven < tau)
         if not near.any():
             return np.zeros(m)
         left = 1.0 - (driven + at) / tau
