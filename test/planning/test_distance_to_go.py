@@ -242,3 +242,47 @@ def test_what_stands_beside_the_robot_does_not_close_the_way_from_it() -> None:
     assert is_clear(known, START, (3.0, 0.0), RADIUS_M)
     assert not is_clear(known, START, (-3.0, 0.0), RADIUS_M)
     assert is_clear(known, START, START, RADIUS_M)
+
+
+def closed_by(known: PointMap, goal: Point, seconds: float) -> str:
+    """After so many seconds at rest, ten updates each, of a map that does not change."""
+    to_go = DistanceToGo(RouteParams(), RADIUS_M)
+    for k in range(round(10 * seconds) + 1):
+        to_go.update(SECOND_NS + k * SECOND_NS // 10, known, START, goal)
+    return to_go.closed_by
+
+
+def test_what_closes_every_way_is_said_once_it_lasts() -> None:
+    ring = [(math.cos(a), math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 180).tolist()]
+    around_goal = PointMap([(4.0 + x, y) for x, y in ring])
+    assert closed_by(around_goal, (4.0, 0.0), 0.5) == "", "a person may pass"
+    assert "around the goal" in closed_by(around_goal, (4.0, 0.0), 5.0)
+    assert "around the robot" in closed_by(PointMap(ring), (4.0, 0.0), 5.0)
+    on_it = PointMap(polyline((4.0, -1.0), (4.0, 1.0)))
+    assert "0.10 m from its middle" in closed_by(on_it, (4.1, 0.0), 5.0)
+    opened = PointMap([(x, y) for x, y in ring if abs(y) > 0.4 or x > 0.0])
+    assert closed_by(opened, (4.0, 0.0), 5.0) == ""
+
+
+def test_a_way_that_opens_again_is_not_closed() -> None:
+    ring = [(math.cos(a), math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 180).tolist()]
+    to_go = DistanceToGo(RouteParams(), RADIUS_M)
+    for second in range(1, 5):
+        to_go.update(second * SECOND_NS, PointMap(ring), START, (4.0, 0.0))
+    assert to_go.closed_by
+    to_go.update(5 * SECOND_NS, PointMap(ring[30:]), START, (4.0, 0.0))
+    assert to_go.closed_by
+    opened = PointMap(ring[30:])
+    opened.version += 1
+    to_go.update(6 * SECOND_NS, opened, START, (4.0, 0.0))
+    assert to_go.closed_by == ""
+
+
+@pytest.mark.parametrize("half_m", [3.0, 5.5, 9.5])
+def test_the_way_round_a_long_wall_is_found(half_m: float) -> None:
+    """Also where its ends are farther away than what is looked at first."""
+    known = PointMap(polyline((2.0, -half_m), (2.0, half_m)))
+    found = at(made(known, (4.0, 0.0)), START)
+    shortest = 2.0 * math.hypot(2.0, half_m)
+    assert shortest < found < 1.1 * shortest + 2.0
+    assert closed_by(known, (4.0, 0.0), 5.0) == ""

@@ -24,6 +24,7 @@ OMNI, TURNS = Base(), Base(drive=Drive.DIFFERENTIAL)
 RISK = RiskParams()
 FAR = Circle(center_m=(0.5, -2.5), radius_m=0.5, velocity_mps=(0.0, 0.1))  # in reach, no risk
 MARGIN_M = 0.1
+REST = Speeds()
 
 waypoints = st.tuples(st.floats(0.3, 2.5), st.floats(-math.pi, math.pi)).map(
     lambda polar: (polar[0] * math.cos(polar[1]), polar[0] * math.sin(polar[1]))
@@ -37,7 +38,7 @@ def rollout(
     position: Point = (0.0, 0.0),
     yaw: float = 0.0,
     base: Base = OMNI,
-    speeds: Speeds = Speeds(),
+    speeds: Speeds = REST,
 ) -> tuple[MapRollout, DistanceToGo]:
     to_go = DistanceToGo(RouteParams(), RADIUS_M)
     to_go.update(1, known, position, goal)
@@ -274,9 +275,9 @@ def test_alone_nothing_can_be_met_within_the_horizon(
 
 
 def standing(
-    known: PointMap, *waypoint_list: Point, moving: bool = False, **kwargs
-) -> list[float]:  # type: ignore[no-untyped-def]
-    made, _ = rollout(known, (9.0, 0.0), *((FAR,) if moving else ()), **kwargs)
+    known: PointMap, *waypoint_list: Point, moving: bool = False, base: Base = OMNI
+) -> list[float]:
+    made, _ = rollout(known, (9.0, 0.0), *((FAR,) if moving else ()), base=base)
     qx, qy = np.array(waypoint_list).T
     paths = made.paths(qx, qy, np.hypot(qx, qy) / SPEED)
     found: list[float] = made.standing_risk(paths, RISK, MARGIN_M).tolist()
