@@ -8,6 +8,7 @@ the full speed, small near what stands. Unknown space counts as free.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,8 +116,8 @@ class DistanceToGo:
         self._cell_m = fine * per_cell
         field = known.rectangle_field(low, high, fine)
         self._origin = field.origin_m
-        speed = _speed(field.distance_m, self._radius_m)
-        speed = _widest(speed, per_cell)
+        widest_m = _widest(field.distance_m, per_cell)
+        speed = _speed(widest_m, self._radius_m)
         height, width = speed.shape
         i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
         j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
@@ -127,7 +128,7 @@ class DistanceToGo:
             return ""  # the map does not reach so far
         cell = (position[0] - self._origin[0]) / self._cell_m
         row = (position[1] - self._origin[1]) / self._cell_m
-        closing, leads_out = self._closed(field, (int(row), int(cell)), (j, i), goal)
+        closing, leads_out = self._closed(field, widest_m, (int(row), int(cell)), (j, i), goal)
         all_m = 0.5 * known.params.size_m + _LEAST_MARGIN_M
         if leads_out and self._margin_m < all_m:
             # Beyond what the map holds, all is free: a way round is known or assumed there.
@@ -136,7 +137,12 @@ class DistanceToGo:
         return closing
 
     def _closed(
-        self, field: DistanceField, start: tuple[int, int], end: tuple[int, int], goal: Point
+        self,
+        field: DistanceField,
+        widest_m: Array,
+        start: tuple[int, int],
+        end: tuple[int, int],
+        goal: Point,
     ) -> tuple[str, bool]:
         """What closes every way between two cells: none is as wide as the robot.
 
@@ -147,7 +153,7 @@ class DistanceToGo:
         nearest_m = float(field.at(np.array([goal[0]]), np.array([goal[1]]))[0])
         if nearest_m < self._radius_m - _CLEAR_M:
             return f"what stands {nearest_m:.2f} m from its middle", False
-        open_ = _widest(field.distance_m, round(self._cell_m / field.cell_m)) > self._radius_m
+        open_ = widest_m > self._radius_m
         open_[max(start[0] - 1, 0) : start[0] + 2, max(start[1] - 1, 0) : start[1] + 2] = True
         open_[end] = True
         number = label(open_, np.ones((3, 3)))[0]
@@ -238,9 +244,10 @@ def _domain(
 
 def _widest(values: Array, per_cell: int) -> Array:
     """The largest value within each cell: the widest part decides, or narrow doors would close."""
-    height, width = (n // per_cell for n in values.shape)
-    whole = values[: height * per_cell, : width * per_cell]
-    largest: Array = whole.reshape(height, per_cell, width, per_cell).max(axis=(1, 3))
+    height, width = (n // per_cell * per_cell for n in values.shape)
+    parts = [values[:height, i:width:per_cell] for i in range(per_cell)]
+    rows = functools.reduce(np.maximum, parts)
+    largest: Array = functools.reduce(np.maximum, [rows[j::per_cell] for j in range(per_cell)])
     return largest
 
 

@@ -155,36 +155,49 @@ class MapRollout:
         v, omega = np.full(m, self._speeds.v), np.full(m, self._speeds.omega)
         share = np.sqrt(qx * qx + qy * qy) / (t1 * full)
         qx, qy = qx + px, qy + py
-        waits = share < 0.9
+        waits, waiting_mps = share < 0.9, full * share
+        any_waits = bool(waits.any())
+        longest_wait_s = float(t1[waits].max()) if any_waits else 0.0
         gx, gy = self._to_go.goal
         arrived = np.full(m, steps)
         on_first = np.ones(m, dtype=bool)
         most, most_turn = accel * h, alpha * h
         xs[:, 0], ys[:, 0] = x, y
         for k in range(steps):
-            ax, ay = self._to_go.direction(x, y)
-            dx = np.where(on_first, qx - x, CARROT_M * ax)
-            dy = np.where(on_first, qy - y, CARROT_M * ay)
-            goal_m = np.sqrt((gx - x) ** 2 + (gy - y) ** 2)
+            dx, dy = qx - x, qy - y
+            if not on_first.all():
+                ax, ay = self._to_go.direction(x, y)
+                dx = np.where(on_first, dx, CARROT_M * ax)
+                dy = np.where(on_first, dy, CARROT_M * ay)
+            goal_x, goal_y = gx - x, gy - y
+            goal_m = np.sqrt(goal_x * goal_x + goal_y * goal_y)
             error = np.arctan2(dy, dx) - yaw
             error = np.remainder(error + math.pi, 2.0 * math.pi) - math.pi
-            sign = np.ones(m)
-            if base.reverse:
-                back = np.abs(error) > 0.5 * math.pi
+            back = np.abs(error) > 0.5 * math.pi if base.reverse else None
+            if back is not None and back.any():
                 error = np.where(back, np.remainder(error, 2.0 * math.pi) - math.pi, error)
                 error = np.where(error > math.pi, error - 2.0 * math.pi, error)
-                sign[back] = -1.0
+            else:
+                back = None
             off = np.abs(error)
             turn = np.copysign(np.minimum(_brake(off, alpha, h), fastest), error)
             room = self._clearance.at(x, y) - self._radius_m
-            wanted = full * np.clip(room / SLOW_ROOM_M, SLOWEST, 1.0)
-            wanted = np.where(waits & (k * h < t1), full * share, wanted)
+            wanted = full * np.minimum(np.maximum(room / SLOW_ROOM_M, SLOWEST), 1.0)
+            if any_waits and k * h < longest_wait_s:
+                wanted = np.where(waits & (k * h < t1), waiting_mps, wanted)
             wanted = np.minimum(wanted, _brake(goal_m, accel, h))
-            wanted = sign * wanted * np.maximum(1.0 - off / first_rad, 0.0)
-            before, v = v, v + np.clip(wanted - v, -most, most)
-            mean = v - 0.5 * (v - before) * np.abs(v - before) / most
-            before, omega = omega, omega + np.clip(turn - omega, -most_turn, most_turn)
-            mean_turn = omega - 0.5 * (omega - before) * np.abs(omega - before) / most_turn
+            wanted = wanted * np.maximum(1.0 - off / first_rad, 0.0)
+            if back is not None:
+                wanted = np.where(back, -wanted, wanted)
+            before, v = v, v + np.minimum(np.maximum(wanted - v, -most), most)
+            change = v - before
+            mean = v - 0.5 * change * np.abs(change) / most
+            before, omega = (
+                omega,
+                omega + np.minimum(np.maximum(turn - omega, -most_turn), most_turn),
+            )
+            change = omega - before
+            mean_turn = omega - 0.5 * change * np.abs(change) / most_turn
             middle = yaw + 0.5 * mean_turn * h
             x, y, yaw = (
                 x + mean * np.cos(middle) * h,
@@ -193,13 +206,15 @@ class MapRollout:
             )
             xs[:, k + 1], ys[:, k + 1] = x, y
             driven[:, k + 1] = driven[:, k] + np.abs(mean) * h / full
-            reach = np.maximum(_REACHED_M, np.abs(v) * h)
-            ended = np.where(
-                waits, (k + 1) * h >= t1, (qx - x) ** 2 + (qy - y) ** 2 < reach * reach
-            )
-            reached = on_first & ended
-            arrived[reached] = k + 1
-            on_first &= ~reached
+            if on_first.any():
+                reach = np.maximum(_REACHED_M, np.abs(v) * h)
+                dx, dy = qx - x, qy - y
+                ended = dx * dx + dy * dy < reach * reach
+                if any_waits:
+                    ended = np.where(waits, (k + 1) * h >= t1, ended)
+                reached = on_first & ended
+                arrived[reached] = k + 1
+                on_first &= ~reached
             if not on_first.any() if self.alone else float(driven[:, k + 1].min()) >= horizon_s:
                 steps = k + 1
                 break
