@@ -103,33 +103,34 @@ class MapRollout:
         driven = np.zeros((m, steps + 1))
         x, y = np.full(m, px), np.full(m, py)
         qx, qy = qx + px, qy + py
-        first_mps = np.sqrt((qx - px) ** 2 + (qy - py) ** 2) / t1
+        first_m = np.sqrt((qx - px) ** 2 + (qy - py) ** 2) / t1 * h
         arrived = np.full(m, steps)
         on_first = np.ones(m, dtype=bool)
         gx, gy = self._to_go.goal
         xs[:, 0], ys[:, 0] = x, y
+        any_first, any_second = True, False
         for k in range(steps):
-            dx, dy = qx - x, qy - y
-            left = np.sqrt(dx * dx + dy * dy)
-            if not on_first.all():
+            if any_first:
+                dx, dy = qx - x, qy - y
+                left = np.sqrt(dx * dx + dy * dy)
+                scale = 1.0 / np.maximum(left, 1e-12)
+                dx, dy, length = dx * scale, dy * scale, np.minimum(first_m, left)
+            if any_second:
                 ax, ay = self._to_go.direction(x, y)
-                goal_m = np.sqrt((gx - x) ** 2 + (gy - y) ** 2)
-                scale = 1.0 / np.maximum(left, 1e-12)
-                dx = np.where(on_first, dx * scale, ax)
-                dy = np.where(on_first, dy * scale, ay)
-                length = np.where(
-                    on_first, np.minimum(first_mps * h, left), np.minimum(full * h, goal_m)
-                )
-            else:
-                scale = 1.0 / np.maximum(left, 1e-12)
-                dx, dy = dx * scale, dy * scale
-                length = np.minimum(first_mps * h, left)
+                goal_x, goal_y = gx - x, gy - y
+                on_m = np.minimum(full * h, np.sqrt(goal_x * goal_x + goal_y * goal_y))
+                if any_first:
+                    ax, ay = np.where(on_first, dx, ax), np.where(on_first, dy, ay)
+                    on_m = np.where(on_first, length, on_m)
+                dx, dy, length = ax, ay, on_m
             x, y = x + length * dx, y + length * dy
             xs[:, k + 1], ys[:, k + 1] = x, y
             driven[:, k + 1] = driven[:, k] + length / full
-            reached = on_first & (left <= first_mps * h * (1.0 + 1e-9))
-            arrived[reached] = k + 1
-            on_first &= ~reached
+            if any_first:
+                reached = on_first & (left <= first_m * (1.0 + 1e-9))
+                arrived[reached] = k + 1
+                on_first &= ~reached
+                any_first, any_second = bool(on_first.any()), not on_first.all()
         return Paths(xs, ys, h, driven, arrived)
 
     def _straight(self, qx: Array, qy: Array, t1: Array) -> Paths:
