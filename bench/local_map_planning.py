@@ -60,7 +60,7 @@ PARTS = {
 def circles(seed: int, reach_m: float, drive: Drive) -> Scenario:
     """300 circles of 0.15 m as in BARN, away from start and goal."""
     rng = np.random.default_rng(seed)
-    found = []
+    found = list[Obstacle]()
     while len(found) < 300:
         x, y = rng.uniform(-0.5 * SIZE_M, 0.5 * SIZE_M, size=2).tolist()
         if min(distance((x, y), START), distance((x, y), GOAL)) > 1.0:

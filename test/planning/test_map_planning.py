@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.mapped_scenes import wall
-from helpers.point_maps import PointMap
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mapped_scenes import wall
+from point_maps import PointMap
 
 from mfba_planner.core.geometry import Point, Pose2D
 from mfba_planner.core.planner_types import Decision, Mode, Observation
@@ -36,6 +36,7 @@ from mfba_planner.simulation.simulated_lidar import scan_at
 RADIUS_M = 0.3
 LIDAR = Lidar(beams=360, range_max_m=3.5)
 PARAMS = preset(PlannerParams(method=Method.PREDICTIVE, speed_mps=1.0))
+COARSE = replace(PARAMS, step_length_m=0.15)  # fewer decisions
 
 
 def walls(*corners: Point) -> tuple[Segment, ...]:
@@ -70,7 +71,7 @@ def driven(
         name="x", start_m=START, goal_m=goal, robot_radius_m=RADIUS_M, segments_m=segments,
         obstacles=obstacles, time_limit_s=limit_s, robot=Robot(lidar=LIDAR, drive=drive),
     )  # fmt: skip
-    return simulate(scenario, planner=PARAMS, sensor=SensorParams(), seed=seed)
+    return simulate(scenario, planner=COARSE, sensor=SensorParams(), seed=seed)
 
 
 @pytest.mark.parametrize("seed", [0, 1])

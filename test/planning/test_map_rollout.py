@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.point_maps import PointMap, polyline
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from point_maps import PointMap, polyline
 
 from mfba_planner.core.geometry import Point, Pose2D
 from mfba_planner.core.planner_types import Circle, Decision, Mode

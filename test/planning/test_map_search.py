@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from helpers.point_maps import PointMap, polyline
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from point_maps import PointMap, polyline
 
 from mfba_planner.core.geometry import Point
 from mfba_planner.core.planner_types import Circle
@@ -87,7 +87,7 @@ def test_no_waypoint_on_a_heading_is_cheaper(
             math.hypot(*found.waypoint)
             + float(one.search.to_go.at(*(np.array([q]) for q in found.waypoint))[0])
         )
-        assert found.closed == found.candidates == ()
+        assert (found.closed, found.candidates) == ((), ())
         return
     least = min(
         one.cost((c * share * REACH_M, s * share * REACH_M), share * REACH_M / SPEED)
