@@ -95,7 +95,7 @@ def place(name: str, reach_m: float, drive: Drive, **what: Any) -> Scenario:
 
 Make = Callable[[int, float, Drive], Scenario]
 ROWS: dict[str, tuple[Make, float, Drive]] = {
-    f"{kind}, {drive.value}, {reach_m:g} m": (make, reach_m, drive)
+    f"{kind}-{drive.value}-{reach_m:g}-m": (make, reach_m, drive)
     for drive in Drive
     for kind, make in (("circles", circles), ("rooms", rooms))
     for reach_m in (3.5, 10.0)
