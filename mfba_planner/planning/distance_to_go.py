@@ -209,7 +209,7 @@ class DistanceToGo:
 
 def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:
     """Whether no point of the map is nearer to the line than room_m; its ends may be."""
-    points = known.map_points()
+    points = known.established_points()
     if not points.shape[0]:
         return True
     x, y = points[:, 0] - start[0], points[:, 1] - start[1]

@@ -31,6 +31,7 @@ class PointMap(StaticMap):
         """Start with some points."""
         super().__init__()
         self.fields = 0
+        self._time_s = 1e3  # all points have been there for long
         self.mark(list(points))
 
     def mark(self, points: Sequence[Point]) -> None:

@@ -135,12 +135,12 @@ def test_after_a_jump_of_the_odometry_the_map_is_dropped() -> None:
     """The goal lies behind the remembered wall, which is out of view at the new place."""
     planner = Predictive(PARAMS, SensorParams(), 0)
     line, goal = ((2.0, -1.5), (2.0, 1.5)), (8.0, 0.0)
-    for tick in range(8):
+    for tick in range(40):
         decision = planner.plan(observed(Pose2D(0.0, 0.0), goal, tick, line))
     assert "through the map" in decision.reason
-    kept = planner.plan(observed(Pose2D(-0.05, 0.0), goal, 8))
+    kept = planner.plan(observed(Pose2D(-0.05, 0.0), goal, 40))
     assert "through the map" in kept.reason
-    jumped = planner.plan(observed(Pose2D(-6.0, 0.0), goal, 9))
+    jumped = planner.plan(observed(Pose2D(-6.0, 0.0), goal, 41))
     assert "through the map" not in jumped.reason
     assert jumped.velocity == pytest.approx((1.0, 0.0))
 
