@@ -167,7 +167,7 @@ def test_the_clearances_are_taken_again_when_they_are_old_or_the_robot_has_left(
     known = PointMap([(1.0, 0.0)])
     search = MapSearch(RouteParams(), RADIUS_M, HEADINGS, REACH_M)
     first = search.clearance(known, HERE, 10**9)
-    assert search.clearance(known, (0.1, 0.0), 10**10) is first, "the map is the same"
+    assert search.clearance(known, (0.1, 0.0), 10**9) is first, "a moment ago"
     moved = search.clearance(known, (2.0, 0.0), 10**9)
     assert moved is not first
     assert float(moved.at(np.array([4.5]), np.array([1.0]))[0]) == known.params.widest_m
