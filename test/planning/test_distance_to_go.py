@@ -66,7 +66,7 @@ def test_where_nothing_is_known_it_is_the_straight_line(goal: Point, point: Poin
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(1.0, 4.0), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
-def test_in_sight_of_the_goal_it_is_the_straight_line(x: float, y: float, gy: float) -> None:
+def test_in_view_of_the_goal_it_is_the_straight_line(x: float, y: float, gy: float) -> None:
     """The wall is behind them and farther away than where the robot slows down."""
     goal = (6.0, gy)
     to_go = made(PointMap(polyline((0.0, -3.0), (0.0, 3.0))), goal, (-1.0, 0.0))
@@ -90,7 +90,7 @@ def test_round_a_wall_it_is_the_string_round_its_end(high: float, goal: Point) -
     assert unhindered < 1.3 * shortest
 
 
-def test_the_shorter_way_round_is_taken() -> None:
+def test_the_shorter_path_round_is_taken() -> None:
     known = PointMap(polyline((2.0, -1.0), (2.0, 2.0)))
     path = followed(made(known, (4.0, 0.0)), START, 9.0)
     assert math.dist(tuple(path[-1]), (4.0, 0.0)) < 0.3
@@ -111,9 +111,9 @@ def test_a_door_is_taken_where_the_robot_fits(width_m: float) -> None:
 
 def test_what_is_unknown_counts_as_free() -> None:
     """Of a wall only the part that was seen: it may end there."""
-    seen, whole = PointMap(polyline((2.0, -1.0), (2.0, 1.0))), PointMap()
+    part, whole = PointMap(polyline((2.0, -1.0), (2.0, 1.0))), PointMap()
     whole.mark(polyline((2.0, -4.0), (2.0, 4.0)))
-    assert at(made(seen, (4.0, 0.0)), START) < at(made(whole, (4.0, 0.0)), START) - 3.0
+    assert at(made(part, (4.0, 0.0)), START) < at(made(whole, (4.0, 0.0)), START) - 3.0
 
 
 discs = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=1, max_size=8)
@@ -143,7 +143,7 @@ def test_it_is_never_shorter_than_the_straight_line_and_falls_along_its_directio
     assert known.least_m(path) > RADIUS_M - 0.05
 
 
-def test_a_goal_far_away_is_seen_beyond_the_domain() -> None:
+def test_a_goal_far_away_is_measured_beyond_the_domain() -> None:
     known = PointMap(polyline((2.0, -2.0), (2.0, 2.0)))
     for goal in ((60.0, 0.0), (500.0, 300.0)):
         to_go = made(known, goal)
@@ -237,7 +237,7 @@ def test_a_line_is_clear_where_no_point_is_near_to_it(
         assert found == (nearest > room_m)
 
 
-def test_what_stands_beside_the_robot_does_not_close_the_way_from_it() -> None:
+def test_what_stands_beside_the_robot_does_not_close_the_path_from_it() -> None:
     known = PointMap([(0.0, 0.2), (-0.1, 0.0)])
     assert is_clear(known, START, (3.0, 0.0), RADIUS_M)
     assert not is_clear(known, START, (-3.0, 0.0), RADIUS_M)
@@ -252,7 +252,7 @@ def closed_by(known: PointMap, goal: Point, seconds: float) -> str:
     return to_go.closed_by
 
 
-def test_what_closes_every_way_is_said_once_it_lasts() -> None:
+def test_what_closes_every_path_is_said_once_it_lasts() -> None:
     ring = [(math.cos(a), math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 180).tolist()]
     around_goal = PointMap([(4.0 + x, y) for x, y in ring])
     assert closed_by(around_goal, (4.0, 0.0), 0.5) == "", "a person may pass"
@@ -264,7 +264,7 @@ def test_what_closes_every_way_is_said_once_it_lasts() -> None:
     assert closed_by(opened, (4.0, 0.0), 5.0) == ""
 
 
-def test_a_way_that_opens_again_is_not_closed() -> None:
+def test_a_path_that_opens_again_is_not_closed() -> None:
     ring = [(math.cos(a), math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 180).tolist()]
     to_go = DistanceToGo(RouteParams(), RADIUS_M)
     for second in range(1, 5):
@@ -279,7 +279,7 @@ def test_a_way_that_opens_again_is_not_closed() -> None:
 
 
 @pytest.mark.parametrize("half_m", [3.0, 5.5, 9.5])
-def test_the_way_round_a_long_wall_is_found(half_m: float) -> None:
+def test_the_path_round_a_long_wall_is_found(half_m: float) -> None:
     """Also where its ends are farther away than what is looked at first."""
     known = PointMap(polyline((2.0, -half_m), (2.0, half_m)))
     found = at(made(known, (4.0, 0.0)), START)

@@ -89,7 +89,7 @@ def test_the_goal_is_reached_without_contact(name: str, drive: Drive, seed: int)
 @pytest.mark.parametrize("drive", list(Drive))
 def test_between_walls_it_stands_still_and_says_why(drive: Drive) -> None:
     room = walls((-1.2, -1.2), (1.2, -1.2), (1.2, 1.2), (-1.2, 1.2), (-1.2, -1.2))
-    episode = driven((4.0, 0.0), room, drive=drive, limit_s=8.0)
+    episode = driven((4.0, 0.0), room, drive=drive, limit_s=8.0, params=PARAMS)
     assert evaluate(episode).collisions == 0
     for decision in episode.ticks[-10:]:
         assert decision.mode is Mode.BLOCKED
@@ -215,7 +215,7 @@ def reasons(decisions: tuple[Decision, ...]) -> set[str]:
     return {d.reason.split(" is ")[0] for d in decisions}
 
 
-def test_the_reason_names_the_way_through_the_map() -> None:
+def test_the_reason_names_the_path_through_the_map() -> None:
     episode = driven(*PLACES["wall"])
     assert "the way through the map" in reasons(episode.ticks)
     first = next(d for d in episode.ticks if "through the map" in d.reason)

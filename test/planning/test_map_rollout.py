@@ -84,7 +84,7 @@ def test_an_omnidirectional_base_drives_to_the_waypoint_and_on_to_the_goal(
         assert driven >= min(RISK.horizon_s, (math.hypot(*waypoint) + rest) / SPEED) - TICK_S
 
 
-def test_the_second_part_follows_the_shortest_way() -> None:
+def test_the_second_part_follows_the_shortest_path() -> None:
     known = PointMap(polyline((2.0, -1.0), (2.0, 1.5)))
     made, to_go = rollout(known, (4.0, 0.0), FAR)
     paths = through(made, (1.0, -1.0))
@@ -246,7 +246,7 @@ def test_in_the_open_it_is_the_risk_of_the_open_planner(circle: Circle, waypoint
     assert expected - 1e-6 * (1.0 + expected) <= found <= expected + close
 
 
-def test_nobody_in_reach_means_alone() -> None:
+def test_no_obstacle_in_reach_means_alone() -> None:
     for away_m, velocity, alone in (
         (30.0, (0.0, 0.0), True),
         (30.0, (-12.0, 0.0), False),
@@ -314,7 +314,7 @@ def test_the_less_room_and_the_sooner_the_greater_the_risk() -> None:
     assert found[3] < 10.0 < FORBIDDEN_M <= found[4]
 
 
-def test_in_contact_already_the_way_out_is_allowed_and_the_way_in_is_not() -> None:
+def test_in_contact_already_the_path_out_is_allowed_and_the_path_in_is_not() -> None:
     wall = PointMap(polyline((0.25, -2.0), (0.25, 2.0)))
     out, along, inwards = standing(wall, (-1.0, 0.0), (0.0, 1.0), (1.0, 0.0))
     assert max(out, along) < FORBIDDEN_M <= inwards
