@@ -29,14 +29,18 @@ class DistanceField:
         u = (x - self.origin_m[0]) / self.cell_m - 0.5
         v = (y - self.origin_m[1]) / self.cell_m - 0.5
         inside = (u >= 0.0) & (v >= 0.0) & (u < width - 1) & (v < height - 1)
-        u, v = np.where(inside, u, 0.0), np.where(inside, v, 0.0)
+        all_inside = bool(inside.all())
+        if not all_inside:
+            u, v = np.where(inside, u, 0.0), np.where(inside, v, 0.0)
         i, j = u.astype(np.int64), v.astype(np.int64)
         u, v = u - i, v - j
         k = j * width + i
-        low = flat[k] * (1.0 - u) + flat[k + 1] * u
+        rest = 1.0 - u
+        low = flat.take(k) * rest + flat.take(k + 1) * u
         k += width
-        high = flat[k] * (1.0 - u) + flat[k + 1] * u
-        return np.where(inside, low + v * (high - low), self.cap_m)
+        high = flat.take(k) * rest + flat.take(k + 1) * u
+        found: Array = low + v * (high - low)
+        return found if all_inside else np.where(inside, found, self.cap_m)
 
 
 def distance_field(

@@ -8,6 +8,7 @@ the full speed, small near what stands. Unknown space counts as free.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +59,9 @@ class DistanceToGo:
         self.goal: Point = (0.0, 0.0)
         self.is_straight = True
         self.closed_by = ""  # what stands between robot and goal on every way, "" if one is open
+        self._closing = ""  # the same, at this moment
         self._closed_ns: int | None = None  # since when
+        self._margin_m = _MARGIN_M
         self._computed: tuple[int, int, Point] | None = None  # stamp, map version, goal
         self._field: DistanceField | None = None  # distances to what stands
         self._to_go: Array | None = None
@@ -72,7 +75,8 @@ class DistanceToGo:
         self.goal = goal
         self.is_straight = is_clear(known, position, goal, self._radius_m + _CLEAR_M)
         if self.is_straight:
-            self.closed_by, self._closed_ns = "", None
+            self.closed_by, self._closing, self._closed_ns = "", "", None
+            self._margin_m = _MARGIN_M
             return
         if self._computed is not None:
             then_ns, version, then_goal = self._computed
@@ -80,14 +84,19 @@ class DistanceToGo:
             fresh = 0.0 <= age_s < self._params.refresh_s or version == known.version
             same = distance(then_goal, goal) < _SAME_GOAL_M
             if fresh and same and self._is_inside(position):
+                self._closed_for(stamp_ns)
                 return
-        closed_by = self._compute(known, position, goal)
+        self._closing = self._compute(known, position, goal)
         self._computed = (stamp_ns, known.version, goal)
-        if not closed_by or self._closed_ns is None:
-            self._closed_ns = stamp_ns if closed_by else None
+        self._closed_for(stamp_ns)
+
+    def _closed_for(self, stamp_ns: int) -> None:
+        """Say what closes the way once it has for long enough."""
+        if not self._closing or self._closed_ns is None:
+            self._closed_ns = stamp_ns if self._closing else None
         # A person who passes a door closes it too, but not for long.
         lasts = self._closed_ns is not None and stamp_ns - self._closed_ns >= _CLOSED_NS
-        self.closed_by = closed_by if lasts else ""
+        self.closed_by = self._closing if lasts else ""
 
     def _compute(self, known: StaticMap, position: Point, goal: Point) -> str:
         """Compute the distance to go; what closes every way to the goal, "" if nothing."""
@@ -103,46 +112,62 @@ class DistanceToGo:
             )
         self._beyond_m = distance(target, goal)
         fine = known.params.cell_m
-        low, high, per_cell = _domain(position, target, fine)
+        low, high, per_cell = _domain(position, target, fine, self._margin_m)
         self._cell_m = fine * per_cell
         field = known.rectangle_field(low, high, fine)
         self._origin = field.origin_m
-        speed = _speed(field.distance_m, self._radius_m)
-        speed = _widest(speed, per_cell)
+        widest_m = _widest(field.distance_m, per_cell)
+        speed = _speed(widest_m, self._radius_m)
         height, width = speed.shape
         i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
         j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
         to_go = eikonalfm.fast_marching(speed, (j, i), (self._cell_m, self._cell_m), 2)
         self._to_go = to_go
-        dy, dx = np.gradient(to_go, self._cell_m)
-        step = dx + 1j * dy
-        self._step = -step / (np.abs(step) + 1e-12)
+        self._step = _downhill(to_go)
         if self._beyond_m:
             return ""  # the map does not reach so far
         cell = (position[0] - self._origin[0]) / self._cell_m
         row = (position[1] - self._origin[1]) / self._cell_m
-        return self._closed(field, (int(row), int(cell)), (j, i), goal)
+        closing, leads_out = self._closed(field, widest_m, (int(row), int(cell)), (j, i), goal)
+        all_m = 0.5 * known.params.size_m + _LEAST_MARGIN_M
+        if leads_out and self._margin_m < all_m:
+            # Beyond what the map holds, all is free: a way round is known or assumed there.
+            self._margin_m = all_m
+            return self._compute(known, position, goal)
+        return closing
 
     def _closed(
-        self, field: DistanceField, start: tuple[int, int], end: tuple[int, int], goal: Point
-    ) -> str:
-        """What closes every way between two cells: none is as wide as the robot."""
+        self,
+        field: DistanceField,
+        widest_m: Array,
+        start: tuple[int, int],
+        end: tuple[int, int],
+        goal: Point,
+    ) -> tuple[str, bool]:
+        """What closes every way between two cells: none is as wide as the robot.
+
+        And whether ways lead out of the domain on both sides of it: then nothing is closed.
+        """
         from scipy.ndimage import label
 
         nearest_m = float(field.at(np.array([goal[0]]), np.array([goal[1]]))[0])
         if nearest_m < self._radius_m - _CLEAR_M:
-            return f"what stands {nearest_m:.2f} m from its middle"
-        open_ = _widest(field.distance_m, round(self._cell_m / field.cell_m)) > self._radius_m
+            return f"what stands {nearest_m:.2f} m from its middle", False
+        open_ = widest_m > self._radius_m
         open_[max(start[0] - 1, 0) : start[0] + 2, max(start[1] - 1, 0) : start[1] + 2] = True
         open_[end] = True
         number = label(open_, np.ones((3, 3)))[0]
         if number[start] == number[end]:
-            return ""
+            return "", False
+        border = np.ones(number.shape, dtype=bool)
+        border[1:-1, 1:-1] = False
+        if (number[border] == number[start]).any() and (number[border] == number[end]).any():
+            return "", True
         inside = np.count_nonzero(number == number[end]) < np.count_nonzero(
             number == number[start]
         )
         around = "the goal" if inside else "the robot"
-        return f"what stands around {around}, without a gap as wide as the robot"
+        return f"what stands around {around}, without a gap as wide as the robot", False
 
     def _is_inside(self, position: Point) -> bool:
         if self._to_go is None:
@@ -199,26 +224,30 @@ def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:
     return not bool((near & (share > 0.0)).any())
 
 
-def _domain(position: Point, goal: Point, fine_m: float) -> tuple[Point, Point, int]:
+def _domain(
+    position: Point, goal: Point, fine_m: float, margin_m: float
+) -> tuple[Point, Point, int]:
     """Corners of the rectangle, and how many cells of the map make one of its cells."""
-    margin, per_cell = _MARGIN_M, 2
+    margin, per_cell = margin_m, 2
+    least_m = max(_LEAST_MARGIN_M, margin_m - 2.0)
     while True:
         low = (min(position[0], goal[0]) - margin, min(position[1], goal[1]) - margin)
         high = (max(position[0], goal[0]) + margin, max(position[1], goal[1]) + margin)
         cell = fine_m * per_cell
         if (high[0] - low[0]) * (high[1] - low[1]) <= _MOST_CELLS * cell * cell:
             return low, high, per_cell
-        if margin > _LEAST_MARGIN_M:
+        if margin > least_m:
             margin -= 0.5
         else:
-            margin, per_cell = _MARGIN_M, per_cell + 1
+            margin, per_cell = margin_m, per_cell + 1
 
 
 def _widest(values: Array, per_cell: int) -> Array:
     """The largest value within each cell: the widest part decides, or narrow doors would close."""
-    height, width = (n // per_cell for n in values.shape)
-    whole = values[: height * per_cell, : width * per_cell]
-    largest: Array = whole.reshape(height, per_cell, width, per_cell).max(axis=(1, 3))
+    height, width = (n // per_cell * per_cell for n in values.shape)
+    parts = [values[:height, i:width:per_cell] for i in range(per_cell)]
+    rows = functools.reduce(np.maximum, parts)
+    largest: Array = functools.reduce(np.maximum, [rows[j::per_cell] for j in range(per_cell)])
     return largest
 
 
@@ -228,6 +257,22 @@ def _speed(clearance_m: Array, radius_m: float) -> Array:
     speed = _SLOWEST + (1.0 - _SLOWEST) * np.minimum(room, 1.0)
     speed[room < 0.0] = _CLOSED
     return speed
+
+
+def _downhill(to_go: Array) -> Array:
+    """Unit vectors (complex) down the distance to go; 0 at its least.
+
+    By differences to the lower neighbours alone, as in the scheme that computes it: central ones
+    would point across a narrow door, at what closes it.
+    """
+    padded = np.pad(to_go, 1, constant_values=np.inf)
+    left, right = to_go - padded[1:-1, :-2], to_go - padded[1:-1, 2:]
+    below, above = to_go - padded[:-2, 1:-1], to_go - padded[2:, 1:-1]
+    step = np.maximum(np.maximum(left, right), 0.0) * np.where(right > left, 1.0, -1.0) + 1j * (
+        np.maximum(np.maximum(below, above), 0.0) * np.where(above > below, 1.0, -1.0)
+    )
+    found: Array = step / (np.abs(step) + 1e-12)
+    return found
 
 
 def _bilinear(values: Array, u: Array, v: Array) -> Array:

@@ -17,7 +17,7 @@ from ..perception.static_map import StaticMap, StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import Move
-from .differential_drive import Speeds
+from .differential_drive import Speeds, brake
 from .distance_to_go import RouteParams, is_clear
 from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
 from .map_search import Found, MapSearch
@@ -31,6 +31,7 @@ Array = np.ndarray
 
 NEAR_M = 3.5  # of a straight way: with so much room beside it the map is not needed
 ROOM_M = 0.25
+NEAR_POINTS_M = 1.0  # contact within a tick is ruled out with what stands so near
 _LEAST_M = 0.005  # kept from what stands, beyond the robot's radius
 _SLOW_MPS, _ESTABLISHED_M = 0.5, 0.05
 _STRAIGHT = "the straight way is free"
@@ -118,12 +119,13 @@ class MapPlanning:
         delay = None
         if params.turns:
             delay = TurnDelay(params, obs.pose.yaw + turn, speeds.omega)
+        near_m = max(NEAR_POINTS_M, params.robot_radius_m + _LEAST_M + self._stopping_m(tick_s))
         observed = None if unobserved is None else ~unobserved
         found = self._search.search(
             rollout, position, self._risk, speed, tick_s, delay, observed, last,
             lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
         )  # fmt: skip
-        return self._as_move(obs, found, position, turn, points[away < 1.0], circles, tick_s)
+        return self._as_move(obs, found, position, turn, points[away < near_m], circles, tick_s)
 
     def _swarm(self, center: Point, stamp_ns: int) -> BatSwarm:
         bat = self._params.bat
@@ -155,6 +157,30 @@ class MapPlanning:
             for c, cx, cy, keep in zip(circles, x.tolist(), y.tolist(), kept.tolist())
             if keep
         ]
+
+    def _braking_share(
+        self, at_rest: ObstaclesAtRest, yaw_rad: float, velocity: Point, tick_s: float
+    ) -> float:
+        """Share of the velocity from which a differential base stops before contact.
+
+        While it brakes it rolls on along its heading.
+        """
+        (ux, uy), held_s = velocity, STOPPING_TICKS * tick_s
+        speed = math.sqrt(ux * ux + uy * uy)
+        hx, hy = math.cos(yaw_rad), math.sin(yaw_rad)
+        if self._params.reverse and hx * ux + hy * uy < 0.0:
+            hx, hy = -hx, -hy
+        far_m = self._stopping_m(tick_s)
+        free_m = far_m * at_rest.allowed_share((far_m * hx, far_m * hy), 1.0)
+        return min(brake(free_m, self._params.max_accel_mps2, held_s) / max(speed, 1e-9), 1.0)
+
+    def _stopping_m(self, tick_s: float) -> float:
+        """The way on which the base stops from its full speed."""
+        params = self._params
+        if not params.turns:
+            return 0.0
+        speed = min(params.speed_mps, params.max_speed_mps)
+        return speed * (STOPPING_TICKS * tick_s + 0.5 * speed / params.max_accel_mps2)
 
     def _in_established(self, rows: Array, x: Array, y: Array, dx: Array, dy: Array) -> Array:
         """Slow tracks whose near side is where something has stood for long: ends of walls."""
@@ -203,6 +229,10 @@ class MapPlanning:
         standing = [Circle(center_m=(x, y), radius_m=radius) for x, y in near.tolist()]
         at_rest = ObstaclesAtRest(position, [*standing, *circles])
         share = at_rest.allowed_share((ux, uy), STOPPING_TICKS * tick_s)
+        if params.turns:
+            share *= self._braking_share(
+                at_rest, obs.pose.yaw + turn, (share * ux, share * uy), tick_s
+            )
         c, s = math.cos(turn), math.sin(turn)
         velocity = (share * (c * ux + s * uy), share * (c * uy - s * ux))
         waypoint = (obs.pose.x + c * qx + s * qy, obs.pose.y + c * qy - s * qx)

@@ -30,6 +30,7 @@ FORBIDDEN_M = 1000.0  # cost of a contact before the waypoint with what stands
 CARROT_M = 0.4  # a differential base aims so far ahead along the shortest way
 SLOW_ROOM_M, SLOWEST = 0.15, 0.4  # room below which a differential base slows down, and to what
 _REACHED_M = 0.1
+_ROUNDING = 1.0 - 1e-9
 _LONGEST = 2.0  # horizons, waiting and turning included
 
 
@@ -102,33 +103,34 @@ class MapRollout:
         driven = np.zeros((m, steps + 1))
         x, y = np.full(m, px), np.full(m, py)
         qx, qy = qx + px, qy + py
-        first_mps = np.sqrt((qx - px) ** 2 + (qy - py) ** 2) / t1
+        first_m = np.sqrt((qx - px) ** 2 + (qy - py) ** 2) / t1 * h
         arrived = np.full(m, steps)
         on_first = np.ones(m, dtype=bool)
         gx, gy = self._to_go.goal
         xs[:, 0], ys[:, 0] = x, y
+        any_first, any_second = True, False
         for k in range(steps):
-            dx, dy = qx - x, qy - y
-            left = np.sqrt(dx * dx + dy * dy)
-            if not on_first.all():
+            if any_first:
+                dx, dy = qx - x, qy - y
+                left = np.sqrt(dx * dx + dy * dy)
+                scale = 1.0 / np.maximum(left, 1e-12)
+                dx, dy, length = dx * scale, dy * scale, np.minimum(first_m, left)
+            if any_second:
                 ax, ay = self._to_go.direction(x, y)
-                goal_m = np.sqrt((gx - x) ** 2 + (gy - y) ** 2)
-                scale = 1.0 / np.maximum(left, 1e-12)
-                dx = np.where(on_first, dx * scale, ax)
-                dy = np.where(on_first, dy * scale, ay)
-                length = np.where(
-                    on_first, np.minimum(first_mps * h, left), np.minimum(full * h, goal_m)
-                )
-            else:
-                scale = 1.0 / np.maximum(left, 1e-12)
-                dx, dy = dx * scale, dy * scale
-                length = np.minimum(first_mps * h, left)
+                goal_x, goal_y = gx - x, gy - y
+                on_m = np.minimum(full * h, np.sqrt(goal_x * goal_x + goal_y * goal_y))
+                if any_first:
+                    ax, ay = np.where(on_first, dx, ax), np.where(on_first, dy, ay)
+                    on_m = np.where(on_first, length, on_m)
+                dx, dy, length = ax, ay, on_m
             x, y = x + length * dx, y + length * dy
             xs[:, k + 1], ys[:, k + 1] = x, y
             driven[:, k + 1] = driven[:, k] + length / full
-            reached = on_first & (left <= first_mps * h * (1.0 + 1e-9))
-            arrived[reached] = k + 1
-            on_first &= ~reached
+            if any_first:
+                reached = on_first & (left <= first_m * (1.0 + 1e-9))
+                arrived[reached] = k + 1
+                on_first &= ~reached
+                any_first, any_second = bool(on_first.any()), not on_first.all()
         return Paths(xs, ys, h, driven, arrived)
 
     def _straight(self, qx: Array, qy: Array, t1: Array) -> Paths:
@@ -154,36 +156,49 @@ class MapRollout:
         v, omega = np.full(m, self._speeds.v), np.full(m, self._speeds.omega)
         share = np.sqrt(qx * qx + qy * qy) / (t1 * full)
         qx, qy = qx + px, qy + py
-        waits = share < 0.9
+        waits, waiting_mps = share < 0.9, full * share
+        any_waits = bool(waits.any())
+        longest_wait_s = float(t1[waits].max()) if any_waits else 0.0
         gx, gy = self._to_go.goal
         arrived = np.full(m, steps)
         on_first = np.ones(m, dtype=bool)
         most, most_turn = accel * h, alpha * h
         xs[:, 0], ys[:, 0] = x, y
         for k in range(steps):
-            ax, ay = self._to_go.direction(x, y)
-            dx = np.where(on_first, qx - x, CARROT_M * ax)
-            dy = np.where(on_first, qy - y, CARROT_M * ay)
-            goal_m = np.sqrt((gx - x) ** 2 + (gy - y) ** 2)
+            dx, dy = qx - x, qy - y
+            if not on_first.all():
+                ax, ay = self._to_go.direction(x, y)
+                dx = np.where(on_first, dx, CARROT_M * ax)
+                dy = np.where(on_first, dy, CARROT_M * ay)
+            goal_x, goal_y = gx - x, gy - y
+            goal_m = np.sqrt(goal_x * goal_x + goal_y * goal_y)
             error = np.arctan2(dy, dx) - yaw
             error = np.remainder(error + math.pi, 2.0 * math.pi) - math.pi
-            sign = np.ones(m)
-            if base.reverse:
-                back = np.abs(error) > 0.5 * math.pi
+            back = np.abs(error) > 0.5 * math.pi if base.reverse else None
+            if back is not None and back.any():
                 error = np.where(back, np.remainder(error, 2.0 * math.pi) - math.pi, error)
                 error = np.where(error > math.pi, error - 2.0 * math.pi, error)
-                sign[back] = -1.0
+            else:
+                back = None
             off = np.abs(error)
             turn = np.copysign(np.minimum(_brake(off, alpha, h), fastest), error)
             room = self._clearance.at(x, y) - self._radius_m
-            wanted = full * np.clip(room / SLOW_ROOM_M, SLOWEST, 1.0)
-            wanted = np.where(waits & (k * h < t1), full * share, wanted)
+            wanted = full * np.minimum(np.maximum(room / SLOW_ROOM_M, SLOWEST), 1.0)
+            if any_waits and k * h < longest_wait_s:
+                wanted = np.where(waits & (k * h < t1), waiting_mps, wanted)
             wanted = np.minimum(wanted, _brake(goal_m, accel, h))
-            wanted = sign * wanted * np.maximum(1.0 - off / first_rad, 0.0)
-            before, v = v, v + np.clip(wanted - v, -most, most)
-            mean = v - 0.5 * (v - before) * np.abs(v - before) / most
-            before, omega = omega, omega + np.clip(turn - omega, -most_turn, most_turn)
-            mean_turn = omega - 0.5 * (omega - before) * np.abs(omega - before) / most_turn
+            wanted = wanted * np.maximum(1.0 - off / first_rad, 0.0)
+            if back is not None:
+                wanted = np.where(back, -wanted, wanted)
+            before, v = v, v + np.minimum(np.maximum(wanted - v, -most), most)
+            change = v - before
+            mean = v - 0.5 * change * np.abs(change) / most
+            before, omega = (
+                omega,
+                omega + np.minimum(np.maximum(turn - omega, -most_turn), most_turn),
+            )
+            change = omega - before
+            mean_turn = omega - 0.5 * change * np.abs(change) / most_turn
             middle = yaw + 0.5 * mean_turn * h
             x, y, yaw = (
                 x + mean * np.cos(middle) * h,
@@ -192,13 +207,15 @@ class MapRollout:
             )
             xs[:, k + 1], ys[:, k + 1] = x, y
             driven[:, k + 1] = driven[:, k] + np.abs(mean) * h / full
-            reach = np.maximum(_REACHED_M, np.abs(v) * h)
-            ended = np.where(
-                waits, (k + 1) * h >= t1, (qx - x) ** 2 + (qy - y) ** 2 < reach * reach
-            )
-            reached = on_first & ended
-            arrived[reached] = k + 1
-            on_first &= ~reached
+            if on_first.any():
+                reach = np.maximum(_REACHED_M, np.abs(v) * h)
+                dx, dy = qx - x, qy - y
+                ended = dx * dx + dy * dy < reach * reach
+                if any_waits:
+                    ended = np.where(waits, (k + 1) * h >= t1, ended)
+                reached = on_first & ended
+                arrived[reached] = k + 1
+                on_first &= ~reached
             if not on_first.any() if self.alone else float(driven[:, k + 1].min()) >= horizon_s:
                 steps = k + 1
                 break
@@ -250,7 +267,7 @@ class MapRollout:
         c = (a * at + 2.0 * b) * at + away
         driven = paths.driven_s[:, :-1]
         outer = (r + margin) ** 2
-        near = (b < 0.0) & (c < outer) & (driven < tau)
+        near = (b < 0.0) & (c < np.minimum(outer, away * _ROUNDING)) & (driven < tau)
         if not near.any():
             return np.zeros(m)
         left = 1.0 - (driven + at) / tau
