@@ -127,11 +127,11 @@ def test_rosbags_reads_the_maps(bag: Path, expected: Episode) -> None:
 
 def test_the_map_is_the_place(maps: tuple[MapPoints, ...], expected: Episode) -> None:
     """Each occupied cell is near a wall, or near the one obstacle."""
-    walls = np.array(expected.scenario.segments_m)
-    start, way = walls[:, :2], walls[:, 2:] - walls[:, :2]
+    ends = np.array(expected.scenario.segments_m)
+    start, wall = ends[:, :2], ends[:, 2:] - ends[:, :2]
     stamp_ns, points = maps[-1]
-    along = ((points[:, None] - start) * way).sum(axis=2) / (way * way).sum(axis=1)
-    nearest = start + np.clip(along, 0.0, 1.0)[..., None] * way
+    share = ((points[:, None] - start) * wall).sum(axis=2) / (wall * wall).sum(axis=1)
+    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * wall
     away = np.sqrt(((points[:, None] - nearest) ** 2).sum(axis=2)).min(axis=1)
     (center,) = expected.scenario.centers(expected.time_s(stamp_ns))
     from_obstacle = np.sqrt(((points - np.array(center)) ** 2).sum(axis=1))

@@ -98,7 +98,7 @@ def test_the_period_is_a_second_by_default(graph: Graph) -> None:
     assert min(np.diff(robot.stamps)) * TICK_NS * NANO >= 1.0
 
 
-def test_who_subscribes_later_gets_the_newest(graph: Graph) -> None:
+def test_a_later_subscriber_gets_the_newest(graph: Graph) -> None:
     robot = Lidar(graph)
     robot.decide(25)
     (info,) = graph.probe.get_publishers_info_by_topic("/local_map")
