@@ -109,7 +109,8 @@ def test_rosbags_reads_the_maps(bag: Path, expected: Episode) -> None:
     assert topic.qos == (offered(topics.LATCHED_QOS),)
     with AnyReader([bag]) as reader:
         connections = [c for c in reader.connections if c.topic == "/local_map"]
-        found = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(connections)]
+        raws = reader.messages(connections)
+        found: list[Any] = [reader.deserialize(raw, c.msgtype) for c, _, raw in raws]
     stamps = [m.header.stamp.sec * SECOND + m.header.stamp.nanosec for m in found]
     assert set(stamps) <= {tick.stamp_ns for tick in expected.ticks}
     assert np.diff(stamps).min() >= SECOND
