@@ -57,7 +57,7 @@ class _Past:
             if reach.size < beams.count:
                 clear = np.zeros(beams.count)
                 clear[beams.number] = reach
-            beside = 1 + math.floor(2.0 * self._turn_sd / beams.spacing_rad)
+            beside = min(1 + math.floor(2.0 * self._turn_sd / beams.spacing_rad), beams.count)
             around = np.concatenate((clear[-beside:], clear, clear[:beside]))
             least = clear.copy()
             for k in range(2 * beside + 1):

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..core.errors import FrameError, InputError
-from ..core.geometry import Point, Pose2D, yaw_from_quaternion
+from ..core.geometry import Point, Pose2D, rotated, yaw_from_quaternion
 from ..core.planner_types import Decision, Mode, Ranges, RefusalReason, Scan
 from ..core.robot_base import Base
 from ..perception.no_return import NoReturn, rep_117
@@ -198,14 +198,6 @@ def velocity(twist: Any) -> tuple[float, float, float]:
     values = (twist.linear.x, twist.linear.y, twist.angular.z)
     _finite("cmd_vel", values)
     return values
-
-
-def rotated(vector: Point, angle_rad: float) -> Point:
-    """A vector in the plane rotated counter-clockwise; an angle of 0 changes no bit."""
-    if angle_rad == 0.0:
-        return vector
-    c, s = math.cos(angle_rad), math.sin(angle_rad)
-    return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1])
 
 
 def body_velocity(decision: Decision, base: Base, tick_ns: int) -> tuple[float, float, float]:

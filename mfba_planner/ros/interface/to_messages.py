@@ -16,13 +16,13 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
-from ...core.geometry import Point, Pose2D, quaternion_from_yaw
+from ...core.geometry import Point, Pose2D, quaternion_from_yaw, rotated
 from ...core.planner_types import Bits, Decision, Mode, Ranges, Scan
 from ...core.robot_base import Base
 from ...perception import occupancy_grid
 from ...perception.sensory_vector import SensorParams, bits_text, longest_range_m
 from ...planning.odometry_jump import is_odometry_jump
-from ...recording.from_messages import SECOND_NS, body_velocity, points_text, rotated
+from ...recording.from_messages import SECOND_NS, body_velocity, points_text
 from ...simulation.episode import Outcome
 from .diagnostic_status import Status
 
