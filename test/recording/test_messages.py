@@ -26,7 +26,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.errors import InputError
-from mfba_planner.core.geometry import Pose2D, wrap_angle
+from mfba_planner.core.geometry import Pose2D, rotated, wrap_angle
 from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.perception.sensory_vector import SensorParams, sensory_vector
 from mfba_planner.recording import from_messages
