@@ -39,7 +39,7 @@ OUTSIDE: dict[str, set[str]] = {
     "core": {"numpy"},
     "swarm": {"numpy"},
     "perception": {"numpy", "scipy"},
-    "planning": {"eikonalfm", "numpy", "pyrvo"},
+    "planning": {"eikonalfm", "numpy", "pyrvo", "scipy"},
     "simulation": {"numpy"},
     "scenarios": {"PIL", "numpy", "pydantic", "yaml"},
     "evaluation": {"distributed", "numpy", "pyarrow", "scipy"},

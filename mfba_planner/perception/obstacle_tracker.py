@@ -198,6 +198,12 @@ class Tracker:
         """Error (x, y, turn) of the pose of the last scan, as far as it is known."""
         return self._pose_error.error
 
+    @property
+    def radii_m(self) -> Array:
+        """Radii of the tracks (m,), not enlarged; circles() begins with them."""
+        radii: Array = self._bank.state[RADIUS]
+        return radii
+
     def may_move(self) -> Array:
         """Whether each of the tracks moves or may move; (m,)."""
         bank = self._bank

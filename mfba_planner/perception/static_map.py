@@ -55,6 +55,7 @@ _ALONE_M = 0.006  # so near to a beam is a point that is thinner than the beams 
 _NOISE_SD = 2.5
 _FEWEST_WEAK = 3.0
 _LIMIT_M = 0.15  # returns so near to the longest range are not used
+_PRESENT_M = 4.0  # returns of the last scan count for distances up to here
 _FIELD_M = 10.0  # side of the window in which distance() knows
 
 
@@ -79,6 +80,7 @@ class StaticMap:
         self._time_s = 0.0
         self._origin: Point = (0.0, 0.0)
         self._field: tuple[int, DistanceField] | None = None
+        self._present: Array = np.empty((0, 2))
         self.version = 0
 
     def forget(self) -> None:
@@ -135,8 +137,13 @@ class StaticMap:
         moving, surely = moving[kept_out], moving[fast & surely]
         found = surfaces(beams)
         changed = False
+        self._present = np.empty((0, 2))
         if found is not None:
             changed = self._mark(found, beams, moving, pose_error)
+            stands = (found.range_m > 0.0) & (found.range_m < _PRESENT_M)
+            stands &= ~self._moving.near_any(found.x, found.y, surely)
+            x, y = self.to_map(found.x[stands], found.y[stands])
+            self._present = np.stack((x, y), axis=1)
         changed |= self._clear(beams, surely)
         x, y = self._robot
         changed |= self._points.roll(x, y)
@@ -239,6 +246,7 @@ class StaticMap:
         # A point whose returns have left it follows them at once: what creeps is in the map too.
         left = dx * dx + dy * dy > (_CREEP_M + _CREEP_SD * self._matching.noise_m) ** 2
         data[HITS, met[left]] = 1.0
+        data[FIRST, met[left]] = self._time_s
         gain = 1.0 / np.minimum(data[HITS][met], _MOST_HITS)
         dx *= gain
         dy *= gain
@@ -303,18 +311,37 @@ class StaticMap:
         data: Array = self._points.data[:2].T
         return data
 
+    def present_points(self) -> Array:
+        """Points (n, 2) of the map and returns of the last scan, but those of what surely moves.
+
+        What creeps, or has just come into view, is in the map too late.
+        """
+        return np.concatenate((self.map_points(), self._present))
+
+    def established_points(self) -> Array:
+        """Those of the points that have been met for a while, without moving: no ghosts."""
+        data = self._points.data
+        points: Array = data[:2, self._established()].T
+        return points
+
+    def _established(self) -> Array:
+        data = self._points.data
+        old: Array = data[FIRST] <= self._time_s - self.params.establish_s
+        return old
+
     def distance_field(self, center: Point, window_m: float, cell_m: float) -> DistanceField:
-        """Distances to the nearest point in a square around a position, in the map's frame.
+        """Distances to the nearest present point in a square, in the map's frame.
 
         Capped at widest_m; array[j, i] belongs to origin + ((i + 0.5) cell, (j + 0.5) cell).
         """
         half = 0.5 * window_m
         low, high = (center[0] - half, center[1] - half), (center[0] + half, center[1] + half)
-        return self.rectangle_field(low, high, cell_m)
+        x, y = self.present_points().T
+        return distance_field(x, y, low, high, cell_m, self.params.widest_m)
 
     def rectangle_field(self, low: Point, high: Point, cell_m: float) -> DistanceField:
-        """distance_field() between two corners."""
-        data = self._points.data
+        """distance_field() between two corners, of the established points alone."""
+        data = self._points.data[:2, self._established()]
         return distance_field(data[X], data[Y], low, high, cell_m, self.params.widest_m)
 
     def distance(self, x: Array, y: Array) -> Array:

@@ -36,6 +36,10 @@ class StaticMapParams:
         0.4, "time after a motion before what is there is marked", unit="s", minimum=0.0,
         maximum=60.0,
     )  # fmt: skip
+    establish_s: float = option(
+        0.8, "time after which a point counts for the way to the goal; what creeps never does",
+        unit="s", minimum=0.0, maximum=60.0,
+    )  # fmt: skip
     widest_m: float = option(
         0.8, "distances are given up to so much", unit="m", minimum=0.05, maximum=10.0
     )

@@ -66,6 +66,10 @@ class BasePlanner:
         self._goal: Point | None = None
         self.forget()
 
+    def replan(self) -> None:
+        """Begin anew in the same surroundings, as the robot has made no progress."""
+        self.reset()
+
     def forget(self) -> None:
         """Drop the state of a subclass."""
 

@@ -27,6 +27,7 @@ _SLOWEST, _ROOM_M = 0.5, 0.3  # F beside what stands, and from where it is 1
 _MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
 _MOST_CELLS = 20_000  # about 8 ms
 _SAME_GOAL_M = 0.1  # noise of the odometry moves the goal in the map's frame
+_CLOSED_NS = 1_500_000_000
 _FARTHEST_M = 20.0  # a goal farther away is replaced by a point on the line to it
 
 
@@ -56,6 +57,8 @@ class DistanceToGo:
         self._params, self._radius_m = params, radius_m
         self.goal: Point = (0.0, 0.0)
         self.is_straight = True
+        self.closed_by = ""  # what stands between robot and goal on every way, "" if one is open
+        self._closed_ns: int | None = None  # since when
         self._computed: tuple[int, int, Point] | None = None  # stamp, map version, goal
         self._field: DistanceField | None = None  # distances to what stands
         self._to_go: Array | None = None
@@ -69,6 +72,7 @@ class DistanceToGo:
         self.goal = goal
         self.is_straight = is_clear(known, position, goal, self._radius_m + _CLEAR_M)
         if self.is_straight:
+            self.closed_by, self._closed_ns = "", None
             return
         if self._computed is not None:
             then_ns, version, then_goal = self._computed
@@ -77,10 +81,16 @@ class DistanceToGo:
             same = distance(then_goal, goal) < _SAME_GOAL_M
             if fresh and same and self._is_inside(position):
                 return
-        self._compute(known, position, goal)
+        closed_by = self._compute(known, position, goal)
         self._computed = (stamp_ns, known.version, goal)
+        if not closed_by or self._closed_ns is None:
+            self._closed_ns = stamp_ns if closed_by else None
+        # A person who passes a door closes it too, but not for long.
+        lasts = self._closed_ns is not None and stamp_ns - self._closed_ns >= _CLOSED_NS
+        self.closed_by = closed_by if lasts else ""
 
-    def _compute(self, known: StaticMap, position: Point, goal: Point) -> None:
+    def _compute(self, known: StaticMap, position: Point, goal: Point) -> str:
+        """Compute the distance to go; what closes every way to the goal, "" if nothing."""
         import eikonalfm  # only here: most runs in the open do not need it
 
         target = goal
@@ -98,18 +108,41 @@ class DistanceToGo:
         field = known.rectangle_field(low, high, fine)
         self._origin = field.origin_m
         speed = _speed(field.distance_m, self._radius_m)
-        height, width = (n // per_cell for n in speed.shape)
-        speed = speed[: height * per_cell, : width * per_cell]
-        # The widest part of a cell decides, or narrow doors would close.
-        speed = speed.reshape(height, per_cell, width, per_cell).max(axis=(1, 3))
+        speed = _widest(speed, per_cell)
+        height, width = speed.shape
         i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
         j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
         to_go = eikonalfm.fast_marching(speed, (j, i), (self._cell_m, self._cell_m), 2)
         self._to_go = to_go
-        self._speed = speed
         dy, dx = np.gradient(to_go, self._cell_m)
         step = dx + 1j * dy
         self._step = -step / (np.abs(step) + 1e-12)
+        if self._beyond_m:
+            return ""  # the map does not reach so far
+        cell = (position[0] - self._origin[0]) / self._cell_m
+        row = (position[1] - self._origin[1]) / self._cell_m
+        return self._closed(field, (int(row), int(cell)), (j, i), goal)
+
+    def _closed(
+        self, field: DistanceField, start: tuple[int, int], end: tuple[int, int], goal: Point
+    ) -> str:
+        """What closes every way between two cells: none is as wide as the robot."""
+        from scipy.ndimage import label
+
+        nearest_m = float(field.at(np.array([goal[0]]), np.array([goal[1]]))[0])
+        if nearest_m < self._radius_m - _CLEAR_M:
+            return f"what stands {nearest_m:.2f} m from its middle"
+        open_ = _widest(field.distance_m, round(self._cell_m / field.cell_m)) > self._radius_m
+        open_[max(start[0] - 1, 0) : start[0] + 2, max(start[1] - 1, 0) : start[1] + 2] = True
+        open_[end] = True
+        number = label(open_, np.ones((3, 3)))[0]
+        if number[start] == number[end]:
+            return ""
+        inside = np.count_nonzero(number == number[end]) < np.count_nonzero(
+            number == number[start]
+        )
+        around = "the goal" if inside else "the robot"
+        return f"what stands around {around}, without a gap as wide as the robot"
 
     def _is_inside(self, position: Point) -> bool:
         if self._to_go is None:
@@ -151,7 +184,7 @@ class DistanceToGo:
 
 def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:
     """Whether no point of the map is nearer to the line than room_m; its ends may be."""
-    points = known.map_points()
+    points = known.established_points()
     if not points.shape[0]:
         return True
     x, y = points[:, 0] - start[0], points[:, 1] - start[1]
@@ -179,6 +212,14 @@ def _domain(position: Point, goal: Point, fine_m: float) -> tuple[Point, Point, 
             margin -= 0.5
         else:
             margin, per_cell = _MARGIN_M, per_cell + 1
+
+
+def _widest(values: Array, per_cell: int) -> Array:
+    """The largest value within each cell: the widest part decides, or narrow doors would close."""
+    height, width = (n // per_cell for n in values.shape)
+    whole = values[: height * per_cell, : width * per_cell]
+    largest: Array = whole.reshape(height, per_cell, width, per_cell).max(axis=(1, 3))
+    return largest
 
 
 def _speed(clearance_m: Array, radius_m: float) -> Array:

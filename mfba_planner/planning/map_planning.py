@@ -9,17 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.geometry import Point
+from ..core.geometry import Point, distance
 from ..core.planner_types import Circle, Observation
 from ..core.random_streams import stream
-from ..perception.distance_field import DistanceField
 from ..perception.obstacle_tracker import Tracker
 from ..perception.static_map import StaticMap, StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import Move
 from .differential_drive import Speeds
-from .distance_to_go import RouteParams
+from .distance_to_go import RouteParams, is_clear
 from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
 from .map_search import Found, MapSearch
 from .mode_transitions import Event
@@ -28,9 +27,12 @@ from .planner_params import PlannerParams
 from .trajectory_cost import RiskParams
 from .turn_delay import TurnDelay
 
-NEAR_M = 3.5  # what stands farther away does not matter while the straight way is clear
+Array = np.ndarray
+
+NEAR_M = 3.5  # of a straight way: with so much room beside it the map is not needed
+ROOM_M = 0.25
 _LEAST_M = 0.005  # kept from what stands, beyond the robot's radius
-_MAPPED_M = 0.1  # so near to its outline is a point of the map on a circle at rest
+_SLOW_MPS, _ESTABLISHED_M = 0.5, 0.05
 _STRAIGHT = "the straight way is free"
 
 
@@ -49,17 +51,20 @@ class MapPlanning:
         seed: int,
     ) -> None:
         """Start with an empty map."""
-        self._params, self._risk, self._seed = params, risk, seed
+        self._params, self._seed = params, seed
+        self._risk = risk.for_turning() if params.turns else risk
         self._search_m = search_m
         self.map = StaticMap(map_params)
         self._search = MapSearch(route, params.robot_radius_m, headings, reach_m)
         self._reach_m = 0.0
+        self._radii_m = np.empty(0)  # of the tracks
 
     def update(self, stamp_ns: int, observation_pose: Observation, tracker: Tracker) -> None:
         """Take the scan that the tracker has just taken."""
         pose = (observation_pose.sensed or (0, observation_pose.pose))[1]
         assert tracker.beams is not None
         moving, surely = tracker.moving()
+        self._radii_m = tracker.radii_m
         self._reach_m = self.map.params.spacing_m / tracker.beams.spacing_rad
         self.map.update(stamp_ns, pose, tracker.beams, moving, surely, tracker.pose_error)
 
@@ -80,12 +85,25 @@ class MapPlanning:
         position, turn = self._in_map(obs.pose.position)
         to_go = self._search.to_go
         to_go.update(obs.pose_ns, known, position, self._in_map(goal)[0])
-        points = known.map_points()
+        if to_go.closed_by:
+            return Move(
+                velocity=(0.0, 0.0), reason=f"no way to the goal: closed by {to_go.closed_by}",
+                event=Event.NO_GAP,
+            )  # fmt: skip
+        if to_go.is_straight:
+            away_m = distance(position, to_go.goal)
+            share = min(1.0, NEAR_M / max(away_m, NEAR_M))
+            gx, gy = to_go.goal
+            near = (
+                position[0] + share * (gx - position[0]),
+                position[1] + share * (gy - position[1]),
+            )
+            if is_clear(known, position, near, params.robot_radius_m + ROOM_M):
+                return None
+        points = known.present_points()
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
-        if to_go.is_straight and float(away.min()) > NEAR_M:
-            return None
         clearance = self._search.clearance(known, position, obs.pose_ns)
-        circles = self._not_in_map(circles, position, clearance)
+        circles = self._not_in_map(circles, position)
         speed = params.speed_mps
         rollout = MapRollout(
             position, obs.pose.yaw + turn, speeds, params, params.robot_radius_m, speed,
@@ -119,25 +137,35 @@ class MapPlanning:
         turn = math.atan2(float(y[1] - y[0]), float(x[1] - x[0]))
         return (float(x[0]), float(y[0])), turn
 
-    def _not_in_map(
-        self, circles: Sequence[Circle], position: Point, clearance: DistanceField
-    ) -> list[Circle]:
-        """Circles that move, or stand and are not in the map, in the map's frame."""
+    def _not_in_map(self, circles: Sequence[Circle], position: Point) -> list[Circle]:
+        """Circles that move, or are too far away for the map, in the map's frame."""
         if not circles:
             return []
         rows = np.array([(*c.center_m, *c.velocity_mps, c.radius_m) for c in circles])
         x, y = self.map.to_map(rows[:, 0], rows[:, 1])
         dx, dy = x - position[0], y - position[1]
-        kept = (rows[:, 2] != 0.0) | (rows[:, 3] != 0.0)
+        kept = ((rows[:, 2] != 0.0) | (rows[:, 3] != 0.0)) & ~self._in_established(
+            rows, x, y, dx, dy
+        )
         kept |= dx * dx + dy * dy > self._reach_m * self._reach_m
-        # What may move is not marked, but may have been marked before it began to.
-        outline_m = rows[:, 4] - self._params.robot_radius_m + _MAPPED_M
-        kept |= clearance.at(x, y) > outline_m
         return [
             replace(c, center_m=(cx, cy))
             for c, cx, cy, keep in zip(circles, x.tolist(), y.tolist(), kept.tolist())
             if keep
         ]
+
+    def _in_established(self, rows: Array, x: Array, y: Array, dx: Array, dy: Array) -> Array:
+        """Slow tracks whose near side is where something has stood for long: ends of walls."""
+        points = self.map.established_points()
+        slow = rows[:, 2] ** 2 + rows[:, 3] ** 2 < _SLOW_MPS * _SLOW_MPS
+        if not points.shape[0]:
+            return np.zeros(x.size, dtype=bool)
+        r = np.zeros(x.size)
+        r[: self._radii_m.size] = self._radii_m
+        r = np.minimum(r / (np.sqrt(dx * dx + dy * dy) + 1e-9), 1.0)
+        near_x, near_y = x - r * dx, y - r * dy
+        away = (near_x[:, None] - points[:, 0]) ** 2 + (near_y[:, None] - points[:, 1]) ** 2
+        return slow & (away.min(axis=1) < _ESTABLISHED_M * _ESTABLISHED_M)
 
     def _as_move(
         self,
@@ -177,14 +205,14 @@ class MapPlanning:
         velocity = (share * (c * ux + s * uy), share * (c * uy - s * ux))
         waypoint = (obs.pose.x + c * qx + s * qy, obs.pose.y + c * qy - s * qx)
         percent = 1e2 * share * math.hypot(ux, uy) / params.speed_mps
-        way = _STRAIGHT
+        reason = _STRAIGHT
         if not found.free or not to_go.is_straight:
-            way = f"the way through the map is {found.to_go_m:.3g} m"
+            reason = f"the way through the map is {found.to_go_m:.3g} m"
             if not found.free:
-                way += f"; costs {found.cost - found.to_go_m:.3g} m more"
+                reason += f"; costs {found.cost - found.to_go_m:.3g} m more"
         return Move(
             velocity=velocity,
-            reason=f"{way}, at {percent:.0f} % speed",
+            reason=f"{reason}, at {percent:.0f} % speed",
             event=Event.CLEAR if found.free and to_go.is_straight else Event.OBSTACLE,
             vs=found.closed,
             vg=found.closed,

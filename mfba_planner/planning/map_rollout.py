@@ -232,8 +232,11 @@ class MapRollout:
         m = paths.x.shape[0]
         if self.alone:
             return np.zeros(m)
-        cx, cy, vx, vy, r = self._circles.T[:, :, None, None]
-        margin = risk.margin_m + risk.margin_ticks * self._tick_s * np.sqrt(vx * vx + vy * vy)
+        around = [
+            risk.around(math.hypot(*row[2:4]), self._tick_s) for row in self._circles.tolist()
+        ]
+        rows = np.concatenate((self._circles, np.array(around)), axis=1)
+        cx, cy, vx, vy, r, margin, close = rows.T[:, :, None, None]
         h, tau = paths.step_s, risk.horizon_s
         t = np.arange(paths.x.shape[1] - 1) * h
         x = cx + vx * t - paths.x[:, :-1]
@@ -252,7 +255,7 @@ class MapRollout:
             return np.zeros(m)
         left = 1.0 - (driven + at) / tau
         missing = np.minimum(1.0 - (np.sqrt(np.maximum(c, 0.0)) - r) / margin, 1.0)
-        found = np.where(near, risk.close_m * missing * np.maximum(left, 0.0), 0.0)
+        found = np.where(near, close * missing * np.maximum(left, 0.0), 0.0)
         hit = near & (c < r * r)
         if hit.any():
             under = np.maximum(b * b - a * (away - r * r), 0.0)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.geometry import Point
-from ..core.planner_types import NANO, Bits
+from ..core.planner_types import Bits
 from ..perception.distance_field import DistanceField
 from ..perception.static_map import StaticMap
 from ..swarm.bat_swarm import BatSwarm
@@ -27,11 +27,9 @@ WAITS_S = (0.4, 1.0, 2.0)
 SPEEDS = (1e-6, 0.5)
 BATCH = 40  # candidates evaluated at once
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
-WINDOW_M = 7.0  # side of the square in which clearances are known
-KEPT_S = 0.15  # contact is ruled out by the points themselves
-_KEPT_M = 0.5  # the window is used again until the robot is so far from its middle
+WINDOW_M = 6.5  # side of the square in which clearances are known
 _STEP_M = 0.1
-SIGHT_M = (0.12, 0.07, 0.025)  # room beside a line of sight
+SIDE_ROOM_M = (0.12, 0.07, 0.025)  # room beside a line of sight
 
 
 class Found(NamedTuple):
@@ -59,19 +57,14 @@ class MapSearch:
         self._qx = (self._cos[:, None] * lengths).ravel()
         self._qy = (self._sin[:, None] * lengths).ravel()
         self._length = np.tile(lengths, headings)
-        self._clearance: tuple[int, int, Point, DistanceField] | None = None
+        self._clearance: tuple[int, DistanceField] | None = None
 
     def clearance(self, known: StaticMap, position: Point, stamp_ns: int) -> DistanceField:
-        """Distances to what stands around the robot; as of KEPT_S ago, where that will do."""
-        if self._clearance is not None:
-            then_ns, version, (x, y), field = self._clearance
-            near = abs(x - position[0]) < _KEPT_M and abs(y - position[1]) < _KEPT_M
-            fresh = 0.0 <= (stamp_ns - then_ns) * NANO < KEPT_S or version == known.version
-            if fresh and near:
-                return field
-        field = known.distance_field(position, WINDOW_M, known.params.cell_m)
-        self._clearance = (stamp_ns, known.version, position, field)
-        return field
+        """Distances to what stands around the robot."""
+        if self._clearance is None or self._clearance[0] != stamp_ns:
+            field = known.distance_field(position, WINDOW_M, known.params.cell_m)
+            self._clearance = (stamp_ns, field)
+        return self._clearance[1]
 
     def search(
         self,
@@ -154,29 +147,29 @@ class MapSearch:
         """The farthest points of the shortest way in line of sight, with more room and less."""
         to_go, clearance = self.to_go, self._clearance
         assert clearance is not None
-        field = clearance[3]
+        field = clearance[1]
         if to_go.is_straight:
             dx, dy = to_go.goal[0] - position[0], to_go.goal[1] - position[1]
             away = math.sqrt(dx * dx + dy * dy)
             part = min(1.0, self._reach_m / max(away, 1e-9))
             return [(dx * part, dy * part)]
         x, y = np.array([position[0]]), np.array([position[1]])
-        way = []
+        path = []
         for _ in range(round(self._reach_m / _STEP_M)):
             ux, uy = to_go.direction(x, y)
             x, y = x + _STEP_M * ux, y + _STEP_M * uy
-            way.append((float(x[0]) - position[0], float(y[0]) - position[1]))
-        ends = np.array(way)
+            path.append((float(x[0]) - position[0], float(y[0]) - position[1]))
+        ends = np.array(path)
         share = np.linspace(0.0, 1.0, 26)[1:]
         xs = position[0] + ends[:, :1] * share
         ys = position[1] + ends[:, 1:] * share
         now = float(field.at(np.array([position[0]]), np.array([position[1]]))[0])
         least = field.at(xs, ys).min(axis=1)
         found = set()
-        for room_m in SIGHT_M:
-            seen = least > min(self._radius_m + room_m, now - 0.005)
-            found.add(int(np.flatnonzero(seen)[-1]) if seen.any() else 0)
-        return [way[k] for k in sorted(found)]
+        for room_m in SIDE_ROOM_M:
+            clear = least > min(self._radius_m + room_m, now - 0.005)
+            found.add(int(np.flatnonzero(clear)[-1]) if clear.any() else 0)
+        return [path[k] for k in sorted(found)]
 
     def _candidates(
         self, ahead: Point, speed_mps: float, tick_s: float, last: Point | None, waits: bool
@@ -232,7 +225,8 @@ class _Evaluation:
     def contact(self, qx: Array, qy: Array, t1: Array) -> Array:
         """Whether the way to each waypoint touches something."""
         paths = self._rollout.paths(qx, qy, t1, float(t1.max()))
-        brief = replace(self._risk, horizon_s=max(float(t1.max()), 0.1), close_m=0.0)
+        horizon_s = max(float(t1.max()), 0.1)
+        brief = replace(self._risk, horizon_s=horizon_s, close_m=0.0, fast_close_s=0.0)
         standing = self._rollout.standing_risk(paths, brief, MARGIN_M) >= FORBIDDEN_M
         moving = self._rollout.moving_risk(paths, brief) > 0.0
         touches: Array = standing | moving

@@ -41,9 +41,6 @@ LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
 SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a direction is needed
 HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
-# A differential drive cannot step aside when an obstacle beside it turns towards it: it passes
-# at a distance, and rather drives on than into the margin.
-TURNING_MARGIN_M, TURNING_CLOSE = 0.15, 7.0
 TOWARDS = math.cos(math.radians(80.0))
 UNOBSERVED = "no direction that the lidar has covered leads on"
 _FREE_M = 1e-9
@@ -172,13 +169,7 @@ class Predictive(BasePlanner):
         (x, y), (gx, gy) = position, goal
         to_goal, goal_distance = (gx - x, gy - y), distance(position, goal)
         drive = self._drive_rollout(obs)
-        risk = self.options.risk
-        if drive is not None:
-            risk = replace(
-                risk,
-                margin_m=risk.margin_m + TURNING_MARGIN_M,
-                close_m=TURNING_CLOSE * risk.close_m,
-            )
+        risk = self.options.risk if drive is None else self.options.risk.for_turning()
         costs = TrajectoryCost(position, circles, risk, tick_s, speed, drive)
         share = min(1.0, speed * tick_s / goal_distance)
         waypoint, t1 = (to_goal[0] * share, to_goal[1] * share), share * goal_distance / speed
@@ -297,8 +288,13 @@ class Predictive(BasePlanner):
             _, self._speeds = apply_command(obs.pose, self._speeds, given, self.params, tick_ns)
         return decision
 
+    def replan(self) -> None:
+        """Drop the last waypoint; what has been perceived is kept."""
+        self._waypoint = None
+        self._changes = SectorChanges()
+
     def forget(self) -> None:
-        """Drop the last waypoint, the tracks and the remembered circles."""
+        """Drop the last waypoint, the map, the tracks and the remembered circles."""
         self._waypoint = None
         self._perceived = ()
         self._speeds = Speeds()

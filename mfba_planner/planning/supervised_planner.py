@@ -51,6 +51,15 @@ class HasLocalMap(Protocol):
         ...
 
 
+@runtime_checkable
+class Replans(Protocol):
+    """A planner that can begin anew without forgetting its surroundings."""
+
+    def replan(self) -> None:
+        """Drop all state but parameters, seed and what is known of the surroundings."""
+        ...
+
+
 class SupervisedPlanner:
     """Passes the decisions of a planner on, changed only by the options below.
 
@@ -161,7 +170,10 @@ class SupervisedPlanner:
 
     def _try_again(self) -> None:
         """Let the planner begin anew."""
-        self.inner.reset()
+        if isinstance(self.inner, Replans):
+            self.inner.replan()
+        else:
+            self.inner.reset()
         if self._no_progress:
             self._progress.restart()
             self._no_progress = ""

@@ -17,8 +17,9 @@ from .drive_rollout import DriveRollout
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12
+TURNING_MARGIN_M, TURNING_CLOSE = 0.15, 7.0
 SLOW = 0.9  # share of the speed below which a candidate waits
-_Row = tuple[float, float, float, float, float, float, float, float, float]
+_Row = tuple[float, float, float, float, float, float, float, float, float, float]
 _by_clearance = itemgetter(0)
 Candidate = tuple[float, Point, float, int]
 
@@ -47,6 +48,17 @@ class RiskParams:
     margin_ticks: float = option(
         1.5, "ticks of an obstacle's motion added to the margin", minimum=0.0, maximum=100.0
     )
+    fast_mps: float = option(
+        0.5, "speed from which an obstacle is kept farther away from, as it may turn",
+        unit="m/s", minimum=0.0, maximum=100.0,
+    )  # fmt: skip
+    fast_margin_s: float = option(
+        0.4, "margin added per m/s above fast_mps", unit="s", minimum=0.0, maximum=10.0
+    )
+    fast_close_s: float = option(
+        1.0, "weight of a close pass added per m/s above fast_mps, for at most 1 m/s",
+        unit="s", minimum=0.0, maximum=100.0,
+    )  # fmt: skip
     waiting: float = option(
         0.1, "cost of waiting, in seconds of driving per second", minimum=0.0, maximum=100.0
     )
@@ -55,12 +67,29 @@ class RiskParams:
         """Raise ConfigError for a value out of range."""
         check(self)
 
+    def around(self, speed_mps: float, tick_s: float) -> tuple[float, float]:
+        """Margin (m) around an obstacle of this speed, and the weight of a pass within it (m).
+
+        One that turns is noticed a tick later. One that is fast leaves no time to evade then.
+        """
+        over = max(speed_mps - self.fast_mps, 0.0)
+        margin = self.margin_m + self.margin_ticks * tick_s * speed_mps + self.fast_margin_s * over
+        return margin, self.close_m + self.fast_close_s * min(over, 1.0)
+
+    def for_turning(self) -> RiskParams:
+        """The weights of a base that cannot step aside when an obstacle beside it turns.
+
+        It passes at a distance, and rather drives on than into the margin.
+        """
+        return replace(
+            self, margin_m=self.margin_m + TURNING_MARGIN_M, close_m=TURNING_CLOSE * self.close_m
+        )
+
 
 class TrajectoryCost:
     """Costs of candidates from one position among circles that keep their velocities.
 
-    A circle that turns is noticed one tick later, so its margin grows with its speed. Plain
-    floats instead of arrays are faster here: few circles are near, and most candidates are
+    Plain floats instead of arrays are faster here: few circles are near, and most candidates are
     rejected by their length or by the first circle.
     """
 
@@ -80,19 +109,19 @@ class TrajectoryCost:
         self._drive = drive
         self.params = params
         px, py = position
-        tau, per_mps = params.horizon_s, params.margin_ticks * tick_s
+        tau = params.horizon_s
         self._rows: list[_Row] = []
         self._tau, self._waiting = tau, params.waiting
-        self._weights = tau, params.close_m, params.contact_m, params.urgent_m
+        self._weights = tau, params.contact_m, params.urgent_m
         for circle in circles:
             (x, y), (vx, vy), r = circle.center_m, circle.velocity_mps, circle.radius_m
             circle_speed = math.sqrt(vx * vx + vy * vy)
-            margin = params.margin_m + per_mps * circle_speed
+            margin, close = params.around(circle_speed, tick_s)
             x, y, outer = x - px, y - py, r + margin
             reachable = outer + (speed_mps + circle_speed) * tau
             away, outer = x * x + y * y, outer * outer
             if away <= reachable * reachable:
-                self._rows.append((away - outer, x, y, vx, vy, r, margin, outer, away))
+                self._rows.append((away - outer, x, y, vx, vy, r, margin, outer, away, close))
         # The nearest first, as it rejects most candidates; the sort is stable.
         self._rows.sort(key=_by_clearance)
         self._active_rows = self._rows
@@ -102,7 +131,7 @@ class TrajectoryCost:
         """Bits (m,): 1 if a robot with velocity (ux, uy) comes too close within tau."""
         if not self._rows:
             return np.zeros(ux.shape, dtype=int)
-        _, x, y, vx, vy, _, _, outer, away = np.array(self._rows).T[:, :, None]
+        _, x, y, vx, vy, _, _, outer, away, _ = np.array(self._rows).T[:, :, None]
         if self._drive is not None:
             delay = self._drive.turn_delay.towards_all(ux, uy)
             x, y = x + vx * delay, y + vy * delay
@@ -215,7 +244,7 @@ class TrajectoryCost:
         """
         (gx, gy), tau, kept = to_goal, self.params.horizon_s, []
         for row in self._active_rows:
-            _, x, y, vx, vy, r, margin, _, _ = row
+            _, x, y, vx, vy, r, margin, _, _, _ = row
             hx, hy = x - gx, y - gy
             near = math.sqrt(x * x + y * y) or _TINY
             far = math.sqrt(hx * hx + hy * hy) or _TINY
@@ -245,9 +274,9 @@ class TrajectoryCost:
         share of the margin. Within a margin, a robot may move in any direction that does not
         bring it closer.
         """
-        tau, close, contact, urgent = self._weights
+        tau, contact, urgent = self._weights
         worst, sqrt = 0.0, math.sqrt
-        for _, x, y, vx, vy, r, margin, outer, away in self._active_rows:
+        for _, x, y, vx, vy, r, margin, outer, away, close in self._active_rows:
             if t0 > 0.0:
                 x = x + vx * t0 - qx
                 y = y + vy * t0 - qy

@@ -26,8 +26,6 @@ from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.spin_node import spin_node
 from ..runtime.stamp_pairing import StampPairs
 
-_DEFAULT_RADII = [0.3]
-
 
 class VirtualSensor(GraphNode):
     """The ring of virtual sensors; a refused input becomes NaN sectors, never free ones.
@@ -40,7 +38,7 @@ class VirtualSensor(GraphNode):
         super().__init__(topics.VIRTUAL_SENSOR, **kwargs)
         self.settings = s = parameters.declare(self, VirtualSensorSettings(), read_only=True)
         self.sensor = parameters.declare(self, SensorParams())
-        self.radii = parameters.declare_radii(self, _DEFAULT_RADII)
+        self.radii = parameters.declare_radii(self, [0.3])
         self.segments = Segments.of(parse_segments(s.segments_m))
         parameters.follow(self, lambda: self.sensor, self._set_sensor)
         self._refused_inputs = RefusedInputs(self)
