@@ -369,11 +369,10 @@ class StaticMap:
         """occupancy_grid() cut to its known cells, with its pose in odom; None before a scan."""
         if self._stamp_ns is None:
             return None
-        cell_m = self.params.cell_m
-        (left, low), cells = cut_to_known(*self.occupancy_grid(), cell_m)
+        (left, low), cells = cut_to_known(*self.occupancy_grid(), self.params.cell_m)
         x, y = self._matching.measured(np.array([left]), np.array([low]), self._origin)
         origin = Pose2D(float(x[0]), float(y[0]), float(self._matching.error[2]))
-        return OccupancyGrid(self._stamp_ns, origin, cell_m, cells)
+        return OccupancyGrid(self._stamp_ns, origin, self.params.cell_m, cells)
 
 
 def _clear_lengths(beams: Beams, bearing: Array, turn_sd: float) -> tuple[Array, Array]:
