@@ -142,8 +142,7 @@ class StaticMap:
             changed = self._mark(found, beams, moving, pose_error)
             stands = (found.range_m > 0.0) & (found.range_m < _PRESENT_M)
             stands &= ~self._moving.near_any(found.x, found.y, surely)
-            x, y = self.to_map(found.x[stands], found.y[stands])
-            self._present = np.stack((x, y), axis=1)
+            self._present = np.stack(self.to_map(found.x[stands], found.y[stands]), axis=1)
         changed |= self._clear(beams, surely)
         x, y = self._robot
         changed |= self._points.roll(x, y)
