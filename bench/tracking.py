@@ -28,7 +28,6 @@ from mfba_planner.evaluation.suites.named_suites import suite
 from mfba_planner.perception.obstacle_tracker import Tracker
 from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.differential_drive import command
 from mfba_planner.planning.planner_factory import make_planner
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive_planner import Predictive, preset
@@ -287,7 +286,7 @@ def memory(ticks: int) -> None:
         if decision.mode is Mode.ARRIVED or tick - since > LONGEST_TRIP:
             arrived, since = arrived + (decision.mode is Mode.ARRIVED), tick
             goals.reverse()
-        world.step(command(decision, scenario.robot, params.tick_ns))
+        world.step(world.command(decision))
         if tick % (ticks // 10) == 0:
             pages = int(Path("/proc/self/statm").read_text().split()[1])
             megabytes = 1e-6 * pages * os.sysconf("SC_PAGE_SIZE")

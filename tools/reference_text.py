@@ -35,6 +35,12 @@ bits.
 **Decisions.** `planner/decision` explains each decision: mode, Vs, Vg, chosen gap, waypoint, bat
 positions, and the reason as text.
 
+**Local map.** `local_map` is the map of `predictive` with a lidar: 100 occupied, 0 seen free, -1
+unknown, cut to the known cells. Its stamp is that of the newest scan. The origin has a small yaw
+where the map corrects the odometry. It is published when it has changed, at most once per
+`map_period_s` of the decisions' stamps (in lockstep: of simulated time). It is latched: a viewer
+that starts later gets the newest.
+
 ## Time
 
 **Lockstep**: one tick is one decision. The world moves on when the Twist for the current tick has

@@ -9,7 +9,7 @@ from ..core.argument_parser import Parser
 from .support.load_episodes import add_paths, named_episodes
 
 _DESCRIPTION = """Show runs in Rerun's viewer (pip install 'mfba_planner[view]'): the moving world,
-decisions as text, clearance and speed, with playback on sim_time or tick."""
+the local maps of a bag, decisions as text, clearance and speed; playback on sim_time or tick."""
 
 
 def main(args: list[str]) -> int:
@@ -23,12 +23,12 @@ def main(args: list[str]) -> int:
         help="write this file instead of opening the viewer; open it with `rerun RRD`",
     )
     parsed = parser.parse(args)
-    runs, fleet_names = named_episodes(parsed.paths, parsed.robots)
+    runs, fleet_names, maps = named_episodes(parsed.paths, parsed.robots)
     from ..report.rerun_viewer import save, show
 
     if parsed.save is None:
-        show(runs, fleet_names)
+        show(runs, fleet_names, maps)
         return 0
-    save(runs, parsed.save, fleet_names)
+    save(runs, parsed.save, fleet_names, maps)
     print(f"wrote {parsed.save}")
     return 0

@@ -64,6 +64,14 @@ def towards(a: Point, heading_rad: float, length_m: float) -> Point:
     return (a[0] + length_m * math.cos(heading_rad), a[1] + length_m * math.sin(heading_rad))
 
 
+def rotated(vector: Point, angle_rad: float) -> Point:
+    """A vector in the plane rotated counter-clockwise; an angle of 0 changes no bit."""
+    if angle_rad == 0.0:
+        return vector
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1])
+
+
 def tangent_half_angle(distance_m: float, radius_m: float) -> float:
     """Half the angle between the two tangents from a point to a circle (Fig. 5).
 

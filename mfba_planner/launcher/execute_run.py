@@ -7,6 +7,8 @@ import sys
 from contextlib import closing, suppress
 
 from ..core.errors import BagError, MfbaError
+from ..recording.fleet_topics import NO_NAMESPACE
+from ..recording.local_maps import NO_MAPS, read_local_maps
 from ..scenarios.run_config import Driver
 from ..simulation.episode import Episode
 from ..simulation.run_episode import simulate
@@ -57,7 +59,10 @@ def _finish(run: Run, episode: Episode | None, failure: str = "") -> None:
     if run.request.view:
         from ..report.rerun_viewer import show
 
-        show([(run_result.directory.name, run_result.episode)])
+        name, maps = run_result.directory.name, NO_MAPS
+        if episode is None:
+            maps = {name: read_local_maps(run.directory.bag, [NO_NAMESPACE])[NO_NAMESPACE]}
+        show([(name, run_result.episode)], maps=maps)
     run_result.require_success()
 
 

@@ -8,6 +8,7 @@ import sys
 from ..core.errors import MfbaError
 from ..evaluation.metrics import evaluate
 from ..recording.decisions_without_inputs import print_omissions
+from ..recording.local_maps import read_local_maps
 from ..recording.read_episode import read_recording
 from ..report.fleet_table import fleet_text, why_no_success
 from .run_state import Run
@@ -40,6 +41,6 @@ def finish_fleet_run(run: Run, failure: str = "") -> None:
     if run.request.view:
         from ..report.rerun_viewer import show
 
-        show(list(runs.items()), list(runs))
+        show(list(runs.items()), list(runs), read_local_maps(directory.bag, runs))
     if why := why_no_success(results):
         raise MfbaError(f"{directory.path}: {why}")

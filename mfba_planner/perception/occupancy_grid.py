@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from ..core.geometry import Point
+from ..core.geometry import Point, Pose2D
 from .scan_beams import Beams
 
 Array = np.ndarray
@@ -15,6 +16,26 @@ Array = np.ndarray
 OCCUPIED, FREE, UNKNOWN = 100, 0, -1
 _CELL_M = 0.2
 _EVERY_S = 0.5
+
+
+class OccupancyGrid(NamedTuple):
+    """A map at a time, as nav_msgs/OccupancyGrid: cells (h, w) int8, row by row from the origin.
+
+    origin is the pose, in odom, of the outer corner of the first cell.
+    """
+
+    stamp_ns: int
+    origin: Pose2D
+    cell_m: float
+    cells: Array
+
+    def occupied(self) -> Array:
+        """Centres (n, 2) of the occupied cells, m, in odom."""
+        row, column = np.nonzero(self.cells == OCCUPIED)
+        dx, dy = (column + 0.5) * self.cell_m, (row + 0.5) * self.cell_m
+        c, s = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
+        x, y = self.origin.x + (c * dx - s * dy), self.origin.y + (s * dx + c * dy)
+        return np.stack((x, y), axis=1)
 
 
 class ObservedCells:
@@ -92,3 +113,14 @@ def occupancy(
     inside = (i >= 0) & (j >= 0) & (i < n) & (j < n)
     cells[j[inside], i[inside]] = OCCUPIED
     return (i0 * cell_m, j0 * cell_m), cells
+
+
+def cut_to_known(origin: Point, cells: Array, cell_m: float) -> tuple[Point, Array]:
+    """The smallest part that holds all known cells; the middle cell if none is known."""
+    known = cells != UNKNOWN
+    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    if not rows.size:
+        rows, columns = (np.array([n // 2]) for n in cells.shape)
+    (j, above), (i, right) = rows[[0, -1]].tolist(), columns[[0, -1]].tolist()
+    part = cells[j : above + 1, i : right + 1]
+    return (origin[0] + i * cell_m, origin[1] + j * cell_m), part

@@ -17,7 +17,7 @@ from ..core.planner_types import NANO
 from .distance_field import DistanceField, distance_field
 from .free_space import FreeSpace
 from .moving_returns import MovingReturns
-from .occupancy_grid import ObservedCells, occupancy
+from .occupancy_grid import ObservedCells, OccupancyGrid, cut_to_known, occupancy
 from .scan_beams import Beams
 from .scan_matching import ScanMatching
 from .scan_surfaces import Surfaces, surfaces
@@ -142,8 +142,7 @@ class StaticMap:
             changed = self._mark(found, beams, moving, pose_error)
             stands = (found.range_m > 0.0) & (found.range_m < _PRESENT_M)
             stands &= ~self._moving.near_any(found.x, found.y, surely)
-            x, y = self.to_map(found.x[stands], found.y[stands])
-            self._present = np.stack((x, y), axis=1)
+            self._present = np.stack(self.to_map(found.x[stands], found.y[stands]), axis=1)
         changed |= self._clear(beams, surely)
         x, y = self._robot
         changed |= self._points.roll(x, y)
@@ -365,6 +364,15 @@ class StaticMap:
         return occupancy(
             data[X], data[Y], self._robot, self.params.size_m, self.params.cell_m, self._observed
         )
+
+    def known_grid(self) -> OccupancyGrid | None:
+        """occupancy_grid() cut to its known cells, with its pose in odom; None before a scan."""
+        if self._stamp_ns is None:
+            return None
+        (left, low), cells = cut_to_known(*self.occupancy_grid(), self.params.cell_m)
+        x, y = self._matching.measured(np.array([left]), np.array([low]), self._origin)
+        origin = Pose2D(float(x[0]), float(y[0]), float(self._matching.error[2]))
+        return OccupancyGrid(self._stamp_ns, origin, self.params.cell_m, cells)
 
 
 def _clear_lengths(beams: Beams, bearing: Array, turn_sd: float) -> tuple[Array, Array]:

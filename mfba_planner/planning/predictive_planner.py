@@ -17,7 +17,7 @@ from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
 from ..perception.obstacle_tracker import Tracker, TrackingParams
 from ..perception.scan_coverage import ScanCoverage
 from ..perception.sensory_vector import SensorParams, sense_circles
-from ..perception.static_map import StaticMapParams
+from ..perception.static_map import StaticMap, StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
@@ -129,9 +129,6 @@ class Predictive(BasePlanner):
             for c, s in zip(self._cos.tolist(), self._sin.tolist())
         ]
         self._waypoint: Point | None = None
-        self._memory = ObstacleMemory(self.options.memory)
-        self._tracker = Tracker(self.options.tracking)
-        self._map_planning: MapPlanning
         super().__init__(params, sensor, seed)
 
     def move(self, obs: Observation, goal: Point) -> Move:
@@ -153,16 +150,14 @@ class Predictive(BasePlanner):
                 bats=self.has_bats,
             )
             if among is not None:
-                if among.event is Event.OBSTACLE:
-                    self._waypoint = among.waypoint
+                self._waypoint = among.waypoint if among.event is Event.OBSTACLE else None
                 return among
         if not circles and self._is_observed((goal[0] - position[0], goal[1] - position[1])):
             self._changes.not_enclosed()
             straight = self.straight(position, goal, self.params.speed_mps)
             return Move(velocity=straight, reason="no obstacle in range")
         at_rest = ObstaclesAtRest(position, circles)
-        misplaced = at_rest.misplaced()
-        if misplaced:
+        if misplaced := at_rest.misplaced():
             return _blocked(misplaced)
         move = self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
         if not all(move.vs or (0,)):
@@ -287,6 +282,10 @@ class Predictive(BasePlanner):
             for k in np.flatnonzero(self._unobserved).tolist():
                 ranges[(k + 1) * count // n % count] = 0.0
         return tuple(ranges)
+
+    def local_map(self) -> StaticMap:
+        """What stands, as seen in the scans; empty without scans."""
+        return self._map_planning.map
 
     def plan(self, obs: Observation) -> Decision:
         """Decide, and for a differential drive keep the speeds that the decision leads to."""

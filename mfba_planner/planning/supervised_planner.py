@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point, bearing, distance, towards
@@ -15,6 +15,9 @@ from .planner_params import Method, PlannerParams
 from .progress_checker import ProgressChecker
 from .recovery import Phase, Recovery, advance, most_room, wait_after
 from .speed_limit import allowed_speed_share
+
+if TYPE_CHECKING:  # the paper's planner has no map and must not load it
+    from ..perception.static_map import StaticMap
 
 TRAIL_STEP_M = 0.05  # least distance of two remembered positions
 _NOT_DRIVING = (Mode.IDLE, Mode.ARRIVED)
@@ -36,6 +39,15 @@ class HasSurroundings(Protocol):
 
     def surroundings(self, position: Point) -> Ranges:
         """Range per sector to what its last decision was made on; empty if on sectors."""
+        ...
+
+
+@runtime_checkable
+class HasLocalMap(Protocol):
+    """A planner that keeps a map of what stands."""
+
+    def local_map(self) -> StaticMap:
+        """The map, as of its last decision; another one after a reset."""
         ...
 
 
@@ -76,6 +88,11 @@ class SupervisedPlanner:
     def phase(self) -> Phase:
         """Phase of the recovery."""
         return self._recovery.phase
+
+    @property
+    def local_map(self) -> StaticMap | None:
+        """The map of the wrapped planner, None if it keeps none."""
+        return self.inner.local_map() if isinstance(self.inner, HasLocalMap) else None
 
     def reset(self) -> None:
         """Drop all state but parameters and seed (after a clock reset, before a new trip)."""

@@ -11,11 +11,14 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ..core.errors import FrameError, InputError
-from ..core.geometry import Point, Pose2D, yaw_from_quaternion
+from ..core.geometry import Point, Pose2D, rotated, yaw_from_quaternion
 from ..core.planner_types import Decision, Mode, Ranges, RefusalReason, Scan
 from ..core.robot_base import Base
 from ..perception.no_return import NoReturn, rep_117
+from ..perception.occupancy_grid import OccupancyGrid
 from ..perception.sensory_vector import blind
 from ..planning.differential_drive import command
 
@@ -173,20 +176,28 @@ def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF
     )
 
 
+def occupancy_grid(message: Any) -> OccupancyGrid:
+    """nav_msgs/OccupancyGrid to a map; InputError where the fields contradict each other."""
+    info = message.info
+    _finite("occupancy grid resolution", (info.resolution,))
+    if not info.resolution > 0.0:
+        raise InputError(f"occupancy grid has resolution={info.resolution:g} m; send more than 0")
+    if len(message.data) != info.width * info.height:
+        raise InputError(
+            f"occupancy grid holds {len(message.data)} cells, but width={info.width} and "
+            f"height={info.height} make {info.width * info.height}; check its publisher"
+        )
+    cells = np.array(message.data, dtype=np.int8).reshape(info.height, info.width)
+    origin = pose2d(info.origin, "occupancy grid origin")
+    return OccupancyGrid(stamp_ns(message.header.stamp), origin, info.resolution, cells)
+
+
 def velocity(twist: Any) -> tuple[float, float, float]:
     """geometry_msgs/Twist(Stamped) to body-frame (vx, vy, wz); InputError for NaN or inf."""
     twist = getattr(twist, "twist", twist)
     values = (twist.linear.x, twist.linear.y, twist.angular.z)
     _finite("cmd_vel", values)
     return values
-
-
-def rotated(vector: Point, angle_rad: float) -> Point:
-    """A vector in the plane rotated counter-clockwise; an angle of 0 changes no bit."""
-    if angle_rad == 0.0:
-        return vector
-    c, s = math.cos(angle_rad), math.sin(angle_rad)
-    return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1])
 
 
 def body_velocity(decision: Decision, base: Base, tick_ns: int) -> tuple[float, float, float]:

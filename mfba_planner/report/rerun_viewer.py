@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+from bisect import bisect_left
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ import numpy as np
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.output_files import refuse_existing
 from mfba_planner.core.planner_types import Decision, Mode
+from mfba_planner.recording.local_maps import NO_MAPS, MapPoints, RobotMaps
 from mfba_planner.simulation.batched_motion import Motion
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.obstacle_motion import velocity_at
@@ -26,27 +28,36 @@ from .html.page_data import clearances, in_one_scene, obstacle_names, speeds
 from .sector_ring import ring_of
 
 _GREY, _DARK = style.FAINT, style.QUIET
+_MAP_M = 0.025  # radius of the points of the local map
 _AHEAD_S = 2.0  # arrows show the obstacles' motion over this time
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, 49)
 
 
-def save(runs: Sequence[tuple[str, Episode]], path: Path, roster: Sequence[str] = ()) -> None:
+def save(
+    runs: Sequence[tuple[str, Episode]],
+    path: Path,
+    roster: Sequence[str] = (),
+    maps: RobotMaps = NO_MAPS,
+) -> None:
     """Write a recording that `rerun FILE` opens. Raises OutputError where path exists.
 
     roster: the names of all robots of the fleet, if the runs are of one; they share a scene.
+    maps: the local maps of each run, by its name.
     """
     refuse_existing(path)
     rerun, stream = _stream()
     stream.save(str(path), default_blueprint=_layout(rerun, runs, roster))
-    _log_runs(rerun, stream, runs, roster)
+    _log_runs(rerun, stream, runs, roster, maps)
 
 
-def show(runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = ()) -> None:
+def show(
+    runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = (), maps: RobotMaps = NO_MAPS
+) -> None:
     """Open the viewer's window on what save() would write; raises like require_viewer."""
     require_viewer()
     rerun, stream = _stream()
     stream.spawn(default_blueprint=_layout(rerun, runs, roster))
-    _log_runs(rerun, stream, runs, roster)
+    _log_runs(rerun, stream, runs, roster, maps)
 
 
 def require_viewer() -> None:
@@ -123,7 +134,11 @@ def _from_above(view: Any, episodes: Sequence[Episode]) -> Any:
 
 
 def _log_runs(
-    rerun: Any, stream: Any, runs: Sequence[tuple[str, Episode]], roster: Sequence[str]
+    rerun: Any,
+    stream: Any,
+    runs: Sequence[tuple[str, Episode]],
+    roster: Sequence[str],
+    maps: RobotMaps,
 ) -> None:
     is_fleet = in_one_scene(runs, roster)
     last, _ = max(runs, key=lambda run: len(run[1].ticks))
@@ -131,7 +146,10 @@ def _log_runs(
         names = obstacle_names(name, episode, roster)
         if is_fleet:  # other robots are logged by their own run, common obstacles once
             names = [own for own in names if own not in roster and name == last]
-        _RunLogger(rerun, stream, name, episode, names, [name] if is_fleet else None).log_all()
+        label = [name] if is_fleet else None
+        logger = _RunLogger(rerun, stream, name, episode, names, label)
+        logger.log_all()
+        logger.log_maps(maps.get(name, ()))
     stream.flush()
 
 
@@ -171,6 +189,18 @@ class _RunLogger:
             if math.isfinite(gap_m):
                 self._log("curves/clearance", self.rr.Scalars(gap_m))
             self._log("curves/speed", self.rr.Scalars(speed))
+
+    def log_maps(self, maps: Sequence[MapPoints]) -> None:
+        """Log each local map at its tick: it is shown until the next one."""
+        stamps = [tick.stamp_ns for tick in self.episode.ticks]
+        for found in maps:
+            k = bisect_left(stamps, found.stamp_ns)
+            if k == len(stamps):
+                continue
+            self.stream.set_time("sim_time", duration=self.episode.time_s(stamps[k]))
+            self.stream.set_time("tick", sequence=k)
+            flat = np.pad(found.points_m, ((0, 0), (0, 1)))
+            self._log("world/map", self.rr.Points3D(flat, radii=_MAP_M, colors=_rgb(_GREY)))
 
     def _log(self, path: str, data: Any, *, static: bool = False) -> None:
         self.stream.log(f"{self.name}/{path}", data, static=static)

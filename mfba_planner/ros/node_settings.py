@@ -139,6 +139,9 @@ class PlannerSettings:
     view_period_s: float = option(
         0.2, "period of the markers", unit="s", minimum=0.0, maximum=3600.0
     )
+    map_period_s: float = option(
+        1.0, "least time between two local_map; 0: none", unit="s", minimum=0.0, maximum=3600.0
+    )
     scan_yaw: float = option(
         0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
     )

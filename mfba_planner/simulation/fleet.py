@@ -13,7 +13,6 @@ from ..core.errors import ConfigError
 from ..core.geometry import Point, Pose2D, bearing, distance, towards
 from ..core.planner_types import NANO, Decision, PathPlanner
 from ..perception.sensory_vector import SensorParams
-from ..planning.differential_drive import command
 from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import supervised_algorithm_1
 from .episode import Episode, Outcome
@@ -216,7 +215,7 @@ def run_fleet(
             ticks[number].append(
                 path_planners[number].plan(observe(fleet.robot_worlds[number], sensor))
             )
-        return {n: command(ticks[n][-1], scenario.robot, planner.tick_ns) for n in numbers}
+        return {n: fleet.robot_worlds[n].command(ticks[n][-1]) for n in numbers}
 
     commands = decide(range(len(path_planners)))
     while (running := fleet.running) and go_on(fleet):

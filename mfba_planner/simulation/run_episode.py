@@ -8,7 +8,6 @@ from typing import TypeVar
 
 from ..core.planner_types import Observation, PathPlanner
 from ..perception.sensory_vector import SensorParams
-from ..planning.differential_drive import command
 from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..planning.supervised_planner import supervised_algorithm_1
@@ -42,7 +41,7 @@ def episode_generator(
     yield obs
     ticks, truth = [path_planner.plan(obs)], [world.pose]
     while (outcome := world.outcome()) is None and go_on(world):
-        world.step(command(ticks[-1], scenario.robot, world.tick_ns))
+        world.step(world.command(ticks[-1]))
         obs = observe(world, sensor)
         yield obs
         ticks.append(path_planner.plan(obs))

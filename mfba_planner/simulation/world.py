@@ -6,9 +6,9 @@ from __future__ import annotations
 from math import isnan
 
 from ..core.errors import ConfigError
-from ..core.geometry import Point, Pose2D, distance
-from ..core.planner_types import NANO
-from ..planning.differential_drive import Speeds, apply_command
+from ..core.geometry import Point, Pose2D, distance, rotated
+from ..core.planner_types import NANO, Decision
+from ..planning.differential_drive import Speeds, apply_command, command
 from .batched_motion import Motion
 from .episode import Outcome, stamp_of
 from .nearby_obstacles import Nearby, NearbyObstacles
@@ -95,8 +95,19 @@ class World:
             return Outcome.TIME_LIMIT
         return None
 
+    def command(self, decision: Decision) -> Point:
+        """The command of a decision as the base receives it, for step().
+
+        A Twist is in the body frame: the planner turns its velocity by the heading that the
+        odometry gives, the base has its true one.
+        """
+        given = command(decision, self.scenario.robot, self.tick_ns)
+        if self.scenario.robot.turns:
+            return given
+        return rotated(rotated(given, -decision.pose.yaw), self.pose.yaw)
+
     def step(self, command: Point) -> None:
-        """Advance by one tick with a command as from differential_drive.command."""
+        """Advance by one tick with a command as from command()."""
         robot = self.scenario.robot
         if robot.turns:
             self.pose, self.speeds = apply_command(

@@ -13,6 +13,7 @@ from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.option_specs import override
 from mfba_planner.core.planner_types import Circle, Decision, Mode, Observation, Scan
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
+from mfba_planner.perception.static_map import StaticMap
 from mfba_planner.planning.planner_factory import make_planner
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
@@ -213,3 +214,13 @@ def test_the_case_studies_are_decided_as_without_it(case: str, method: Method) -
         for p in (chosen, off)
     }
     assert len(found) == 1
+
+
+def test_the_local_map_is_that_of_the_wrapped_planner_and_new_after_a_reset() -> None:
+    assert make_planner(PlannerParams()).local_map is None
+    planner = make_planner(PlannerParams(method=Method.PREDICTIVE))
+    first = planner.local_map
+    assert isinstance(first, StaticMap)
+    assert planner.local_map is first
+    planner.reset()
+    assert planner.local_map is not first

@@ -26,7 +26,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import LaserScan
 
 from mfba_planner.core.errors import InputError
-from mfba_planner.core.geometry import Pose2D, wrap_angle
+from mfba_planner.core.geometry import Pose2D, rotated, wrap_angle
 from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.perception.sensory_vector import SensorParams, sensory_vector
 from mfba_planner.recording import from_messages
@@ -221,7 +221,7 @@ def test_the_twist_is_the_decision_in_the_body_frame(
     ):
         vx, vy, wz = from_messages.velocity(sent(message))
         assert wz == 0.0
-        back = from_messages.rotated((vx, vy), yaw)
+        back = rotated((vx, vy), yaw)
         # subnormal floats lose digits
         assert math.dist(back, velocity) <= 1e-12 * math.hypot(*velocity) + 1e-300
         if yaw == 0.0:
@@ -347,9 +347,9 @@ def test_text_without_points_is_refused(text: str) -> None:
 
 @given(st.tuples(moderate, moderate), angles)
 def test_rotation_and_its_inverse(vector: tuple[float, float], angle: float) -> None:
-    turned = from_messages.rotated(vector, angle)
+    turned = rotated(vector, angle)
     assert math.hypot(*turned) == pytest.approx(math.hypot(*vector))
-    assert from_messages.rotated(turned, -angle) == pytest.approx(vector, abs=1e-6)
+    assert rotated(turned, -angle) == pytest.approx(vector, abs=1e-6)
 
 
 def a_scan(count: int = 360, **changes: Any) -> LaserScan:

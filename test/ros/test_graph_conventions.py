@@ -41,6 +41,7 @@ TABLE = [
     ("/trail", "nav_msgs/msg/Path", ["world_sim"], [], False),
     ("/cmd_vel", "geometry_msgs/msg/Twist", ["planner"], ["world_sim"], False),
     ("/planner/decision", "diagnostic_msgs/msg/DiagnosticArray", ["planner"], [], False),
+    ("/local_map", "nav_msgs/msg/OccupancyGrid", ["planner"], [], True),
     ("/outcome", "diagnostic_msgs/msg/DiagnosticStatus", ["world_sim"], [], True),
     ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", [], ["world_sim"], False),
     ("/markers", "visualization_msgs/msg/MarkerArray", ["planner", "world_sim"], [], False),

@@ -47,7 +47,12 @@ NOISY = replace(
         scan_m=0.01, scan_dropout=0.1, scan_loss=0.02, scan_latency_s=0.1,
     ),
 )  # fmt: skip
-ROBOTS = {"turning": TURNING, "scanning": SCANNING, "noisy": NOISY}
+ROBOTS = {
+    "turning": TURNING,
+    "scanning": SCANNING,
+    "noisy": NOISY,
+    "omnidirectional": replace(NOISY, drive=Drive.OMNIDIRECTIONAL),
+}
 
 
 def near(robot: Robot) -> Scenario:

@@ -23,6 +23,7 @@ PLUGINS = "rviz_default_plugins/"
 # What rviz_default_plugins' plugins_description.xml (Jazzy) lists for those used here.
 DISPLAYS = {
     "Grid": None,
+    "Map": "nav_msgs/msg/OccupancyGrid",
     "MarkerArray": "visualization_msgs/msg/MarkerArray",
     "Path": "nav_msgs/msg/Path",
     "Pose": "geometry_msgs/msg/PoseStamped",

@@ -21,6 +21,7 @@ from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ...recording.decisions_without_inputs import print_omissions
 from ...recording.fleet_topics import NO_NAMESPACE, select_robots
+from ...recording.local_maps import NO_MAPS, RobotMaps, read_local_maps
 from ...recording.read_episode import Recording, read_recording
 from ...report.result_json import read_result
 from ...scenarios.scenario_files import load_scenario
@@ -41,23 +42,29 @@ def add_paths(parser: Parser) -> None:
 
 
 class NamedEpisodes(NamedTuple):
-    """(name, run) pairs; fleet_names has all robots' names if the runs are one fleet's."""
+    """(name, run) pairs; fleet_names has all robots' names if the runs are one fleet's.
+
+    maps holds the local maps of the bags by the run's name.
+    """
 
     runs: list[tuple[str, Episode]]
     fleet_names: tuple[str, ...] = ()
+    maps: RobotMaps = NO_MAPS
 
 
 def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> NamedEpisodes:
     """Read or simulate the runs; print what is left out. Raises BagError, InputError."""
-    recordings = [_recording(path, robots) for path in paths]
-    first = recordings[0]
+    loaded = [_recording(path, robots) for path in paths]
+    first, maps = loaded[0]
     if len(paths) == 1 and NO_NAMESPACE not in first.episodes:
-        return NamedEpisodes(list(first.episodes.items()), first.scenario.robot_names)
-    runs = []
-    for path, recording in zip(paths, recordings):
+        return NamedEpisodes(list(first.episodes.items()), first.scenario.robot_names, maps)
+    runs, maps_of = [], {}
+    for path, (recording, maps) in zip(paths, loaded):
         for robot, episode in recording.episodes.items():
-            runs.append((".".join(filter(None, (_name(path), robot))), episode))
-    return NamedEpisodes(runs)
+            name = ".".join(filter(None, (_name(path), robot)))
+            runs.append((name, episode))
+            maps_of[name] = maps.get(robot, ())
+    return NamedEpisodes(runs, maps=maps_of)
 
 
 def _name(path: Path) -> str:
@@ -68,17 +75,18 @@ def _name(path: Path) -> str:
     return path.name if path.is_dir() else path.stem
 
 
-def _recording(path: Path, robots: Sequence[str]) -> Recording:
+def _recording(path: Path, robots: Sequence[str]) -> tuple[Recording, RobotMaps]:
+    """A recording and its local maps."""
     bag = bag_in(path)
     if bag == path and not any(path.glob("*.mcap")) and (path / _RESULT).is_file():
         path = path / _RESULT
     if path.suffix != ".json":
         recording = read_recording(bag, robots)
         print_omissions(bag, recording.omitted)
-        return recording
+        return recording, read_local_maps(bag, recording.episodes)
     select_robots(path, [NO_NAMESPACE], robots)
     episode = _simulate_result(path)
-    return Recording(episode.scenario, episode.seed, {NO_NAMESPACE: episode}, {})
+    return Recording(episode.scenario, episode.seed, {NO_NAMESPACE: episode}, {}), NO_MAPS
 
 
 def _simulate_result(path: Path) -> Episode:

@@ -79,6 +79,9 @@ function legend() {
       svg("circle", { cx: 11, cy: 8, r: 7, class: "enlarged" }),
       svg("circle", { cx: 11, cy: 8, r: 4, class: "body" })),
     entry(`its motion in ${AHEAD} s`, svg("path", { d: "M1 8H20M14 4L20 8L14 12", class: "motion" })),
+    ...(runs.some((run) => run.maps.length)
+      ? [entry("local map: what stands, as seen", svg("path", { d: "M3 8h0M8 8h0M13 8h0M18 8h0", class: "map" }))]
+      : []),
     entry("sensing range, sector or heading that is set",
       svg("path", { d: "M2 14A18 18 0 0 1 20 14L11 2Z", class: "sector set" }),
       svg("path", { d: "M1 14A18 18 0 0 1 21 14", class: "ring" })),

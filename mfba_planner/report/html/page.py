@@ -15,6 +15,7 @@ from string import Template
 from mfba_planner import __version__
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.output_files import write_new
+from mfba_planner.recording.local_maps import NO_MAPS, RobotMaps
 from mfba_planner.report import format_values
 from mfba_planner.simulation.episode import Episode
 
@@ -28,18 +29,24 @@ _SCRIPTS = (
 
 
 def write_page(
-    runs: Sequence[tuple[str, Episode]], path: Path, roster: Sequence[str] = ()
+    runs: Sequence[tuple[str, Episode]],
+    path: Path,
+    roster: Sequence[str] = (),
+    maps: RobotMaps = NO_MAPS,
 ) -> None:
     """Write the page of some named runs; the same runs give the same bytes.
 
     roster: the names of all robots of the fleet, if the runs are of one; they share a scene.
+    maps: the local maps of each run, by its name.
     Raises InputError for too many runs or ticks, OutputError when path exists already or cannot
     be written.
     """
-    write_new(path, page(runs, roster).encode())
+    write_new(path, page(runs, roster, maps).encode())
 
 
-def page(runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = ()) -> str:
+def page(
+    runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = (), maps: RobotMaps = NO_MAPS
+) -> str:
     """The text of the page. Raises InputError for too many runs or ticks."""
     episodes = [episode for _, episode in runs]
     is_fleet = in_one_scene(runs, roster)
@@ -53,7 +60,7 @@ def page(runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = ()) -> str
         style=_own("page.css"),
         data=as_json(
             {
-                **page_data(runs, __version__, roster),
+                **page_data(runs, __version__, roster, maps),
                 "worlds": names,
                 "charts": charts(episodes),
                 "looks": [look(number) for number in range(len(runs))],

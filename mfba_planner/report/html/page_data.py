@@ -19,7 +19,9 @@ from mfba_planner.evaluation.metrics import evaluate, tick_clearances, within_ra
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.odometry_jump import is_odometry_jump
 from mfba_planner.planning.planner_params import PlannerParams
+from mfba_planner.recording.local_maps import NO_MAPS, RobotMaps
 from mfba_planner.report import format_values
+from mfba_planner.report.html.map_data import map_data
 from mfba_planner.report.result_table import result_rows
 from mfba_planner.report.run_events import closest_passes
 from mfba_planner.report.sector_ring import ring_of
@@ -38,7 +40,10 @@ _MODES = list(Mode)
 
 
 def page_data(
-    runs: Sequence[tuple[str, Episode]], version: str, roster: Sequence[str] = ()
+    runs: Sequence[tuple[str, Episode]],
+    version: str,
+    roster: Sequence[str] = (),
+    maps: RobotMaps = NO_MAPS,
 ) -> Plain:
     """The data of the page of some named runs; runs in equal worlds share one view.
 
@@ -63,6 +68,7 @@ def page_data(
         "modes": [{"key": mode.value, "label": format_values.MODES[mode]} for mode in _MODES],
         "runs": [
             run_data(name, episode, view, obstacle_names(name, episode, roster), times_s)
+            | {"maps": map_data(episode, maps.get(name, ()))}
             for (name, episode), view in zip(runs, shared)
         ],
     }

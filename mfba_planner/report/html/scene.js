@@ -58,6 +58,8 @@ class Scene {
     this.element.prepend(svg("path", { class: "grid", d: lines.join("") }));
     const walls = world.segments.map(([x0, y0, x1, y1]) => `M${x0} ${-y0}L${x1} ${-y1}`);
     if (walls.length) this.add("path", { class: "segments", d: walls.join("") });
+    this.map = this.add("path", { class: "map" });
+    this.mapTicks = this.run.maps.map(({ tick }) => tick);
     if (!world.walls) return;
     const [x0, y0, x1, y1] = world.walls;
     this.add("rect", { class: "wall", x: x0, y: -y1, width: x1 - x0, height: y1 - y0 });
@@ -211,6 +213,7 @@ class Scene {
 
   showDecision(k) {
     const { ticks } = this.run;
+    this.showMap(k);
     const mode = DATA.modes[ticks.mode[k]].key;
     set(this.element, { "data-mode": mode, "data-tick": k });
     const isAnySet = ticks.vs[k].includes("1");
@@ -236,6 +239,21 @@ class Scene {
       bats.push(svg("circle", { cx: ticks.bats[k][i], cy: -ticks.bats[k][i + 1], r }));
     }
     this.bats.replaceChildren(...bats);
+  }
+
+  /** The last local map until tick k: a dot for each occupied cell. */
+  showMap(k) {
+    const number = k < this.mapTicks[0] ? -1 : indexAt(this.mapTicks, k);
+    if (this.mapShown === number) return;
+    this.mapShown = number;
+    const { points } = this.run.maps[number] ?? { points: [] };
+    const dots = [];
+    for (let i = 0, x = 0, y = 0; i < points.length; i += 2) {
+      x += points[i];
+      y += points[i + 1];
+      dots.push(`M${x / 100} ${-y / 100}h0`);
+    }
+    set(this.map, { d: dots.join(""), "data-points": dots.length });
   }
 
   /** A line with a head of seven pixels, from (x, y) along (dx, dy). */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The planner's publishers: goal_step and cmd_vel, then plan, decision and markers."""
+"""The planner's publishers: goal_step and cmd_vel, then plan, decision, markers, map."""
 
 from __future__ import annotations
 
@@ -10,26 +10,31 @@ from geometry_msgs.msg import Twist, TwistStamped
 from ...core.geometry import Point
 from ...core.planner_types import Decision, Mode
 from ...planning.odometry_jump import is_odometry_jump
-from ...planning.planner_params import PlannerParams
+from ...planning.supervised_planner import SupervisedPlanner
 from ..interface import markers, to_messages, topics
 from ..node_settings import PlannerSettings
 from ..runtime.base_node import GraphNode
+from .local_map_publisher import LocalMapPublisher
 
 
 class PlannerPublishers:
     """The publishers of planner."""
 
     def __init__(
-        self, node: GraphNode, settings: PlannerSettings, params: Callable[[], PlannerParams]
+        self,
+        node: GraphNode,
+        settings: PlannerSettings,
+        path_planner: Callable[[], SupervisedPlanner],
     ) -> None:
-        """Advertise all topics; cmd_vel holds for one tick of the params."""
-        self._settings, self._params = settings, params
+        """Advertise all topics; cmd_vel holds for one tick of the planner's params."""
+        self._settings, self._path_planner = settings, path_planner
         self._log = node.get_logger()
         self._node_name = node.get_fully_qualified_name()
         self._goal_step = node.advertise(topics.GOAL_STEP)
         self._plan = node.advertise(topics.PLAN)
         self._decision = node.advertise(topics.DECISION)
         self._markers = node.advertise(topics.MARKERS)
+        self._local_map = LocalMapPublisher(node, settings)
         self._view = markers.RateLimit(settings.view_period_s)
         stamped = TwistStamped if settings.enable_stamped_cmd_vel else None
         self._cmd_vel = node.advertise(topics.CMD_VEL, stamped)
@@ -53,10 +58,11 @@ class PlannerPublishers:
         )
         if self._view.due(decision.stamp_ns):
             self._markers.publish(markers.decision_markers(decision, frame, ring_radius_m))
+        self._local_map.publish_if_due(self._path_planner().local_map, decision.stamp_ns)
 
     def publish_command(self, decision: Decision) -> None:
         """Publish goal_step, then cmd_vel: the stamp of goal_step is also that of cmd_vel."""
-        s, stamp, params = self._settings, decision.stamp_ns, self._params()
+        s, stamp, params = self._settings, decision.stamp_ns, self._path_planner().params
         self._goal_step.publish(
             to_messages.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame)
         )

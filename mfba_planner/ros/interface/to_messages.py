@@ -11,17 +11,18 @@ from types import MappingProxyType
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Pose, PoseArray, PoseStamped, Twist, TwistStamped
-from nav_msgs.msg import Odometry, Path
+from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, MultiArrayDimension, UInt8MultiArray
 
-from ...core.geometry import Point, Pose2D, quaternion_from_yaw
+from ...core.geometry import Point, Pose2D, quaternion_from_yaw, rotated
 from ...core.planner_types import Bits, Decision, Mode, Ranges, Scan
 from ...core.robot_base import Base
+from ...perception import occupancy_grid
 from ...perception.sensory_vector import SensorParams, bits_text, longest_range_m
 from ...planning.odometry_jump import is_odometry_jump
-from ...recording.from_messages import SECOND_NS, body_velocity, points_text, rotated
+from ...recording.from_messages import SECOND_NS, body_velocity, points_text
 from ...simulation.episode import Outcome
 from .diagnostic_status import Status
 
@@ -157,6 +158,18 @@ def plan_msg(decision: Decision, frame_id: str) -> Path:
     if decision.goal is not None and decision.goal != points[-1]:
         points.append(decision.goal)
     return path_msg(points, decision.stamp_ns, frame_id)
+
+
+def occupancy_grid_msg(grid: occupancy_grid.OccupancyGrid, frame_id: str) -> OccupancyGrid:
+    """A map; its origin has a yaw where the map has corrected the odometry's heading."""
+    message = OccupancyGrid()
+    set_header(message.header, grid.stamp_ns, frame_id)
+    set_stamp(message.info.map_load_time, grid.stamp_ns)
+    message.info.height, message.info.width = grid.cells.shape
+    message.info.resolution = grid.cell_m
+    set_pose(message.info.origin, *grid.origin)
+    message.data = array("b", grid.cells.tobytes())
+    return message
 
 
 def twist_msg(decision: Decision, base: Base = OMNIDIRECTIONAL, tick_ns: int = 0) -> Twist:

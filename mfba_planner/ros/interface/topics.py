@@ -8,7 +8,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray, PoseStamped, PoseWithCovarianceStamped, Twist
-from nav_msgs.msg import Odometry, Path
+from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
@@ -43,7 +43,8 @@ SENSOR_QOS = QoSProfile(
 class Topic:
     """A topic of the graph; those with every_tick carry one message per tick.
 
-    least_qos is what foreign writers may offer, where that is less than qos.
+    With some_ticks the stamp is that of a tick, but not every tick has a message. least_qos is
+    what foreign writers may offer, where that is less than qos.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Topic:
     qos: QoSProfile
     least_qos: QoSProfile | None = None
     every_tick: bool = False
+    some_ticks: bool = False
 
 
 CLOCK = Topic(
@@ -138,6 +140,14 @@ DECISION = Topic(
     qos=TICK_QOS,
     every_tick=True,
 )
+LOCAL_MAP = Topic(
+    # what stands, where the planner keeps a map; latched, as Nav2's map and costmaps
+    name="local_map",
+    type=OccupancyGrid,
+    writers=(PLANNER,),
+    qos=LATCHED_QOS,
+    some_ticks=True,
+)
 OUTCOME = Topic(
     # "running", then how it ended (simulation.episode.Outcome) and after how many ticks
     name="outcome",
@@ -172,6 +182,7 @@ GRAPH: tuple[Topic, ...] = (
     TRAIL,
     CMD_VEL,
     DECISION,
+    LOCAL_MAP,
     OUTCOME,
     INITIALPOSE,
     MARKERS,

@@ -51,7 +51,7 @@ class PlannerNode(ManagedNode):
     def configure(self) -> None:
         """Advertise and subscribe."""
         s = self.settings
-        self._outputs = PlannerPublishers(self, s, lambda: self.path_planner.params)
+        self._outputs = PlannerPublishers(self, s, lambda: self.path_planner)
         self._inputs.subscribe()
         self.goals.subscribe()
 

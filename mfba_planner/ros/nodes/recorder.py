@@ -64,7 +64,7 @@ class Recorder(GraphNode):
         name = self.resolve_topic_name(relative_name)
         self._types[name] = (type_name(message_type), offered(topic.qos))
         definition_of(type_name(message_type))  # loaded now, so that no first message waits for it
-        is_of_tick = topic.every_tick and has_header(message_type)
+        is_of_tick = (topic.every_tick or topic.some_ticks) and has_header(message_type)
         deliver: Deliver = partial(self._on_message, name, is_of_tick)
         if topic is topics.CLOCK and self.settings.sim_time:
             deliver = self._on_clock
