@@ -228,7 +228,8 @@ def _allowed(entry: dict[str, Any]) -> str:
         return next(_allowed(kind) for kind in entry["anyOf"] if kind.get("type") != "null")
     if entry["type"] == "array":
         if "prefixItems" in entry:
-            return "[x, y]" if len(entry["prefixItems"]) == 2 else "[t, x, y]"
+            shapes = {2: "[x, y]", 3: "[t, x, y]", 4: "[x0, y0, x1, y1]"}
+            return shapes[len(entry["prefixItems"])]
         return f"list of {_allowed(entry['items'])}"
     if entry["type"] == "number":
         low = f"> {entry['exclusiveMinimum']:g}" if "exclusiveMinimum" in entry else ""

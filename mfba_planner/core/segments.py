@@ -67,7 +67,7 @@ class Segments(NamedTuple):
 def _from_nearest(px: Array, py: Array, dx: Array, dy: Array) -> tuple[Array, Array]:
     """From the nearest point of the segment 0 to (dx, dy), to (px, py); a point if it is short."""
     square = dx * dx + dy * dy
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         s = (px * dx + py * dy) / square
     s = np.minimum(1.0, np.where(s > 0.0, s, 0.0))  # 0/0 of a path at rest: 0
     return px - s * dx, py - s * dy

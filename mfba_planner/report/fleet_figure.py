@@ -14,7 +14,7 @@ from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.scenario import Scenario
 
 from . import format_values, legend, style
-from .draw_scene import draw_ends, draw_path
+from .draw_scene import draw_ends, draw_path, draw_walls
 from .figure_sheet import to_bytes
 from .run_events import is_finite
 from .scene_layout import SceneLayout
@@ -43,6 +43,7 @@ def _fleet_figure(scenario: Scenario, seed: int, runs: Mapping[str, Episode]) ->
             if is_finite(tick.pose.position):
                 view = view.around(tick.pose.position, first.robot_radius_m)
     layout = SceneLayout(*fitted(view.grown(first.robot_radius_m, first.robot_radius_m)))
+    draw_walls(layout.ax, episodes[0])
     for name, episode in zip(names, episodes):
         draw_path(layout.ax, episode)
         draw_ends(layout.ax, episode, style.SMALL_START)

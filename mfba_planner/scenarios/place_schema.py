@@ -99,7 +99,7 @@ MEANINGS = {
     "segments_m": "wall segments, [x0, y0, x1, y1] each, m; the robot touches them",
     "polygons_m": "solid polygons, a list of corners [x, y] each, m; their outlines are walls",
     "boxes": "solid rectangles; their outlines are walls",
-    "map": "a Nav2 map's .yaml file, relative to this one; outlines of occupied cells are walls",
+    "map": "the .yaml of a Nav2 map, relative to this file; outlines of occupied cells are walls",
     "size_m": "length and width, m",
     "yaw_deg": "direction of its length, degrees from +x, counter-clockwise",
 }

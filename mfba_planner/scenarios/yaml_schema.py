@@ -158,7 +158,7 @@ _MEANINGS = {
     "obstacles": "circles at rest or moving",
     "walls": "a rectangle that reflects obstacles; the robot may cross it",
     "time_limit_s": "simulated time after which the run fails, s",
-    "center_m": "centre at t = 0, m; left out with a trajectory",
+    "center_m": "centre, of an obstacle at t = 0, m; left out with a trajectory",
     "radius_m": "radius, m",
     "speed_mps": "speed, m/s",
     "heading_deg": "heading, degrees from +x, counter-clockwise",

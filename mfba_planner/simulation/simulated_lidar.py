@@ -16,7 +16,6 @@ from .robot_model import Lidar
 
 _FULL_CIRCLE_RAD = 2.0 * math.pi
 _END_SLACK = 1e-9  # of a segment's length
-_END_SLACK = 1e-9  # of a segment's length
 _RAYS: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = {}
 
 
@@ -79,7 +78,7 @@ def cast_walls(
     for origin, low, high, slope in zip(
         position, walls.lower_m, walls.upper_m, rays(beams, turned_rad, fov_rad)
     ):
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             a, b = (low - origin) / slope, (high - origin) / slope
         enter = np.fmax(enter, np.fmin(a, b))  # fmin ignores 0/0: a ray along the wall
         leave = np.fmin(leave, np.fmax(a, b))
@@ -103,7 +102,7 @@ def cast_segments(
     x, y = segments.x[:, None] - position[0], segments.y[:, None] - position[1]
     dx, dy = segments.dx[:, None], segments.dy[:, None]
     across = c * dy - s * dx  # 0 along the segment
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         ranges = (x * dy - y * dx) / across
         share = (x * s - y * c) / across
     hit = (ranges >= 0.0) & (share >= -_END_SLACK) & (share <= 1.0 + _END_SLACK)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.segments import Array, Segments
 
+_FEW = 200  # segments: up to so many are faster without a selection for each step
 _STEPS = 16  # taken together: near each other, so that most segments are far from all of them
 
 
@@ -44,8 +45,7 @@ def wall_clearances(
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             ux, uy = np.diff(x), np.diff(y)
             gap_m[steps] = _nearest(segments, x, y, ux, uy) - radius_m
-            arguments = (x[:-1, None], y[:-1, None], ux[:, None], uy[:, None])
-            shares = _until_contact(segments, radius_m, *arguments)
+            shares = _first_contacts(segments, radius_m, x[:-1], y[:-1], ux, uy)
             contact_s[steps] = np.where(np.isnan(ux + uy), np.inf, shares * durations_s[steps])
     return WallClearances(gap_m, contact_s)
 
@@ -63,6 +63,28 @@ def _nearest(segments: Segments, x: Array, y: Array, ux: Array, uy: Array) -> Ar
     near = segments.select(from_mean <= from_mean.min() + 2.0 * roam + 1e-6)
     found: Array = near.swept_distances(x[:-1, None], y[:-1, None], ux[:, None], uy[:, None])
     return found.min(axis=1)
+
+
+def _first_contacts(
+    segments: Segments, radius_m: float, x: Array, y: Array, ux: Array, uy: Array
+) -> Array:
+    """_until_contact() of steps (k,); of many segments, only those in the path of each."""
+    if segments.x.size <= _FEW:
+        return _until_contact(segments, radius_m, x[:, None], y[:, None], ux[:, None], uy[:, None])
+    middle_x, middle_y = segments.x + 0.5 * segments.dx, segments.y + 0.5 * segments.dy
+    half = 0.5 * np.sqrt(segments.dx * segments.dx + segments.dy * segments.dy)
+    wide = (half + (radius_m + 1e-6)) ** 2
+    shares = np.full(len(x), np.inf)
+    for k in range(len(x)):
+        # A circle round each enlarged segment: does the ray meet it, or start in it?
+        px, py = middle_x - x[k], middle_y - y[k]
+        along, aside = px * ux[k] + py * uy[k], px * uy[k] - py * ux[k]
+        ahead = (along > 0.0) & (aside * aside <= wide * (ux[k] * ux[k] + uy[k] * uy[k]))
+        near = segments.select(ahead | (px * px + py * py <= wide))
+        if near.x.size:
+            step = (column[k : k + 1, None] for column in (x, y, ux, uy))
+            shares[k] = _until_contact(near, radius_m, *step)[0]
+    return shares
 
 
 def _until_contact(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from report_readers import rows_of
+from walled_place import PLACE
 
 from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, MfbaError, OutputError
@@ -25,9 +26,10 @@ def episode() -> Episode:
 
 def test_every_tick_of_every_run_is_saved(episode: Episode, tmp_path: Path) -> None:
     other = run(load_scenario("empty"))
-    save([("a", episode), ("b", other)], tmp_path / "two.rrd")
-    rows = rows_of(tmp_path / "two.rrd")
-    for name, made in (("a", episode), ("b", other)):
+    place = run(PLACE)
+    save([("a", episode), ("b", other), ("c", place)], tmp_path / "three.rrd")
+    rows = rows_of(tmp_path / "three.rrd")
+    for name, made in (("a", episode), ("b", other), ("c", place)):
         ticks = len(made.ticks)
         every_tick = ("decision", "curves/speed", "world/robot", "world/trail", "world/bats")
         assert {rows[f"/{name}/{path}"] for path in every_tick} == {ticks}
@@ -36,6 +38,7 @@ def test_every_tick_of_every_run_is_saved(episode: Episode, tmp_path: Path) -> N
         assert rows[f"/{name}/curves/clearance"] == gaps
         assert rows[f"/{name}/world/obstacles"] == (ticks if made.scenario.obstacles else 0)
         assert rows[f"/{name}/world/walls"] == bool(made.scenario.walls)
+        assert rows[f"/{name}/world/segments"] == bool(made.scenario.segments_m)
 
 
 def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

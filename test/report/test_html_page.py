@@ -16,6 +16,7 @@ from launched_programs import complete
 from project import ROOT
 from selenium.webdriver.common.keys import Keys
 from waiting import wait_until
+from walled_place import PLACE
 
 from mfba_planner.core.errors import InputError, OutputError
 from mfba_planner.core.planner_types import Mode
@@ -618,6 +619,17 @@ def test_a_run_of_one_tick_without_obstacles_has_a_page(browser: Browser, tmp_pa
     assert browser.console_messages() == []
     assert field(browser, "tick") == "0 of 0"
     assert field(browser, "clearance") == "–"
+
+
+def test_walls_are_drawn_and_count_as_clearance(browser: Browser, tmp_path: Path) -> None:
+    episode = run(PLACE)
+    write_page([("place", episode)], tmp_path / "page.html")
+    browser.open(tmp_path / "page.html")
+    assert browser.console_messages() == []
+    path = browser.run("return document.querySelector('.scene .segments').getAttribute('d')")
+    assert path == "M2 0.9L2 -0.1M4 -0.1L5 -1.1"
+    assert field(browser, "clearance") == f"{clearances(episode)[0]:.3f} m"
+    assert clearances(episode)[0] < 1.71, "that of the wall, not of the obstacle"
 
 
 def test_too_many_runs_or_ticks_are_refused(episode: Episode, tmp_path: Path) -> None:

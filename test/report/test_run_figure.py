@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from walled_place import PLACE
 
 from mfba_planner.core.errors import OutputError
 from mfba_planner.core.geometry import Point, Pose2D
@@ -128,6 +129,7 @@ SAMPLES: dict[str, Callable[[], Episode]] = {
     "corridor": _corridor,
     "tower": _tower,
     "small": _small,
+    "place": lambda: run(PLACE),
 }
 
 
@@ -355,6 +357,22 @@ def test_the_legend_lists_what_is_drawn_and_nothing_else() -> None:
     blocked = legend_labels(figure_of("blocked"))
     assert {"end of the run", "blocked (every gap closed)"} <= set(blocked)
     assert not {"wall for obstacles only", "wall", "obstacle's track"} & set(blocked)
+    place = legend_labels(figure_of("place"))
+    assert "wall" in place
+    assert "wall for obstacles only" not in place
+
+
+def test_wall_segments_are_drawn_where_they_are_and_in_view() -> None:
+    (walls,) = artists(figure_of("place"), "wall")
+    drawn = tuple(tuple(line.ravel().tolist()) for line in walls.get_segments())
+    assert drawn == PLACE.segments_m
+    (left, right), (bottom, top) = (
+        figure_of("place").axes[0].get_xlim(),
+        figure_of("place").axes[0].get_ylim(),
+    )
+    for x0, y0, x1, y1 in PLACE.segments_m:
+        assert left < min(x0, x1) <= max(x0, x1) < right
+        assert bottom < min(y0, y1) <= max(y0, y1) < top
 
 
 def texts(figure: Figure) -> list[Text]:

@@ -5,36 +5,31 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from visualization_msgs.msg import Marker
+from walled_place import PLACE
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.ros.interface.markers import world_markers
 from mfba_planner.scenarios.run_config import Driver, RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_json import parse_segments, segments_text
 from mfba_planner.simulation.episode import Outcome
-from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.run_episode import simulate
-from mfba_planner.simulation.scenario import Scenario
+from mfba_planner.simulation.world import World
 from mfba_planner.verification.verify_bag import verify
 
 PAPER = PlannerParams(goal_tolerance_m=0.05)
-HALL = Scenario(
-    name="hall",
-    start_m=(0.0, 0.0),
-    goal_m=(6.0, 0.3),
-    segments_m=((2.0, -0.9, 2.0, 0.1), (4.0, 0.1, 5.0, 1.1)),
-    obstacles=(Obstacle(center_m=(3.0, -1.5), radius_m=0.3, speed_mps=0.1, heading_rad=1.5),),
-)
 
 
 @pytest.mark.parametrize("robot", [Robot(), Robot(lidar=Lidar(beams=360))], ids=["ring", "lidar"])
 def test_the_graph_decides_as_the_core_and_verify_agrees(
     robot: Robot, tmp_path: Path, domain_id: int
 ) -> None:
-    scenario = replace(HALL, robot=robot)
+    scenario = replace(PLACE, robot=robot)
     config = RunConfig(scenario=scenario, planner=PAPER, seed=3, driver=Driver.IN_PROCESS)
     run_in_process(config, tmp_path / "bag", domain_id=domain_id)
     recorded = read_episode(tmp_path / "bag")
@@ -51,12 +46,23 @@ def test_the_graph_decides_as_the_core_and_verify_agrees(
 
 
 def test_the_sensor_gets_the_walls_only_where_it_has_no_scan() -> None:
-    with_ring = node_parameters(RunConfig(scenario=HALL), ())["virtual_sensor"]
-    assert parse_segments(with_ring["segments_m"]) == HALL.segments_m
-    scanning = replace(HALL, robot=Robot(lidar=Lidar(beams=360)))
+    with_ring = node_parameters(RunConfig(scenario=PLACE), ())["virtual_sensor"]
+    assert parse_segments(with_ring["segments_m"]) == PLACE.segments_m
+    scanning = replace(PLACE, robot=Robot(lidar=Lidar(beams=360)))
     assert "segments_m" not in node_parameters(RunConfig(scenario=scanning), ())["virtual_sensor"]
-    empty = replace(HALL, segments_m=())
+    empty = replace(PLACE, segments_m=())
     assert "segments_m" not in node_parameters(RunConfig(scenario=empty), ())["virtual_sensor"]
+
+
+def test_viewers_get_the_walls_as_lines() -> None:
+    marks = world_markers(World(PLACE, 100_000_000, 0.1), 1, "odom").markers
+    (walls,) = [mark for mark in marks if mark.ns == "walls"]
+    ends = [(point.x, point.y) for point in walls.points]
+    assert ends == [(2.0, -0.9), (2.0, 0.1), (4.0, 0.1), (5.0, 1.1)]
+    assert (walls.type, walls.action) == (Marker.LINE_LIST, Marker.ADD)
+    open_place = World(replace(PLACE, segments_m=()), 100_000_000, 0.1)
+    (none,) = [m for m in world_markers(open_place, 1, "odom").markers if m.ns == "walls"]
+    assert none.action == Marker.DELETE, "viewers report a line without points as an error"
 
 
 def test_segments_as_a_parameter() -> None:

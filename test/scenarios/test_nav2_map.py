@@ -205,6 +205,11 @@ def test_refused_maps(change: str, message: str, tmp_path: Path) -> None:
     assert refusal(tmp_path) == message
 
 
+def test_a_yaw_that_is_rounding_is_none(tmp_path: Path) -> None:
+    write_map(tmp_path, text="resolution: 1.0\norigin: [1, 2, -1.2e-17]\n")
+    assert len(load(tmp_path).segments_m) == 4
+
+
 def test_missing_and_unreadable(tmp_path: Path) -> None:
     assert refusal(tmp_path) == f"map /m.yaml: No such file or directory; {REMEDY}"
     (tmp_path / "m.yaml").write_bytes(b"\xff\xfe\x00")

@@ -78,6 +78,14 @@ def test_every_shipped_scenario_has_its_name_and_can_be_solved(name: str) -> Non
     assert evaluate(run(scenario)).success
 
 
+def test_the_shipped_place_is_made_of_segments_boxes_and_a_polygon() -> None:
+    """The paper's planner does not pass its door, so it is not among those above."""
+    scenario = load_scenario("rooms")
+    assert scenario.name == "rooms"
+    assert len(scenario.segments_m) == 6 + 2 * 4 + 3
+    assert load_scenario(scenario_to_json(scenario)) == scenario
+
+
 def test_whole_numbers_are_numbers() -> None:
     scenario = parse_scenario(with_obstacle("center_m: [1, 4], radius_m: 1, speed_mps: 2"), "x")
     assert scenario.start_m == (0.0, 0.0)
@@ -166,12 +174,12 @@ def test_shipped_names_win_over_files_of_the_same_name(
         ("cas1", "'cas1': no such scenario; did you mean 'case1'? (or give a .yaml file)"),
         (
             "",
-            "'': no such scenario; known: case1, case2, empty, kidnapped, swap, walled "
+            "'': no such scenario; known: case1, case2, empty, kidnapped, rooms, swap, walled "
             "(or give a .yaml file)",
         ),
         (
             ".",
-            "'.': no such scenario; known: case1, case2, empty, kidnapped, swap, walled "
+            "'.': no such scenario; known: case1, case2, empty, kidnapped, rooms, swap, walled "
             "(or give a .yaml file)",
         ),
         ("nope.yaml", "nope.yaml: No such file or directory; give a readable scenario .yaml"),

@@ -161,6 +161,19 @@ def test_other_robots_are_obstacles_along_their_paths() -> None:
         assert result.min_clearance_m == pytest.approx(min(map(min, gaps)), abs=1e-12)
 
 
+def test_every_robot_of_a_fleet_senses_and_touches_the_walls() -> None:
+    """Two robots side by side, a wall before one of them, as in its own world."""
+    ends = (((0.0, 0.0), (6.0, 0.0)), ((0.0, 4.0), (6.0, 4.0)))
+    walls = ((3.0, 3.5, 3.0, 4.2),)
+    free, walled = run_fleet(fleet_of(*ends, segments_m=walls), seed=1)
+    assert free.scenario.segments_m == walled.scenario.segments_m == walls
+    assert not any(any(tick.vs) for tick in free.ticks)
+    assert any(any(tick.vs) for tick in walled.ticks)
+    assert evaluate(walled).min_clearance_m < 1.0 < evaluate(free).min_clearance_m
+    through = run_fleet(fleet_of(*ends, segments_m=walls), path_planner=Blind)
+    assert [evaluate(episode).collisions for episode in through] == [0, 1]
+
+
 def test_an_episode_of_a_fleet_can_be_run_again() -> None:
     """Run again as a single robot among obstacles, it decides the same."""
     for episode in run_fleet(head_on(), seed=3):

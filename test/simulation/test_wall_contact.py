@@ -46,6 +46,19 @@ def test_many_steps_among_many_walls_are_each_step_with_each_wall(
     assert found.contact_s.tolist() == contacts_s
 
 
+@given(segments=SEGMENTS, points=PATHS)
+def test_a_selection_for_each_step_changes_nothing(
+    segments: list[Segment], points: list[Point]
+) -> None:
+    """Of many segments only those in the path of a step are looked at."""
+    far = [(50.0 + k, 50.0, 50.0 + k, 51.0) for k in range(300)]
+    expected, found = clearances(segments, points), clearances([*segments, *far], points)
+    assert found.gap_m.tolist() == expected.gap_m.tolist()
+    reached = expected.contact_s <= 5.0  # before the far ones
+    assert found.contact_s[reached].tolist() == expected.contact_s[reached].tolist()
+    assert (found.contact_s <= expected.contact_s).all()
+
+
 @given(segment=st.tuples(NUMBERS, NUMBERS, NUMBERS, NUMBERS), a=PATHS)
 def test_time_to_contact_is_when_the_distance_first_is_the_radius(
     segment: Segment, a: list[Point]
@@ -121,7 +134,7 @@ def test_a_single_tick_is_a_robot_at_rest() -> None:
     assert (result.collisions, motion.first_contact_with) == (1, WALL)
 
 
-def test_the_lidar_detects_segments_without_being_told_to() -> None:
+def test_the_lidar_detects_segments_without_an_option() -> None:
     lidar = Lidar(beams=360, range_min_m=0.0)
     wall = Segments.of([(2.0, -9.0, 2.0, 9.0)])
     found = scan_at(Pose2D(0.0, 0.0), lidar, [], None, wall).ranges_m

@@ -4,7 +4,8 @@
 Every approximation favours the robot: a cell is free unless it lies wholly inside a circle,
 circles are tested only at the ticks of the time grid, every step is rounded up to whole cells,
 speeds from 0 to the robot's own are allowed, and a robot that leaves the area may return anywhere
-at any later time. So a goal that is not reached here cannot be reached at all.
+at any later time. So a goal that is not reached here cannot be reached at all. Cells that walls
+separate from the start are not reached at any time.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.segments import Segments
 from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.scenario import Scenario
 
@@ -45,6 +47,7 @@ def unreachable(
     p = params or ReachParams()
     xs, ys = _axes(scenario, p)
     half = p.cell_m / math.sqrt(2.0)
+    open_cells = _open_cells(scenario, xs, ys, half)
     gx, gy = scenario.goal_m
     goal = np.hypot(xs[:, None] - gx, ys[None, :] - gy) <= half + GOAL_TOLERANCE_M
     sx, sy = scenario.start_m
@@ -54,12 +57,15 @@ def unreachable(
     # any point of one cell to any point of another: distance of centres plus a diagonal
     stride = (speed_mps * p.step_s + 2.0 * half) / p.cell_m + 1e-9
     outside = False
+    if not (goal & open_cells).any():
+        return "walls enclose the start or goal_m"
     for tick in range(1, math.ceil(scenario.time_limit_s / p.step_s) + 1):
         before_s, now_s = (tick - 1) * p.step_s, tick * p.step_s
         outside = outside or bool((reached & edge).any())
         reached = distance_transform_edt(~reached) <= stride
         if outside:
             reached |= edge
+        reached &= open_cells
         if (reached & goal).any() and not _goal_covered(scenario, segments, before_s, now_s):
             return ""
         reached &= ~_covered(xs, ys, segments, now_s, half)
@@ -102,6 +108,32 @@ def _axes(scenario: Scenario, p: ReachParams) -> tuple[np.ndarray, np.ndarray]:
     low = np.min(corners, axis=0) - p.border_m
     high = np.max(corners, axis=0) + p.border_m
     return tuple(np.arange(a, b, p.cell_m) for a, b in zip(low, high))  # type: ignore[return-value]
+
+
+def _open_cells(scenario: Scenario, xs: np.ndarray, ys: np.ndarray, half: float) -> np.ndarray:
+    """Cells that walls do not separate from the start, at any speed.
+
+    A cell is closed if it lies wholly within the robot's radius of a wall; cells are connected by
+    sides and corners, and round the outside of the grid.
+    """
+    from scipy.ndimage import label
+
+    shape = (len(xs), len(ys))
+    if not scenario.segments_m:
+        return np.ones(shape, dtype=bool)
+    closed = np.zeros(shape, dtype=bool)
+    r = scenario.robot_radius_m - half - 1e-9
+    for x0, y0, x1, y1 in scenario.segments_m:
+        i = slice(*np.searchsorted(xs, (min(x0, x1) - r, max(x0, x1) + r)))
+        j = slice(*np.searchsorted(ys, (min(y0, y1) - r, max(y0, y1) + r)))
+        near = Segments.of([(x0, y0, x1, y1)]).distances(xs[i, None, None], ys[None, j, None])
+        closed[i, j] |= near[:, :, 0] < r
+    parts, _ = label(np.pad(~closed, 1, constant_values=True), np.ones((3, 3)))
+    parts = parts[1:-1, 1:-1]
+    sx, sy = scenario.start_m
+    at_start = np.hypot(xs[:, None] - sx, ys[None, :] - sy) <= half + 1e-9
+    found: np.ndarray = np.isin(parts, parts[at_start & ~closed]) & ~closed
+    return found
 
 
 def _covered(

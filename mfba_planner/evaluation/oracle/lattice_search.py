@@ -7,7 +7,7 @@ Used where the tangent search finds nothing, and to check its longer paths.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from ...core.geometry import Point
 from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.obstacle_motion import Walls
 from .polyline import edge_gaps, within
+from .static_walls import NO_WALLS, StaticWalls
 from .tangent_search import CLEAR_M
 
 _CHUNK = 20_000  # (edge, segment) pairs evaluated at once: what a cache holds
@@ -42,8 +43,13 @@ def lattice_paths(
     limit_s: float,
     params: LatticeParams,
     inside: Walls | None = None,
+    walls: StaticWalls = NO_WALLS,
+    to_go: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> list[np.ndarray]:
-    """Free paths (p, 2) from start to goal within limit_s, shortest first."""
+    """Free paths (p, 2) from start to goal within limit_s, shortest first.
+
+    to_go is a lower bound of the distance to the goal, the straight line by default.
+    """
     angles = np.arange(params.headings) * (2.0 * math.pi / params.headings)
     angles += math.atan2(goal[1] - start[1], goal[0] - start[0])
     u = speed_mps * np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -57,12 +63,15 @@ def lattice_paths(
         rest_s = np.hypot(left[:, 0], left[:, 1]) / speed_mps
         to_goal = left / np.maximum(rest_s, 1e-9)[:, None]
         inner = _during(inner, t, math.inf)
-        for n in np.flatnonzero(_free(points, to_goal, t, t + rest_s, inner)).tolist():
+        direct = _free(points, to_goal, t, t + rest_s, inner)
+        direct &= walls.clear(points, left, CLEAR_M)
+        for n in np.flatnonzero(direct).tolist():
             arrivals.append((t + float(rest_s[n]), layer, n))
             limit_s = min(limit_s, t + float(rest_s[n]) + params.slack_s)
         successors = (points[:, None] + u * params.step_s).reshape(-1, 2)
         left = np.array(goal) - successors
-        f = t + params.step_s + np.hypot(left[:, 0], left[:, 1]) / speed_mps
+        rest_m = to_go(*successors.T) if to_go else np.hypot(left[:, 0], left[:, 1])
+        f = t + params.step_s + rest_m / speed_mps
         kept = np.flatnonzero((f <= limit_s) & within(inside, *successors.T))
         kept = kept[np.argsort(f[kept], kind="stable")]
         column, row = np.floor(successors[kept] / params.cell_m).astype(np.int64).T
@@ -70,6 +79,7 @@ def lattice_paths(
         # edges first: the best point of a cell may be unreachable
         now = _during(inner, t, t + params.step_s)
         free = _free_steps(points, u, t, t + params.step_s, kept, now)
+        free &= walls.clear_steps(points, u * params.step_s, kept, CLEAR_M)
         kept, cells = kept[free], cells[free]
         _, first = np.unique(cells, return_index=True)
         kept = kept[np.sort(first)]

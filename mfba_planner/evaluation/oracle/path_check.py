@@ -3,7 +3,8 @@
 
 Obstacles are followed from event to event (a wall reverses a velocity, a turn or knot replaces
 it); simulation folds coordinates and times. The distance is the minimum of a quadratic;
-simulation projects onto a segment.
+simulation projects onto a segment. The distance to a wall is that of its own frame, cut into
+quadratics; simulation takes the least of four distances of ends.
 """
 
 from __future__ import annotations
@@ -99,8 +100,8 @@ def _until_wall(value: float, speed: float, low: float, high: float) -> float:
 
 
 def clearance(scenario: Scenario, waypoints: Sequence[Waypoint]) -> float:
-    """Smallest gap (m) to any enlarged circle along straight segments; negative in contact."""
-    smallest = math.inf
+    """Smallest gap (m) to any enlarged circle or wall along straight segments; < 0: contact."""
+    smallest = wall_clearance(scenario, waypoints)
     for obstacle in scenario.obstacles:
         radius = obstacle.radius_m + scenario.robot_radius_m
         for piece in pieces(obstacle, scenario.walls, waypoints[-1].t_s):
@@ -127,6 +128,44 @@ def _smallest_distance(a: Waypoint, b: Waypoint, piece: Piece, start: float, end
     return math.sqrt(max(0.0, least))
 
 
+def wall_clearance(scenario: Scenario, waypoints: Sequence[Waypoint]) -> float:
+    """Smallest gap (m) to any wall along straight segments; inf without walls."""
+    smallest = math.inf
+    for x0, y0, x1, y1 in scenario.segments_m:
+        length = math.hypot(x1 - x0, y1 - y0)
+        c, s = (x1 - x0) / length, (y1 - y0) / length
+        # In the wall's own frame: it lies on the first axis from 0 to length.
+        ends = [
+            (c * (w.x - x0) + s * (w.y - y0), c * (w.y - y0) - s * (w.x - x0)) for w in waypoints
+        ]
+        for a, b in pairwise(ends):
+            smallest = min(smallest, _distance_to_wall(a, b, length))
+    return smallest - scenario.robot_radius_m
+
+
+def _distance_to_wall(a: tuple[float, float], b: tuple[float, float], length: float) -> float:
+    """Smallest distance of the way from a to b, in the wall's frame.
+
+    Cut where it passes the ends of the wall: before the first, beside the wall and behind the
+    last the square of the distance is a polynomial of degree two each.
+    """
+    (along, across), (ahead, aside) = a, (b[0] - a[0], b[1] - a[1])
+    cuts = {0.0, 1.0}
+    if ahead != 0.0:
+        cuts |= {share for end in (0.0, length) if 0.0 < (share := (end - along) / ahead) < 1.0}
+    least = math.inf
+    for first, last in pairwise(sorted(cuts)):
+        middle = along + 0.5 * (first + last) * ahead
+        beyond = min(max(middle, 0.0), length)  # of the wall, the end that counts here
+        is_beside = 0.0 < middle < length
+        p, q = (0.0, 0.0) if is_beside else (along - beyond, ahead)
+        A, B, C = q * q + aside * aside, 2.0 * (p * q + across * aside), p * p + across * across
+        vertex = -B / (2.0 * A) if A > 0.0 else first
+        for share in (first, last, min(max(vertex, first), last)):
+            least = min(least, (A * share + B) * share + C)
+    return math.sqrt(max(0.0, least))
+
+
 def inspect(
     scenario: Scenario, waypoints: Sequence[Waypoint], speed_mps: float
 ) -> tuple[float, Fault]:
@@ -146,6 +185,8 @@ def inspect(
         if time_s < 0.0 or abs(length_m - speed_mps * time_s) > 1e-6 * speed_mps * time_s + SLACK:
             return -math.inf, f"moves {length_m:.9g} m in {time_s:.9g} s at t = {a.t_s:.9g} s"
     smallest = clearance(scenario, waypoints)
+    if smallest < 0.0 and wall_clearance(scenario, waypoints) == smallest:
+        return smallest, f"touches a wall ({-smallest:.3g} m inside)"
     if smallest < 0.0:
         return smallest, f"touches an enlarged circle ({-smallest:.3g} m inside)"
     return smallest, ""

@@ -10,6 +10,7 @@ import numpy as np
 from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.obstacle_motion import Walls
 from .polyline import gaps, lengths, pair_gaps, path_gaps, within
+from .static_walls import NO_WALLS, StaticWalls
 from .tangent_search import CLEAR_M
 
 _NEAR_M = 1.5  # obstacle segments further away are checked only in the end
@@ -20,35 +21,49 @@ _MAX_POINTS = 40  # SLSQP's time grows with their cube; a path that has to wait 
 
 
 def refine(
-    path: np.ndarray, speed_mps: float, segments: UniformSegments, inside: Walls | None = None
+    path: np.ndarray,
+    speed_mps: float,
+    segments: UniformSegments,
+    inside: Walls | None = None,
+    walls: StaticWalls = NO_WALLS,
 ) -> np.ndarray | None:
-    """The shortest free polyline (p, 2) found near a path; None when the path is not free."""
-    if not _free(path, speed_mps, segments):
+    """The shortest free polyline (p, 2) found near a path; None when the path is not free.
+
+    The circles round the ends of walls, which are among the segments, hold it off the walls; the
+    walls themselves are tested afterwards.
+    """
+    if not _free(path, speed_mps, segments, walls):
         return None
-    best = _shortcut(path, speed_mps, segments)
+    best = _shortcut(path, speed_mps, segments, walls)
     for split in (False, True):
         trial = _bend_finer(best) if split else best
         if trial is None:
             break
-        tight = _tighten(trial, speed_mps, segments, inside)
+        tight = _tighten(trial, speed_mps, segments, inside, walls)
         if tight is None:
             continue
-        tight = _shortcut(tight, speed_mps, segments)
+        tight = _shortcut(tight, speed_mps, segments, walls)
         if lengths(tight[None])[0] < lengths(best[None])[0]:
             best = tight
     return best
 
 
-def _free(points: np.ndarray, speed_mps: float, segments: UniformSegments) -> bool:
-    return bool(gaps(points[None], speed_mps, segments).min(initial=math.inf) >= 0.0)
+def _free(
+    points: np.ndarray, speed_mps: float, segments: UniformSegments, walls: StaticWalls
+) -> bool:
+    free = gaps(points[None], speed_mps, segments).min(initial=math.inf) >= 0.0
+    return bool(free and walls.clear_path(points))
 
 
-def _shortcut(points: np.ndarray, speed_mps: float, segments: UniformSegments) -> np.ndarray:
+def _shortcut(
+    points: np.ndarray, speed_mps: float, segments: UniformSegments, walls: StaticWalls
+) -> np.ndarray:
     """Remove via points, the one that saves most first, while the path stays free."""
     while len(points) > 2:
         k = np.arange(1, len(points) - 1)
         trials = np.stack([np.delete(points, i, axis=0) for i in k])
-        free = gaps(trials, speed_mps, segments).min(axis=(1, 2)) >= 0.0
+        free = gaps(trials, speed_mps, segments).min(axis=(1, 2), initial=math.inf) >= 0.0
+        free &= walls.clear(points[:-2], points[2:] - points[:-2], 0.0)  # past each via point
         if not free.any():
             return points
         new = np.where(free, lengths(trials), math.inf)
@@ -77,7 +92,11 @@ def _bend_finer(points: np.ndarray) -> np.ndarray | None:
 
 
 def _tighten(
-    points: np.ndarray, speed_mps: float, segments: UniformSegments, inside: Walls | None
+    points: np.ndarray,
+    speed_mps: float,
+    segments: UniformSegments,
+    inside: Walls | None,
+    walls: StaticWalls,
 ) -> np.ndarray | None:
     """Minimise the length over the via points (SLSQP); None when the result is not free."""
     if not 2 < len(points) <= _MAX_POINTS:
@@ -91,7 +110,7 @@ def _tighten(
         gap = gaps(found[None], speed_mps, local)[0]
         if (
             gap.min(initial=math.inf) >= 0.0
-            and _free(found, speed_mps, segments)
+            and _free(found, speed_mps, segments, walls)
             and within(inside, *found.T).all()
         ):
             return found

@@ -3,7 +3,8 @@
 
 A shortest trajectory at constant speed consists of straight edges that graze moving circles and
 of arcs along their edges. Nodes are points on a circle's edge (widened so that chords between
-neighbouring nodes stay outside). Edges are headings that graze a circle, chords along a circle,
+neighbouring nodes stay outside). The ends of walls are circles at rest, and no edge may touch a
+wall. Edges are headings that graze a circle, chords along a circle,
 the two headings to its edge at the time it bounces or turns, and the straight line to the goal.
 """
 
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +21,7 @@ from ...core.geometry import Point
 from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.obstacle_motion import Walls
 from .polyline import edge_gaps, within
+from .static_walls import NO_WALLS, StaticWalls
 
 CLEAR_M = 1e-5  # clearance to every circle, so that rounding makes no contact
 
@@ -77,13 +80,19 @@ class Search:
         params: SearchParams,
         inside: Walls | None = None,
         until_s: float | None = None,
+        walls: StaticWalls = NO_WALLS,
+        to_go: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+        bound_s: float = math.inf,
     ) -> None:
         """Prepare; speed in m/s; all paths stay within the rectangle inside, if given.
 
         until_s is until when the segments tell the whole motion; None: until the last one ends.
+        The ends of the walls have to be among the segments. to_go is a lower bound of the
+        distance to the goal, the straight line by default; bound_s the duration of a known path.
         """
         self.start, self.goal, self.v, self.segments = start, goal, speed_mps, segments
-        self.params, self.inside = params, inside
+        self.params, self.inside, self.walls, self.bound_s = params, inside, walls, bound_s
+        self.to_go = to_go or self._straight_to_go
         self.inner = segments._replace(radius=segments.radius + CLEAR_M)
         self.edge = (segments.radius + 2.0 * CLEAR_M) / math.cos(params.chord_rad / 2.0)
         self.end_x = segments.x + segments.vx * (segments.t1 - segments.t0)
@@ -98,10 +107,11 @@ class Search:
         """Paths (p, 2) from start to goal, shortest first; empty when none is found."""
         graph = _Graph()
         root = graph.add(*self.start, 0.0, -1, 0, -1)
-        heap = [(math.dist(self.start, self.goal) / self.v, root)]
+        first = float(self.to_go(np.array(self.start[:1]), np.array(self.start[1:]))[0])
+        heap = [(first / self.v, root)]
         best: dict[tuple[int, int, int], float] = {}
         arrivals: list[tuple[float, int]] = []
-        limit = math.inf
+        limit = self.bound_s + self.params.slack_s
         while heap and len(graph.x) < self.params.max_nodes:
             batch: list[int] = []
             while heap and len(batch) < self.params.batch and heap[0][0] <= limit:
@@ -155,7 +165,7 @@ class Search:
         if (segment >= 0).any():
             edges.append(self._along(x, y, t, segment, side))
         origin, ex, ey, et, esegment, eside = (np.concatenate(column) for column in zip(*edges))
-        f = et + np.hypot(ex - self.goal[0], ey - self.goal[1]) / self.v
+        f = et + self.to_go(ex, ey) / self.v
         keep = np.flatnonzero((f <= limit) & (et <= self.horizon) & within(self.inside, ex, ey))
         origin, ex, ey, et, esegment, eside, f = (
             column[keep] for column in (origin, ex, ey, et, esegment, eside, f)
@@ -172,6 +182,9 @@ class Search:
             self.inner,
         )
         free = np.flatnonzero(gap.min(axis=1) >= -1e-9)
+        origins = np.stack([ox, oy], axis=1)[free]
+        steps = np.stack([ex, ey], axis=1)[free] - origins
+        free = free[self.walls.clear(origins, steps, CLEAR_M)]
         parents = [batch[o] for o in origin[free].tolist()]
         return list(
             zip(
@@ -184,6 +197,10 @@ class Search:
                 parents,
             )
         )
+
+    def _straight_to_go(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        distance: np.ndarray = np.hypot(x - self.goal[0], y - self.goal[1])
+        return distance
 
     def _to_goal(self, x: np.ndarray, y: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
         n = len(x)
