@@ -69,11 +69,7 @@ def encounter_ticks(episode: Episode) -> list[Decision]:
 
 
 def closest_passes(episode: Episode) -> list[Pass]:
-<<<<<<< HEAD
     """The closest pass of each obstacle that was ever there, by number; without the walls."""
-=======
-    """The closest pass of each obstacle that was ever there, by its number; without the walls."""
->>>>>>> w1-merge-w2
     columns = zip(*tick_clearances(episode))
     passes = [
         _closest_within(episode, index, min(range(len(gaps)), key=gaps.__getitem__))
