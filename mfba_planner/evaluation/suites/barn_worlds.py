@@ -54,12 +54,13 @@ def barn_scenario(name: str, k: int, rng: np.random.Generator) -> Scenario:
 
 
 def field_cells(filled: float, smoothings: int, rng: np.random.Generator) -> np.ndarray:
-    """Filled cells (30, 30) of the automaton, rows first.
+    """Filled cells (30, 30) of the automaton, rows first; its outer columns stay filled.
 
     In every smoothing a cell with at least FILL_FROM filled neighbours is filled, one with at
-    most CLEAR_TO is cleared, and all others stay; beyond the grid nothing is filled.
+    most CLEAR_TO is cleared, and all others stay.
     """
     cells = rng.random((FIELD_ROWS, COLUMNS)) < filled
+    cells[:, [0, -1]] = True
     for _ in range(smoothings):
         padded = np.pad(cells, 1).astype(np.int8)
         around = sum(
@@ -68,6 +69,7 @@ def field_cells(filled: float, smoothings: int, rng: np.random.Generator) -> np.
             if (i, j) != (0, 0)
         )
         cells = (around >= FILL_FROM) | (cells & (around > CLEAR_TO))
+        cells[:, [0, -1]] = True
     return cells
 
 

@@ -228,7 +228,7 @@ _ALL = (
     ),
     Suite(
         name="barn-like",
-        description="200 to 400 cylinders of 0.075 m by cellular automata; robot of 0.22 m, 1 m/s",
+        description="200 to 500 cylinders of 0.075 m by cellular automata; robot of 0.22 m, 1 m/s",
         number=107,
         make=_barn_like,
         speed_mps=FAST_MPS,
