@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.errors import ConfigError
 from ...core.geometry import Point
 from ...core.option_specs import check, option
 from ...core.segments import Segment, Segments
@@ -35,7 +36,7 @@ HALF_LENGTH_M, HALF_WIDTH_M = 9.0, 4.0
 PILLAR_RADIUS_M = 0.3
 START_M: Point = (-6.0, 0.0)
 GOAL_M: Point = (6.0, 0.0)
-_PASSED_M = 0.3  # beyond a door, from where a person heads for the end of the hall
+_NEAR_M = 0.5  # on both sides of a door, where a person walks straight through it
 _DIGITS = 4  # of the coordinates of doors and pillars
 
 
@@ -54,8 +55,13 @@ class HallParams:
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range."""
+        """Raise ConfigError for a value out of range, or a maximum below its minimum."""
         check(self)
+        if self.door_min_m > self.door_max_m:
+            raise ConfigError(
+                f"door_min_m={self.door_min_m:g}: above door_max_m={self.door_max_m:g}; "
+                "give the smaller one first"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,15 +140,19 @@ def people_paths(params: HallParams, hall: Hall, rng: np.random.Generator) -> Ar
 def _walk(
     params: HallParams, hall: Hall, starts: Array, gates: Array, ahead: Array, speeds: Array
 ) -> Array:
-    """Through the gates (n, 2), then along the hall, ahead (n,) = 1 or -1 along x."""
+    """Towards the gates (n, 2), through them, then along the hall; ahead (n,) is 1 or -1 along x.
+
+    A target is always ahead of a person: one that is passed would draw him back.
+    """
     position = np.round(starts.reshape(-1, 2), DIGITS)
     gates = gates.reshape(-1, 2)
+    through = gates + np.stack([2.0 * _NEAR_M * ahead, 0.0 * ahead], axis=1)
     beyond = np.stack([60.0 * ahead, 0.7 * gates[:, 1]], axis=1)
     velocity = np.round(speeds[:, None] * np.stack([ahead, 0.0 * ahead], axis=1), DIGITS)
     found, borders = [position], Borders(hall)
     for _ in range(round(params.until_s / STEP_S)):
-        passed = position[:, 0] * ahead > _PASSED_M
-        targets = np.where(passed[:, None], beyond, gates)
+        along = (position[:, 0] * ahead)[:, None]
+        targets = np.where(along < -_NEAR_M, gates, np.where(along < _NEAR_M, through, beyond))
         force = desire(position, velocity, targets, speeds) + borders.repulsion(position)
         velocity = next_velocity(velocity, force, speeds)
         moved = borders.outside(position + STEP_S * velocity, params.radius_m)
