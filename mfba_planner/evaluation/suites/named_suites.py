@@ -33,7 +33,8 @@ _Make = Callable[["Suite", int, float], Scenario]
 class Suite:
     """Worlds 0, 1, 2, ... of one kind; number is the suite's own index in the seeds.
 
-    speed_mps is the robot's, at which results and gaps to the optimum are reported.
+    speed_mps is the robot's, at which results and gaps to the optimum are reported. in_the_open:
+    moving obstacles in an empty hall, not a place with walls or a field of posts.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Suite:
     distinct: int | None = None  # number of different worlds; None: all differ
     count: int | None = None  # number of worlds; None: no end
     speed_mps: float = SPEED_MPS
+    in_the_open: bool = True
     seed: int = 0
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -225,20 +227,23 @@ _ALL = (
         description="walls, cycling through " + ", ".join(ROOM_FAMILIES),
         number=106,
         make=_rooms,
+        in_the_open=False,
     ),
     Suite(
         name="barn-like",
         description="200 to 500 cylinders of 0.075 m by cellular automata; robot of 0.22 m, 1 m/s",
         number=107,
         make=_barn_like,
+        in_the_open=False,
         speed_mps=FAST_MPS,
     ),
     Suite(
         name="crowd",
-        description="14 people of 0.25 m at 1.3 m/s on average, by social forces, in a hall with "
+        description="14 people of 0.25 m who want 1.3 m/s on average, by social forces, in a hall with "
         "two doors and pillars; robot 1 m/s",
         number=108,
         make=_hall,
+        in_the_open=False,
         speed_mps=FAST_MPS,
     ),
 )
