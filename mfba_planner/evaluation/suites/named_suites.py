@@ -239,7 +239,7 @@ _ALL = (
     ),
     Suite(
         name="crowd",
-        description="14 people of 0.25 m who want 1.3 m/s on average, by social forces, in a hall with "
+        description="14 people of 0.25 m, by social forces at 1.3 m/s on average, in a hall with "
         "two doors and pillars; robot 1 m/s",
         number=108,
         make=_hall,
