@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Worlds in the manner of BARN: the automaton's rule, the lane, the way through; drivable."""
 
-import free_ways
+import flood_fill
 import numpy as np
 import pytest
 from suite_run import metrics_of
@@ -13,7 +13,7 @@ from mfba_planner.evaluation.suites.barn_worlds import (
     FIRST_ROW,
     VARIANTS,
     field_cells,
-    has_way,
+    has_path,
     lane_cells,
 )
 from mfba_planner.simulation.episode import Outcome
@@ -61,19 +61,19 @@ def test_the_lane_is_closed_at_its_sides_and_behind_the_robot() -> None:
     assert not lane[1:, 1:-1].any()
 
 
-def test_a_way_is_as_wide_as_the_robot_and_a_tenth() -> None:
+def test_a_path_is_as_wide_as_the_robot_and_0_1_m() -> None:
     """A gap of n cells in a row across: from cylinder to cylinder n x 0.15 m."""
 
     def passes(cells: int) -> bool:
         field = np.zeros((FIELD_ROWS, 30), dtype=bool)
         field[15] = True
         field[15, 8 : 8 + cells] = False
-        return has_way(lane_cells(field))
+        return has_path(lane_cells(field))
 
     assert [passes(n) for n in (0, 3, 4, 8)] == [False, False, True, True]
 
 
-def test_worlds_are_lanes_with_a_way_and_200_to_500_cylinders() -> None:
+def test_worlds_are_lanes_of_200_to_500_cylinders() -> None:
     filled = []
     for k in range(24):
         world = BARN.world(k)
@@ -92,18 +92,18 @@ def test_worlds_are_lanes_with_a_way_and_200_to_500_cylinders() -> None:
         assert rows[inner].min() >= FIRST_ROW
         assert rows[inner].max() < FIRST_ROW + FIELD_ROWS
         filled.append(int(inner.sum()))
-        assert free_ways.clearance_of(world, world.start_m) >= 0.32
-        assert free_ways.clearance_of(world, world.goal_m) >= 0.32
+        assert flood_fill.clearance_of(world, world.start_m) >= 0.32
+        assert flood_fill.clearance_of(world, world.goal_m) >= 0.32
     by_fill = np.array(filled).reshape(2, 4, 3).mean(axis=(0, 2))
     assert len(VARIANTS) == 12
     assert (np.diff(by_fill) > 0).all(), "more is filled from one percentage to the next"
 
 
 @pytest.mark.parametrize("k", [0, 5, 9, 10])
-def test_the_way_is_there_by_flood_fill_and_by_the_oracle(k: int) -> None:
+def test_flood_fill_and_oracle_find_a_path(k: int) -> None:
     world = BARN.world(k)
-    # The way past either end of the lane is no way in: it is closed behind, and has no gaps.
-    assert free_ways.has_way(world, 0.22 + 0.05 - 0.01)
+    # The lane is closed behind the robot, and its sides have no gaps.
+    assert flood_fill.has_path(world, 0.22 + 0.05 - 0.01)
     found = solve(world, 1.0)
     assert found.certificate is Certificate.FEASIBLE
     assert 10.0 <= found.length_m < 14.0

@@ -23,7 +23,7 @@ def unit_walls(walls: list[tuple[int, int, int, int]]) -> set[tuple[Cell, Cell]]
     return set(found)
 
 
-def ways(columns: int, rows: int, walls: set[tuple[Cell, Cell]]) -> list[tuple[Cell, Cell]]:
+def passages(columns: int, rows: int, walls: set[tuple[Cell, Cell]]) -> list[tuple[Cell, Cell]]:
     """Pairs of neighbouring cells without a wall between them."""
     pairs = []
     for i in range(columns):
@@ -47,7 +47,7 @@ def reached(pairs: list[tuple[Cell, Cell]]) -> set[Cell]:
 def test_every_cell_is_reached_and_without_openings_in_one_way(columns: int, rows: int) -> None:
     for seed in range(20):
         walls = unit_walls(maze_walls(columns, rows, 0, np.random.default_rng(seed)))
-        pairs = ways(columns, rows, walls)
+        pairs = passages(columns, rows, walls)
         assert len(reached(pairs)) == columns * rows
         assert len(pairs) == columns * rows - 1, "a tree"
         border = [w for w in walls if is_border(w, columns, rows)]

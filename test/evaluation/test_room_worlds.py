@@ -4,7 +4,7 @@
 import math
 
 import pytest
-from free_ways import clearance_of, has_way
+from flood_fill import clearance_of, has_path
 from suite_run import metrics_of
 
 from mfba_planner.core.geometry import distance
@@ -38,12 +38,12 @@ def test_families_alternate() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_start_and_goal_are_clear_and_the_way_is_wider_than_the_robot(family: str) -> None:
-    for world in worlds(family, 12):
+def test_start_and_goal_are_clear_and_a_path_is_wider_than_the_robot(family: str) -> None:
+    for world in worlds(family, 8):
         for end in (world.start_m, world.goal_m):
             assert clearance_of(world, end) >= FREE_M - ROUNDING_M
         # A flood fill of cells of 2 cm may lose that much.
-        assert has_way(world, 0.5 * NARROWEST_M - 0.02)
+        assert has_path(world, 0.5 * NARROWEST_M - 0.02)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -55,17 +55,17 @@ def test_worlds_of_a_family_differ_also_in_their_direction(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", ["door", "corridor", "maze"])
-def test_without_its_ways_the_goal_is_enclosed(family: str) -> None:
-    """So nothing leads round the outside: a disc that fits no door or corridor gets nowhere."""
+def test_nothing_leads_round_the_outside(family: str) -> None:
+    """A disc that fits no door or corridor gets nowhere."""
     too_wide = {"door": 0.62, "corridor": 0.72, "maze": 0.78}[family]
-    assert not any(has_way(world, too_wide, 0.05) for world in worlds(family, 8))
+    assert not any(has_path(world, too_wide, 0.05) for world in worlds(family, 8))
 
 
 def test_doors_are_of_0_7_to_1_2_m() -> None:
     """The widest disc that passes, by trial."""
     widths = []
     for world in worlds("door", 10):
-        passing = [w for w in (0.66, 0.8, 0.95, 1.1, 1.22) if has_way(world, 0.5 * w, 0.04)]
+        passing = [w for w in (0.66, 0.8, 0.95, 1.1, 1.22) if has_path(world, 0.5 * w, 0.04)]
         widths.append(max(passing))
     assert 0.66 == min(widths) < 0.9 < max(widths) < 1.22
 
@@ -89,7 +89,7 @@ def test_the_straight_line_is_blocked(family: str) -> None:
         assert found.length_m > distance(world.start_m, world.goal_m) + 1e-3
 
 
-def test_tables_stand_on_four_legs_which_the_robot_may_pass_between() -> None:
+def test_tables_are_four_posts() -> None:
     found = worlds("furniture", 20)
     assert {len(world.obstacles) % 4 for world in found} == {0}
     assert {o.radius_m for world in found for o in world.obstacles} == {0.03}

@@ -39,7 +39,7 @@ _REACH = (
 def barn_scenario(name: str, k: int, rng: np.random.Generator) -> Scenario:
     """A world of variant k % 12."""
     filled, smoothings = VARIANTS[k % len(VARIANTS)]
-    while not has_way(lane := lane_cells(field_cells(filled, smoothings, rng))):
+    while not has_path(lane := lane_cells(field_cells(filled, smoothings, rng))):
         pass
     return Scenario(
         name=name,
@@ -81,7 +81,7 @@ def lane_cells(field: np.ndarray) -> np.ndarray:
     return lane
 
 
-def has_way(lane: np.ndarray) -> bool:
+def has_path(lane: np.ndarray) -> bool:
     """Whether the robot, with 0.05 m of spare on either side, gets from start to the far end.
 
     It goes from node to node, along the axes; all is counted in whole nodes.

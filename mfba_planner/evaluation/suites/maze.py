@@ -37,17 +37,17 @@ def maze_walls(columns: int, rows: int, openings: int, rng: np.random.Generator)
 def _tree(columns: int, rows: int, rng: np.random.Generator) -> set[tuple[Cell, Cell]]:
     """Pairs of neighbouring cells without a wall between them, the lower cell first."""
     path: list[Cell] = [(0, 0)]
-    seen, tree = {path[0]}, set[tuple[Cell, Cell]]()
+    visited, tree = {path[0]}, set[tuple[Cell, Cell]]()
     while path:
         i, j = here = path[-1]
         around = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
-        new = [c for c in around if 0 <= c[0] < columns and 0 <= c[1] < rows and c not in seen]
+        new = [c for c in around if 0 <= c[0] < columns and 0 <= c[1] < rows and c not in visited]
         if not new:
             path.pop()
             continue
         chosen = new[int(rng.integers(len(new)))]
         tree.add((min(here, chosen), max(here, chosen)))
-        seen.add(chosen)
+        visited.add(chosen)
         path.append(chosen)
     return tree
 

@@ -29,7 +29,7 @@ def clearance_of(world: Scenario, point: Point) -> float:
     return float(clearance_at(world, np.array(point[0]), np.array(point[1])))
 
 
-def has_way(world: Scenario, radius_m: float, cell_m: float = 0.02) -> bool:
+def has_path(world: Scenario, radius_m: float, cell_m: float = 0.02) -> bool:
     """Whether a disc of this radius, at least, gets from start to goal within the scene's box.
 
     A way of that width, straight or bent, may be lost by up to a cell: ask for that much less.
