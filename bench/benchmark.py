@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Benchmark for docs/benchmark.md: every suite, planner, perception and ingredient, and its cost.
 
+Every suite in the open: places (rooms, barn-like, crowd) only if named by --suite.
+
     pip install -e .[orca]
     python bench/benchmark.py --worlds 10000     # the whole thing; some hours on two cores
     python bench/benchmark.py --out DIR          # small; continues where it was interrupted
@@ -28,9 +30,10 @@ from benchmark_runs import HEADLINE, Counts, Results, print_line
 
 from mfba_planner.core.output_files import new_run_directory
 from mfba_planner.evaluation.study.compute_chunks import initialize_worker
-from mfba_planner.evaluation.suites import suite_names
+from mfba_planner.evaluation.suites import suite, suite_names
 
 ROOT = Path(__file__).parents[1]
+IN_THE_OPEN = [name for name in suite_names() if suite(name).in_the_open]
 RATE_WORLDS = 2000  # runs by which episodes per minute are measured
 BEGIN_MARK, END_MARK = "<!-- generated: begin -->\n", "<!-- generated: end -->\n"
 
@@ -69,7 +72,10 @@ def arguments() -> argparse.ArgumentParser:
         "--seen", type=int, metavar="N", help="of other perceptions (default: as --few)"
     )
     parser.add_argument(
-        "--suite", action="append", choices=suite_names(), help="only this; may be repeated"
+        "--suite",
+        action="append",
+        choices=suite_names(),
+        help="only this; may be repeated (default: those in the open)",
     )
     parser.add_argument("--rounds", type=int, default=200, help="of the measurement of cost")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
@@ -96,7 +102,7 @@ def main(args: list[str] | None = None) -> None:
         few=few,
         perception_worlds=found.seen or few,
     )
-    suites = [name for name in suite_names() if not found.suite or name in found.suite]
+    suites = [name for name in suite_names() if name in (found.suite or IN_THE_OPEN)]
     out = found.out or new_run_directory(stem="benchmark")
     target = found.docs / "benchmark.md"
     _between(target.read_text(encoding="utf-8"), "")  # before the work is done

@@ -20,9 +20,11 @@ import numpy as np
 from ...core.geometry import Point
 from ...simulation.constant_velocity_segments import UniformSegments
 from ...simulation.obstacle_motion import Walls
-from .polyline import edge_gaps, within
+from .polyline import FAR_M, edge_gaps, within
 from .static_walls import NO_WALLS, StaticWalls
 
+_CHUNK = 20_000  # (edge, segment) pairs evaluated at once: what a cache holds
+_MANY, _PARTS = 40, 4  # from so many segments on they are tried in parts
 CLEAR_M = 1e-5  # clearance to every circle, so that rounding makes no contact
 
 
@@ -170,18 +172,8 @@ class Search:
         origin, ex, ey, et, esegment, eside, f = (
             column[keep] for column in (origin, ex, ey, et, esegment, eside, f)
         )
-        span = np.maximum(et - t[origin], 1e-12)
         ox, oy = x[origin], y[origin]
-        gap = edge_gaps(
-            ox[:, None],
-            oy[:, None],
-            t[origin][:, None],
-            et[:, None],
-            ((ex - ox) / span)[:, None],
-            ((ey - oy) / span)[:, None],
-            self.inner,
-        )
-        free = np.flatnonzero(gap.min(axis=1) >= -1e-9)
+        free = np.flatnonzero(self._misses(ox, oy, t[origin], ex, ey, et))
         origins = np.stack([ox, oy], axis=1)[free]
         steps = np.stack([ex, ey], axis=1)[free] - origins
         free = free[self.walls.clear(origins, steps, CLEAR_M)]
@@ -197,6 +189,37 @@ class Search:
                 parents,
             )
         )
+
+    def _misses(
+        self,
+        x: np.ndarray,
+        y: np.ndarray,
+        t: np.ndarray,
+        end_x: np.ndarray,
+        end_y: np.ndarray,
+        end_t: np.ndarray,
+    ) -> np.ndarray:
+        """Which edges (n,) have no contact with any circle.
+
+        Among many circles an edge is mostly stopped by several: a part of them is tried first.
+        Taken in parts that a cache holds.
+        """
+        span = np.maximum(end_t - t, 1e-12)
+        columns = x, y, t, end_t, (end_x - x) / span, (end_y - y) / span
+        left, count = np.arange(len(x)), len(self.segments.t0)
+        for first in range(_PARTS if count >= _MANY else 1):
+            step = _PARTS if count >= _MANY else 1
+            part = UniformSegments(*(column[first::step] for column in self.inner))
+            rows = max(1, _CHUNK // max(1, len(part.t0)))
+            kept = [left[:0]]
+            for k in range(0, len(left), rows):
+                block = left[k : k + rows]
+                gap = edge_gaps(*(column[block, None] for column in columns), part)
+                kept.append(block[gap.min(axis=1, initial=FAR_M) >= -1e-9])
+            left = np.concatenate(kept)
+        free = np.zeros(len(x), dtype=bool)
+        free[left] = True
+        return free
 
     def _straight_to_go(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         distance: np.ndarray = np.hypot(x - self.goal[0], y - self.goal[1])

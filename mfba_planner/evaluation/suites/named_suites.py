@@ -13,10 +13,14 @@ from ...core.errors import ConfigError
 from ...core.option_specs import did_you_mean
 from ...simulation.scenario import Scenario
 from .adversarial_worlds import FAMILIES, adversarial_obstacles
+from .barn_worlds import barn_scenario
 from .dynabarn_worlds import DIFFICULTIES, dynabarn_obstacles
 from .random_crowds import CrowdParams, Motion, crowd
+from .room_worlds import FAMILIES as ROOM_FAMILIES
+from .room_worlds import room_scenario
 from .social_forces import PedestrianParams, pedestrian_obstacles
 from .task_geometry import ROOM, Trip, scenario
+from .walled_crowd import HallParams, hall_scenario
 
 WORLD_STREAM = 3  # spawn key of worlds' SeedSequence children; one number per purpose
 SPEED_MPS = 0.8  # of the robot, unless the suite has another
@@ -29,7 +33,8 @@ _Make = Callable[["Suite", int, float], Scenario]
 class Suite:
     """Worlds 0, 1, 2, ... of one kind; number is the suite's own index in the seeds.
 
-    speed_mps is the robot's, at which results and gaps to the optimum are reported.
+    speed_mps is the robot's, at which results and gaps to the optimum are reported. in_the_open:
+    moving obstacles in an empty hall, not a place with walls or a field of posts.
     """
 
     name: str
@@ -39,6 +44,7 @@ class Suite:
     distinct: int | None = None  # number of different worlds; None: all differ
     count: int | None = None  # number of worlds; None: no end
     speed_mps: float = SPEED_MPS
+    in_the_open: bool = True
     seed: int = 0
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -121,6 +127,19 @@ def _pedestrians(source: Suite, k: int, _: float) -> Scenario:
     return scenario(f"{source.name}-{k}", obstacles)
 
 
+def _rooms(source: Suite, k: int, _: float) -> Scenario:
+    family = list(ROOM_FAMILIES)[k % len(ROOM_FAMILIES)]
+    return room_scenario(f"{source.name}-{k}-{family}", family, source.stream(k))
+
+
+def _barn_like(source: Suite, k: int, _: float) -> Scenario:
+    return barn_scenario(f"{source.name}-{k}", k, source.stream(k))
+
+
+def _hall(source: Suite, k: int, _: float) -> Scenario:
+    return hall_scenario(f"{source.name}-{k}", HallParams(), source.stream(k))
+
+
 _DENSE = CrowdParams(
     obstacles=60, radius_min_m=0.1, radius_max_m=0.3, speed_min_mps=0.05, static_share=0.3
 )
@@ -201,6 +220,30 @@ _ALL = (
         "forces; robot 1 m/s",
         number=105,
         make=_pedestrians,
+        speed_mps=FAST_MPS,
+    ),
+    Suite(
+        name="rooms",
+        description="walls, cycling through " + ", ".join(ROOM_FAMILIES),
+        number=106,
+        make=_rooms,
+        in_the_open=False,
+    ),
+    Suite(
+        name="barn-like",
+        description="200 to 500 cylinders of 0.075 m by cellular automata; robot of 0.22 m, 1 m/s",
+        number=107,
+        make=_barn_like,
+        in_the_open=False,
+        speed_mps=FAST_MPS,
+    ),
+    Suite(
+        name="crowd",
+        description="14 people of 0.25 m, by social forces at 1.3 m/s on average, in a hall with "
+        "two doors and pillars; robot 1 m/s",
+        number=108,
+        make=_hall,
+        in_the_open=False,
         speed_mps=FAST_MPS,
     ),
 )

@@ -99,15 +99,27 @@ def trajectories(starts: Array, targets: Array, speeds: Array, until_s: float) -
     velocity = np.round(speeds[:, None] * _unit(targets - starts), DIGITS)
     found = [position]
     for _ in range(round(until_s / STEP_S)):
-        force = (speeds[:, None] * _unit(targets - position) - velocity) / RELAXATION_S
-        force += repulsion(position, velocity, _unit(targets - position))
-        velocity = velocity + STEP_S * force
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        velocity *= np.minimum(1.0, FASTEST * speeds / np.maximum(speed, 1e-9))[:, None]
-        velocity = np.round(velocity, DIGITS)
+        force = desire(position, velocity, targets, speeds)
+        velocity = next_velocity(velocity, force, speeds)
         position = np.round(position + STEP_S * velocity, DIGITS)
         found.append(position)
     return np.array(found)
+
+
+def desire(position: Array, velocity: Array, targets: Array, speeds: Array) -> Array:
+    """Acceleration (n, 2) towards the targets, and away from each other."""
+    direction = _unit(targets - position)
+    force: Array = (speeds[:, None] * direction - velocity) / RELAXATION_S
+    force += repulsion(position, velocity, direction)
+    return force
+
+
+def next_velocity(velocity: Array, force: Array, speeds: Array) -> Array:
+    """The velocity (n, 2) after a step, at most FASTEST times the desired speed, rounded."""
+    velocity = velocity + STEP_S * force
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    velocity *= np.minimum(1.0, FASTEST * speeds / np.maximum(speed, 1e-9))[:, None]
+    return np.round(velocity, DIGITS)
 
 
 def repulsion(position: Array, velocity: Array, direction: Array) -> Array:
