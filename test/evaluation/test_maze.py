@@ -44,7 +44,7 @@ def reached(pairs: list[tuple[Cell, Cell]]) -> set[Cell]:
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(1, 1), (1, 5), (5, 5), (7, 4)])
-def test_every_cell_is_reached_and_without_openings_in_one_way(columns: int, rows: int) -> None:
+def test_every_cell_is_reached_and_without_openings_by_one_path(columns: int, rows: int) -> None:
     for seed in range(20):
         walls = unit_walls(maze_walls(columns, rows, 0, np.random.default_rng(seed)))
         pairs = passages(columns, rows, walls)
