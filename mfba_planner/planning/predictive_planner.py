@@ -5,33 +5,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..core.geometry import Point, distance
-from ..core.option_specs import check, option
 from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
-from ..perception.obstacle_memory import ObstacleMemory, ObstacleMemoryParams
-from ..perception.obstacle_tracker import Tracker, TrackingParams
+from ..perception.obstacle_memory import ObstacleMemory
+from ..perception.obstacle_tracker import Tracker
 from ..perception.scan_coverage import ScanCoverage
 from ..perception.sensory_vector import SensorParams, sense_circles
-from ..perception.static_map import StaticMap, StaticMapParams
+from ..perception.static_map import StaticMap
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
 from .differential_drive import Speeds, apply_command, command
-from .distance_to_go import RouteParams
 from .drive_rollout import DriveRollout
 from .map_planning import MapPlanning
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
+from .predictive_params import PredictiveParams
 from .sector_changes import SectorChanges
 from .trajectory_cost import (
     Candidate,
-    RiskParams,
     TrajectoryCost,
     circles_from_sectors,
     predicted_circles,
@@ -45,39 +43,6 @@ TOWARDS = math.cos(math.radians(80.0))
 UNOBSERVED = "no direction that the lidar has covered leads on"
 _FREE_M = 1e-9
 _LAST_WAYPOINT = -1  # candidate number of the last tick's waypoint
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PredictiveParams:
-    """Options of the predictive planner in addition to PlannerParams."""
-
-    headings: int = option(72, "number of headings, one bit each", minimum=12, maximum=3600)
-    reach_m: float = option(
-        2.5, "largest distance of a waypoint", unit="m", minimum=0.01, maximum=100.0
-    )
-    search_m: float = option(
-        0.3, "radius of the disc the bats search", unit="m", minimum=0.001, maximum=100.0
-    )
-    sector_radius_m: float = option(
-        0.3,
-        "radius of the circle that replaces a set sector",
-        unit="m",
-        minimum=0.01,
-        maximum=10.0,
-    )
-    coverage_s: float = option(
-        1.0, "time for which an observed direction stays observed", unit="s", minimum=0.0,
-        maximum=60.0,
-    )  # fmt: skip
-    memory: ObstacleMemoryParams = field(default_factory=ObstacleMemoryParams)
-    tracking: TrackingParams = field(default_factory=TrackingParams)
-    map: StaticMapParams = field(default_factory=StaticMapParams)
-    route: RouteParams = field(default_factory=RouteParams)
-    risk: RiskParams = field(default_factory=RiskParams)
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range."""
-        check(self)
 
 
 def preset(params: PlannerParams | None = None) -> PlannerParams:
