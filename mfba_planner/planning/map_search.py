@@ -25,6 +25,7 @@ Array = np.ndarray
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of waypoints, in reach_m
 WAITS_S = (0.4, 1.0, 2.0)
 SPEEDS = (1e-6, 0.5)
+SLOW = 0.5  # share of the speed below which a waypoint is one of waiting
 BATCH = 40  # candidates evaluated at once
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
 WINDOW_M = 6.5  # side of the square in which clearances are known
@@ -229,7 +230,12 @@ class _Evaluation:
         paths = self._rollout.paths(qx, qy, t1)
         standing = self._rollout.standing_risk(paths, risk, MARGIN_M)
         harm = np.maximum(standing, self._rollout.moving_risk(paths, risk))
-        return cost + harm, harm
+        cost += harm
+        if self._rollout.alone:  # what stands does not go away: waiting for it is of no use
+            (px, py), (gx, gy) = self._position, self._to_go.goal
+            slow = length < SLOW * np.minimum(speed * t1, math.hypot(gx - px, gy - py))
+            cost[slow] += FORBIDDEN_M
+        return cost, harm
 
     def contact(self, qx: Array, qy: Array, t1: Array) -> Array:
         """Whether the way to each waypoint touches something."""
