@@ -214,8 +214,8 @@ class Search:
             kept = [left[:0]]
             for k in range(0, len(left), rows):
                 block = left[k : k + rows]
-                bx, by, start, end, ux, uy = (column[block, None] for column in columns)
-                gap = edge_gaps(bx, by, start, end, ux, uy, part)
+                ox, oy, start, end, ux, uy = (column[block, None] for column in columns)
+                gap = edge_gaps(ox, oy, start, end, ux, uy, part)
                 kept.append(block[gap.min(axis=1, initial=FAR_M) >= -1e-9])
             left = np.concatenate(kept)
         free = np.zeros(len(x), dtype=bool)
