@@ -118,7 +118,7 @@ def test_in_the_open_it_decides_as_without_a_map(monkeypatch: pytest.MonkeyPatch
         Obstacle(center_m=(4.5, 2.0), radius_m=0.3, speed_mps=0.5, heading_rad=-0.5 * math.pi),
     ]
     with_map = driven((6.0, 0.0), (), *people)
-    monkeypatch.setattr(MapPlanning, "move", lambda *_: None)
+    monkeypatch.setattr(MapPlanning, "move", lambda *_, **__: None)
     without = driven((6.0, 0.0), (), *people)
     assert [d.velocity for d in with_map.ticks] == [d.velocity for d in without.ticks]
     assert any(d.mode is Mode.OBSTACLE_AVOIDANCE for d in with_map.ticks)
