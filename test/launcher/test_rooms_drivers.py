@@ -150,8 +150,9 @@ def test_viewers_show_the_maps(bag: Path, maps: tuple[MapPoints, ...], tmp_path:
         assert round(run["ticks"]["time"][shown["tick"]] * 1e9) == stamp_ns - run_start_ns(bag)
         drawn = np.cumsum(np.array(shown["points"]).reshape(-1, 2), axis=0) / 100.0
         assert len(drawn) == len(points)
-        order = np.lexsort((points[:, 0].round(2), points[:, 1].round(2)))
-        np.testing.assert_allclose(drawn, points[order], atol=0.0051)
+        off = np.abs(drawn[:, None] - points).max(axis=2)  # whole cm: half a cm on each axis
+        assert off.min(axis=0).max() < 0.0051
+        assert off.min(axis=1).max() < 0.0051
 
 
 def run_start_ns(bag: Path) -> int:
