@@ -37,5 +37,7 @@ def test_the_example_planner_runs_in_a_sweep(
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     assert cli.main(SWEEP[1:]) == 0
-    rows = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines() if line)
+    # A cell that is too wide for the terminal goes on in a line of one word.
+    found = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+    rows = {words[0]: words[1] for words in found if len(words) == 2}
     assert (rows["runs"].split(), rows["failed"].split()) == (["4", "4"], ["0", "0"])
