@@ -24,7 +24,7 @@ class DistanceField:
 
     def at(self, x: Array, y: Array) -> Array:
         """Bilinear interpolation at positions of any shape; the cap outside."""
-        field, flat = self.distance_m, self.distance_m.ravel()
+        field = self.distance_m
         height, width = field.shape
         u = (x - self.origin_m[0]) / self.cell_m - 0.5
         v = (y - self.origin_m[1]) / self.cell_m - 0.5
@@ -32,15 +32,22 @@ class DistanceField:
         all_inside = bool(inside.all())
         if not all_inside:
             u, v = np.where(inside, u, 0.0), np.where(inside, v, 0.0)
-        i, j = u.astype(np.int64), v.astype(np.int64)
-        u, v = u - i, v - j
-        k = j * width + i
-        rest = 1.0 - u
-        low = flat.take(k) * rest + flat.take(k + 1) * u
-        k += width
-        high = flat.take(k) * rest + flat.take(k + 1) * u
-        found: Array = low + v * (high - low)
+        found = bilinear(field, u, v)
         return found if all_inside else np.where(inside, found, self.cap_m)
+
+
+def bilinear(values: Array, u: Array, v: Array) -> Array:
+    """Values (h, w) between its entries, at column u and row v of any shape, inside of it."""
+    flat, width = values.ravel(), values.shape[1]
+    i, j = u.astype(np.int64), v.astype(np.int64)
+    u, v = u - i, v - j
+    k = j * width + i
+    rest = 1.0 - u
+    low = flat.take(k) * rest + flat.take(k + 1) * u
+    k += width
+    high = flat.take(k) * rest + flat.take(k + 1) * u
+    found: Array = low + v * (high - low)
+    return found
 
 
 def distance_field(

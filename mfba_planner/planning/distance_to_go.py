@@ -16,7 +16,7 @@ import numpy as np
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
 from ..core.planner_types import NANO
-from ..perception.distance_field import DistanceField
+from ..perception.distance_field import DistanceField, bilinear
 from ..perception.static_map import StaticMap
 
 Array = np.ndarray
@@ -63,7 +63,6 @@ class DistanceToGo:
         self._closed_ns: int | None = None  # since when
         self._margin_m = _MARGIN_M
         self._computed: tuple[int, int, Point] | None = None  # stamp, map version, goal
-        self._field: DistanceField | None = None  # distances to what stands
         self._to_go: Array | None = None
         self._beyond_m = 0.0
         self._step: Array | None = None  # unit vectors of the shortest way, complex
@@ -183,7 +182,7 @@ class DistanceToGo:
             dx, dy = x - self.goal[0], y - self.goal[1]
             straight: Array = np.sqrt(dx * dx + dy * dy)
             return straight
-        return _bilinear(self._to_go, *self._cells(x, y)) + self._beyond_m
+        return bilinear(self._to_go, *self._cells(x, y)) + self._beyond_m
 
     def direction(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Unit vector of the shortest way at positions of any shape."""
@@ -191,7 +190,7 @@ class DistanceToGo:
             step = (self.goal[0] - x) + 1j * (self.goal[1] - y)
         else:
             assert self._step is not None
-            step = _bilinear(self._step, *self._cells(x, y))
+            step = bilinear(self._step, *self._cells(x, y))
         step = step / (np.abs(step) + 1e-12)
         return step.real, step.imag
 
@@ -272,16 +271,4 @@ def _downhill(to_go: Array) -> Array:
         np.maximum(np.maximum(below, above), 0.0) * np.where(above > below, 1.0, -1.0)
     )
     found: Array = step / (np.abs(step) + 1e-12)
-    return found
-
-
-def _bilinear(values: Array, u: Array, v: Array) -> Array:
-    flat, width = values.ravel(), values.shape[1]
-    i, j = u.astype(np.int64), v.astype(np.int64)
-    u, v = u - i, v - j
-    k = j * width + i
-    low = flat[k] * (1.0 - u) + flat[k + 1] * u
-    k += width
-    high = flat[k] * (1.0 - u) + flat[k + 1] * u
-    found: Array = low + v * (high - low)
     return found

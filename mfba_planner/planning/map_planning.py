@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.geometry import Point, distance
+from ..core.geometry import Point, Pose2D, distance, rotated
 from ..core.planner_types import Circle, Observation
 from ..core.random_streams import stream
 from ..perception.obstacle_tracker import Tracker
@@ -60,9 +60,8 @@ class MapPlanning:
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
 
-    def update(self, stamp_ns: int, observation_pose: Observation, tracker: Tracker) -> None:
-        """Take the scan that the tracker has just taken."""
-        pose = (observation_pose.sensed or (0, observation_pose.pose))[1]
+    def update(self, stamp_ns: int, pose: Pose2D, tracker: Tracker) -> None:
+        """Take the scan that the tracker has just taken, from the pose."""
         assert tracker.beams is not None
         moving, surely = tracker.moving()
         self._radii_m = tracker.radii_m
@@ -233,9 +232,7 @@ class MapPlanning:
             share *= self._braking_share(
                 at_rest, obs.pose.yaw + turn, (share * ux, share * uy), tick_s
             )
-        c, s = math.cos(turn), math.sin(turn)
-        velocity = (share * (c * ux + s * uy), share * (c * uy - s * ux))
-        waypoint = (obs.pose.x + c * qx + s * qy, obs.pose.y + c * qy - s * qx)
+        vx, vy = rotated((ux, uy), -turn)
         percent = 1e2 * share * math.hypot(ux, uy) / params.speed_mps
         reason = _STRAIGHT
         if not found.free or not to_go.is_straight:
@@ -243,15 +240,18 @@ class MapPlanning:
             if not found.free:
                 reason += f"; costs {found.cost - found.to_go_m:.3g} m more"
         return Move(
-            velocity=velocity,
+            velocity=(share * vx, share * vy),
             reason=f"{reason}, at {percent:.0f} % speed",
             event=Event.CLEAR if found.free and to_go.is_straight else Event.OBSTACLE,
             vs=found.closed,
             vg=found.closed,
             gap=0,
-            waypoint=waypoint,
-            candidates=tuple(
-                (obs.pose.x + c * x + s * y, obs.pose.y + c * y - s * x)
-                for x, y in found.candidates
-            ),
+            waypoint=_in_odom(obs.pose, (qx, qy), turn),
+            candidates=tuple(_in_odom(obs.pose, q, turn) for q in found.candidates),
         )
+
+
+def _in_odom(pose: Pose2D, offset: Point, turn: float) -> Point:
+    """A position in odom, from its offset to the robot in the map's frame."""
+    (x, y), c, s = offset, math.cos(turn), math.sin(turn)
+    return (pose.x + c * x + s * y, pose.y + c * y - s * x)

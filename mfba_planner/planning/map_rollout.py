@@ -20,7 +20,7 @@ from ..core.robot_base import Base
 from ..perception.distance_field import DistanceField
 from .differential_drive import Speeds
 from .distance_to_go import DistanceToGo
-from .trajectory_cost import RiskParams
+from .trajectory_cost import SLOW, RiskParams
 
 Array = np.ndarray
 
@@ -156,7 +156,7 @@ class MapRollout:
         v, omega = np.full(m, self._speeds.v), np.full(m, self._speeds.omega)
         share = np.sqrt(qx * qx + qy * qy) / (t1 * full)
         qx, qy = qx + px, qy + py
-        waits, waiting_mps = share < 0.9, full * share
+        waits, waiting_mps = share < SLOW, full * share
         any_waits = bool(waits.any())
         longest_wait_s = float(t1[waits].max()) if any_waits else 0.0
         gx, gy = self._to_go.goal

@@ -25,7 +25,7 @@ Array = np.ndarray
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of waypoints, in reach_m
 WAITS_S = (0.4, 1.0, 2.0)
 SPEEDS = (1e-6, 0.5)
-SLOW = 0.5  # share of the speed below which a waypoint is one of waiting
+LEAST_SHARE = 0.5  # of the speed, where nothing moves
 BATCH = 40  # candidates evaluated at once
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
 WINDOW_M = 6.5  # side of the square in which clearances are known
@@ -89,11 +89,12 @@ class MapSearch:
         here = float(to_go.at(np.array([px]), np.array([py]))[0])
         ahead = self._ahead(position)
         if observed is not None:
-            ahead = [q for q in ahead if observed[self._heading(q)]] or ahead
+            drivable = observed[self._headings(*np.array(ahead).T)]
+            ahead = [q for q, ok in zip(ahead, drivable.tolist()) if ok] or ahead
         ax, ay = np.array(ahead).T
         at = np.maximum(np.sqrt(ax * ax + ay * ay) / speed_mps, tick_s)
         best, best_cost = (ahead[0], float(at[0])), math.inf
-        if observed is None or observed[self._heading(ahead[0])]:
+        if observed is None or drivable.any():
             cost, harm = evaluate(ax, ay, at)
             k = int(cost.argmin())
             best, best_cost = (ahead[k], float(at[k])), float(cost[k])
@@ -101,8 +102,7 @@ class MapSearch:
                 return Found(*best, best_cost, here, (), (), True)
         qx, qy, t = self._candidates(best[0], speed_mps, tick_s, last, waits=not rollout.alone)
         if observed is not None:
-            headings = np.round(np.arctan2(qy, qx) * self._n / (2.0 * math.pi)).astype(int) - 1
-            kept = observed[headings % self._n]
+            kept = observed[self._headings(qx, qy)]
             qx, qy, t = qx[kept], qy[kept], t[kept]
         lower = np.sqrt(qx * qx + qy * qy) + to_go.at(qx + px, qy + py)
         lower += risk.waiting * (speed_mps * t - np.sqrt(qx * qx + qy * qy))
@@ -141,8 +141,7 @@ class MapSearch:
             t = np.maximum(np.sqrt(x * x + y * y) / evaluate.speed_mps, tick_s)
             cost, _ = evaluate(x, y, t)
             if observed is not None:
-                headings = np.round(np.arctan2(y, x) * self._n / (2.0 * math.pi)).astype(int) - 1
-                cost[~observed[headings % self._n]] = math.inf
+                cost[~observed[self._headings(x, y)]] = math.inf
             swarm.tell(cost.tolist())
         if swarm.best_value >= best_cost:
             return best, best_cost
@@ -150,8 +149,11 @@ class MapSearch:
         t1 = max(math.hypot(qx, qy) / evaluate.speed_mps, tick_s)
         return ((qx, qy), t1), swarm.best_value
 
-    def _heading(self, q: Point) -> int:
-        return (round(math.atan2(q[1], q[0]) * self._n / (2.0 * math.pi)) - 1) % self._n
+    def _headings(self, x: Array, y: Array) -> Array:
+        """Index (k,) of the heading nearest to each direction."""
+        number = np.round(np.arctan2(y, x) * self._n / (2.0 * math.pi)).astype(int)
+        index: Array = (number - 1) % self._n
+        return index
 
     def _ahead(self, position: Point) -> list[Point]:
         """The farthest points of the shortest way in line of sight, with more room and less."""
@@ -233,7 +235,7 @@ class _Evaluation:
         cost += harm
         if self._rollout.alone:  # what stands does not go away: waiting for it is of no use
             (px, py), (gx, gy) = self._position, self._to_go.goal
-            slow = length < SLOW * np.minimum(speed * t1, math.hypot(gx - px, gy - py))
+            slow = length < LEAST_SHARE * np.minimum(speed * t1, math.hypot(gx - px, gy - py))
             cost[slow] += FORBIDDEN_M
         return cost, harm
 

@@ -291,7 +291,7 @@ class Predictive(BasePlanner):
         if obs.scan is not None:
             self._tracker.update(stamp_ns, pose, obs.scan)
             self._coverage.update(stamp_ns, obs.scan)
-            self._map_planning.update(stamp_ns, obs, self._tracker)
+            self._map_planning.update(stamp_ns, pose, self._tracker)
             return self._tracker.circles(obs.pose_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
