@@ -53,14 +53,17 @@ def test_a_goal_in_a_direction_that_no_beam_covers(graph: Graph, planner: dict[s
         vx, vy = velocity(robot)
         if planner is PAPER:
             assert driven == Mode.OBSTACLE_AVOIDANCE.value
-            assert abs(math.atan2(vy, vx)) > math.radians(40.0)
+            assert abs(math.atan2(vy, vx)) > math.radians(50.0)
         else:
             assert (driven, vx, vy) == (Mode.BLOCKED.value, 0.0, 0.0)
             assert robot.reason == "no direction that the lidar has covered leads on"
     for _ in range(3):
         robot.drive()
     vx, vy = velocity(robot)
-    assert math.atan2(vy, vx) == pytest.approx(0.0, abs=0.1), "it is covered now"
+    # A goal step of the paper's swarm turns with the stamp, by 37 degrees in 1 of 20000 draws.
+    largest = math.radians(45.0) if planner is PAPER else 1e-9
+    assert math.hypot(vx, vy) > 0.5
+    assert abs(math.atan2(vy, vx)) < largest, "it is covered now"
 
 
 def test_a_direction_stays_observed_for_a_moment(graph: Graph) -> None:
