@@ -66,7 +66,12 @@ def kill_one(node: str, signum: signal.Signals, moment_s: float, domain: int, ro
     bag = root / f"{node}_{signum.name}_{moment_s:.6f}"
     process = subprocess.Popen(
         [sys.executable, "-c", PROGRAM.format(node), *arguments(node, bag)],
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain), "PYTHONPATH": str(ROOT)},
+        env={
+            **os.environ,
+            "ROS_DOMAIN_ID": str(domain),
+            "PYTHONPATH": str(ROOT),
+            "PYTHONFAULTHANDLER": "1",  # SIGABRT prints the stacks of all threads
+        },
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -81,9 +86,9 @@ def kill_one(node: str, signum: signal.Signals, moment_s: float, domain: int, ro
         _, stderr = process.communicate(timeout=END_WITHIN_S)
         took_s = time.monotonic() - sent
     except subprocess.TimeoutExpired:
-        process.kill()
-        process.communicate()
-        return Death(node, signum, moment_s, END_WITHIN_S, "did not end")
+        process.send_signal(signal.SIGABRT)
+        _, stderr = process.communicate()
+        return Death(node, signum, moment_s, END_WITHIN_S, f"did not end; {stderr.strip()}")
     fault = f"exit code {process.returncode}" if process.returncode else ""
     fault = fault or (f"stderr: {stderr.strip()}" if stderr else "") or bag_fault(bag)
     return Death(node, signum, moment_s, took_s, fault)

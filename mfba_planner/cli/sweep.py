@@ -31,7 +31,7 @@ from ..evaluation.sweep.sweep_spec import (
 )
 from ..evaluation.sweep.table import kinds_of, write
 from ..evaluation.sweep.table_columns import COLUMNS, SCENARIO, TIMINGS
-from ..launcher.set_option import add_set_argument, with_settings
+from ..launcher.set_option import add_set_argument, robot_changes, with_settings
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD
 from ..planning.planner_registry import PLANNERS
@@ -161,11 +161,11 @@ def _sweep_spec(parsed: argparse.Namespace) -> tuple[SweepSpec, list[str]]:
         setting = default_setting(name)
     default = setting.params
     planners = tuple(parsed.planners or [DEFAULT_METHOD.value])
-    params, sensor = with_settings(default, SensorParams(), parsed.settings)
+    robot, settings = robot_changes(parsed.settings)
+    params, sensor = with_settings(default, SensorParams(), settings)
     # --set overrides every planner's own preset.
     own = {
-        name: with_settings(own_preset(name, default), sensor, parsed.settings)[0]
-        for name in planners
+        name: with_settings(own_preset(name, default), sensor, settings)[0] for name in planners
     }
     spec = SweepSpec(
         suite=name,
@@ -183,6 +183,7 @@ def _sweep_spec(parsed: argparse.Namespace) -> tuple[SweepSpec, list[str]]:
             latency_ticks=parsed.latency,
             suite_seed=parsed.suite_seed,
             patience_s=parsed.patience,
+            robot=robot,
         ),
         own={name: preset for name, preset in own.items() if preset != params},
     )
@@ -226,8 +227,10 @@ def command_line(spec: SweepSpec) -> str:
         params = spec.setting_of(planner).params
         for name, value in _non_default(params, own_preset(planner, default.params)):
             changes[f"planner.{name}"] = value
+    changes |= {f"robot.{name}": value for name, value in setting.robot.items()}
     for name, value in changes.items():
-        arguments += ["--set", f"{name}={value}"]
+        text = str(value).lower() if isinstance(value, bool) else value
+        arguments += ["--set", f"{name}={text}"]
     return shlex.join(arguments)
 
 

@@ -48,9 +48,15 @@ def with_settings(
 
 def with_robot_settings(robot: Robot, settings: list[str]) -> tuple[Robot, list[str]]:
     """The robot with the robot.NAME=VALUE changes of --set, and the other settings."""
+    changes, others = robot_changes(settings)
+    return override(robot, changes), others
+
+
+def robot_changes(settings: list[str]) -> tuple[dict[str, Any], list[str]]:
+    """The robot.NAME=VALUE changes of --set by name, and the other settings."""
     of_robot = [text for text in settings if text.startswith("robot.")]
     others = [text for text in settings if text not in of_robot]
-    return override(robot, _below("robot", dict(map(_setting, of_robot)))), others
+    return _below("robot", dict(map(_setting, of_robot))), others
 
 
 def option_rows() -> Iterable[tuple[str, Any, Any]]:

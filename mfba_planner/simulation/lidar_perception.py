@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ..core.errors import ConfigError
+from ..core.option_specs import Scalar, override
 from ..core.planner_types import NANO, Observation
 from ..core.robot_base import Drive
 from ..perception.sensory_vector import SensorParams
@@ -48,9 +50,18 @@ OWN_ROBOT = "scenario"
 LIDAR_PERCEPTIONS = (*LIDAR_ROBOTS, OWN_ROBOT)
 
 
-def with_lidar(scenario: Scenario, name: str, noise_m: float = 0.0) -> Scenario:
-    """The same task for the robot of that perception; noise_m deviates ranges further."""
+def with_lidar(
+    scenario: Scenario,
+    name: str,
+    noise_m: float = 0.0,
+    changes: Mapping[str, Scalar] | None = None,
+) -> Scenario:
+    """The same task for the robot of that perception, with changed options of Robot.
+
+    noise_m deviates ranges further. Raises ConfigError for a change that is refused.
+    """
     robot = scenario.robot if name == OWN_ROBOT else LIDAR_ROBOTS[name].robot
+    robot = override(robot, changes or {})
     if not robot.lidar.beams:
         robot = replace(robot, lidar=replace(robot.lidar, beams=DEFAULT_BEAMS))
     if noise_m:

@@ -14,11 +14,12 @@ from waiting import wait_until
 
 from mfba_planner import cli
 from mfba_planner.cli.sweep import command_line
+from mfba_planner.core.errors import ConfigError
 from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.evaluation.suites.named_suites import SPEED_MPS
 from mfba_planner.evaluation.sweep import sweep_chunks as sweep_chunks
 from mfba_planner.evaluation.sweep.run_sweep import sweep
-from mfba_planner.evaluation.sweep.sweep_spec import Setting, SweepSpec
+from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting, SweepSpec
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.read_episode import read_episode
@@ -178,6 +179,21 @@ def test_the_command_line_of_a_report_gives_the_same_sweep() -> None:
     from mfba_planner.cli.sweep import _parser, _sweep_spec
 
     assert _sweep_spec(_parser().parse(words[2:]))[0] == spec
+
+
+def test_the_command_line_names_a_changed_robot() -> None:
+    from mfba_planner.cli.sweep import _parser, _sweep_spec
+
+    args = [
+        "random-3", "--planner", "predictive", "--worlds", "1",
+        "--set", "robot.reverse=false", "--set", "robot.lidar.fov_rad=4.7",
+    ]  # fmt: skip
+    spec = _sweep_spec(_parser().parse(args))[0]
+    assert command_line(spec) == "mfba sweep " + " ".join(args)
+    robot = spec.setting.scenario(Run("random-3", 0, "predictive", 0)).robot
+    assert (robot.reverse, robot.lidar.fov_rad, robot.lidar.beams) == (False, 4.7, 360)
+    with pytest.raises(ConfigError, match="--perception sectors has no robot; give one of lidar"):
+        _sweep_spec(_parser().parse([*args, "--perception", "sectors"]))
 
 
 def test_predictive_has_its_own_step_and_swarm_unless_others_are_given() -> None:

@@ -31,6 +31,28 @@ def suite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+def test_the_robot_of_all_files_is_changed_and_the_rest_of_it_kept(
+    suite: Path, capsys: Capture
+) -> None:
+    lidar = f"{OPEN}robot: {{lidar: {{beams: 90, range_min_m: 0.2}}}}\n"
+    (suite / "1.yaml").write_text(lidar, encoding="utf-8")
+    args = ("sweep", "mine", "--planner", "straight", "--workers", "1", "--no-oracle")
+    change = ("--set", "robot.drive=differential", "--set", "robot.lidar.range_max_m=2.5")
+    assert mfba(*args, *change, "--out", "out") == 0
+    assert "--set robot.lidar.range_max_m=2.5`" in Path("out/report.md").read_text("utf-8")
+    assert mfba("show", "out", "mine/0/straight/0", "--out", "why") == 0
+    robot = read_episode(Path("why/bag")).scenario.robot
+    assert (robot.drive.value, robot.lidar.beams) == ("differential", 90)
+    assert (robot.lidar.range_min_m, robot.lidar.range_max_m) == (0.2, 2.5)
+    capsys.readouterr()
+    refused = ("--set", "robot.lidar.range_max_m=0.15")
+    assert mfba(*args, *refused, "--out", "none") == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "below range_max_m=0.15" in error
+    assert not Path("none").exists()
+
+
 def test_a_directory_is_swept_resumed_and_explained(suite: Path, capsys: Capture) -> None:
     args = ("sweep", "mine", "--planner", "straight", "--workers", "1", "--out", "out")
     assert mfba(*args) == 0

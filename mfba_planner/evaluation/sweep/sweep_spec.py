@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 from ...core.errors import ConfigError
-from ...core.option_specs import did_you_mean, flatten
+from ...core.option_specs import Scalar, did_you_mean, flatten
 from ...core.planner_types import PathPlanner
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
@@ -54,7 +54,8 @@ class Setting:
     perception: a robot of simulation.lidar_perception, or a name of
     simulation.planner_observations.Perception. patience_s is the wall time after which a run
     counts as hung; nothing else in a run depends on a clock. scenarios are the worlds of the
-    user's own suite; None: those of a built-in one.
+    user's own suite; None: those of a built-in one. robot holds changed options of the robot of a
+    lidar's perception, by their names in --set.
     """
 
     params: PlannerParams = field(default_factory=lambda: PlannerParams(speed_mps=SPEED_MPS))
@@ -65,12 +66,18 @@ class Setting:
     suite_seed: int = 0
     patience_s: float = PATIENCE_S
     scenarios: ScenarioSet | None = None
+    robot: Mapping[str, Scalar] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for an invalid value."""
         if self.perception not in PERCEIVED:
             known = did_you_mean(self.perception, list(PERCEPTIONS))
             raise ConfigError(f"perception {self.perception!r}: unknown; {known}")
+        if self.robot and self.perception not in LIDAR_PERCEPTIONS:
+            raise ConfigError(
+                f"--set robot.{next(iter(self.robot))}: --perception {self.perception} has no "
+                f"robot; give one of {', '.join(LIDAR_PERCEPTIONS)}"
+            )
         # Also of lidars: the same limits of noise and latency.
         Perception("sectors", noise_m=self.noise_m, latency_ticks=self.latency_ticks)
         if not 0.0 < self.patience_s <= LONGEST_S:
@@ -89,7 +96,7 @@ class Setting:
         world = self.suite(run.suite).world(run.world, self.params.speed_mps)
         if self.perception not in LIDAR_PERCEPTIONS:
             return world
-        return with_lidar(world, self.perception, self.noise_m)
+        return with_lidar(world, self.perception, self.noise_m, self.robot)
 
     def observer(self, seed: int, *, sectors: bool = True) -> Observe:
         """The perception of a run with this seed; a lidar's always computes the sectors."""
@@ -110,6 +117,7 @@ class Setting:
     def facts(self) -> dict[str, Any]:
         """All values as plain data; of scenarios their digest."""
         plain = {item.name: getattr(self, item.name) for item in fields(self)}
+        plain["robot"] = dict(self.robot)
         plain |= {"params": flatten(self.params), "sensor": flatten(self.sensor)}
         scenarios = plain.pop("scenarios")
         return plain if scenarios is None else {**plain, "scenarios": scenarios.digest()}
@@ -168,6 +176,9 @@ class SweepSpec:
                 f"--seeds={self.seeds}: {self.suite} has {found.distinct} worlds, which --worlds "
                 "repeats with the next seed each time; leave out --seeds"
             )
+        if self.setting.robot:  # what a robot of one of the worlds refuses is said at the door
+            for world in self.world_range if self.setting.scenarios else [self.first]:
+                self.setting.scenario(Run(self.suite, world, "", 0))
         if not self.planners:
             raise ConfigError("--planner: none given; name at least one")
         for k, name in enumerate(self.planners):
