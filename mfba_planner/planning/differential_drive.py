@@ -32,17 +32,25 @@ def track(decision: Decision, base: Base, tick_ns: int) -> Speeds:
     smaller and the base may reverse), d the distance to the goal:
     omega = sgn(e) min(omega_max, brake(|e|)), v = min(|u|, v_max, brake(d)) max(0, 1 - |e|/e_t).
     """
-    ux, uy = decision.velocity
-    wanted = math.sqrt(ux * ux + uy * uy)
-    if wanted == 0.0 or decision.goal is None:
+    if decision.goal is None:
         return Speeds()
-    tick_s, sign = tick_ns * NANO, 1.0
-    error = wrap_angle(bearing((0.0, 0.0), (ux, uy)) - decision.pose.yaw)
+    remaining = distance(decision.pose.position, decision.goal)
+    return heading_law(decision.velocity, remaining, decision.pose.yaw, base, tick_ns * NANO)
+
+
+def heading_law(
+    velocity: Point, remaining_m: float, yaw_rad: float, base: Base, tick_s: float
+) -> Speeds:
+    """track() of a wanted velocity, m/s, with remaining_m left to the goal."""
+    ux, uy = velocity
+    wanted, sign = math.sqrt(ux * ux + uy * uy), 1.0
+    if wanted == 0.0:
+        return Speeds()
+    error = wrap_angle(bearing((0.0, 0.0), velocity) - yaw_rad)
     if base.reverse and abs(error) > 0.5 * math.pi:
         error, sign = wrap_angle(error + math.pi), -1.0
     turn = min(base.max_turn_radps, brake(abs(error), base.max_turn_accel_radps2, tick_s))
-    remaining = distance(decision.pose.position, decision.goal)
-    speed = min(wanted, base.max_speed_mps, brake(remaining, base.max_accel_mps2, tick_s))
+    speed = min(wanted, base.max_speed_mps, brake(remaining_m, base.max_accel_mps2, tick_s))
     share = max(0.0, 1.0 - abs(error) / base.turn_first_rad)
     return Speeds(sign * speed * share, math.copysign(turn, error))
 

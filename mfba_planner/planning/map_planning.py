@@ -17,13 +17,14 @@ from ..perception.static_map import StaticMap, StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import Move
-from .differential_drive import Speeds, brake
+from .differential_drive import Speeds
 from .distance_to_go import RouteParams, is_clear
 from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
 from .map_search import Found, MapSearch
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
+from .stopping_path import clear_velocity
 from .trajectory_cost import RiskParams
 from .turn_delay import TurnDelay
 
@@ -34,6 +35,7 @@ ROOM_M = 0.25
 NEAR_POINTS_M = 1.0  # contact within a tick is ruled out with what stands so near
 _LEAST_M = 0.005  # kept from what stands, beyond the robot's radius
 _SLOW_MPS, _ESTABLISHED_M = 0.5, 0.05
+ENCLOSED = "what stands leaves no way out"
 _STRAIGHT = "the straight way is free"
 
 
@@ -124,7 +126,15 @@ class MapPlanning:
             rollout, position, self._risk, speed, tick_s, delay, observed, last,
             lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
         )  # fmt: skip
-        return self._as_move(obs, found, position, turn, points[away < near_m], circles, tick_s)
+        return self._as_move(
+            obs, found, position, turn, speeds, points[away < near_m], circles, tick_s
+        )
+
+    def path_heading_rad(self, pose: Pose2D) -> float:
+        """Direction of the shortest way in odom, after move() has not returned None."""
+        (x, y), turn = self._in_map(pose.position)
+        ux, uy = self._search.to_go.direction(np.array([x]), np.array([y]))
+        return math.atan2(float(uy[0]), float(ux[0])) - turn
 
     def _swarm(self, center: Point, stamp_ns: int) -> BatSwarm:
         bat = self._params.bat
@@ -157,21 +167,32 @@ class MapPlanning:
             if keep
         ]
 
-    def _braking_share(
-        self, at_rest: ObstaclesAtRest, yaw_rad: float, velocity: Point, tick_s: float
-    ) -> float:
-        """Share of the velocity from which a differential base stops before contact.
-
-        While it brakes it rolls on along its heading.
-        """
-        (ux, uy), held_s = velocity, STOPPING_TICKS * tick_s
-        speed = math.sqrt(ux * ux + uy * uy)
-        hx, hy = math.cos(yaw_rad), math.sin(yaw_rad)
-        if self._params.reverse and hx * ux + hy * uy < 0.0:
-            hx, hy = -hx, -hy
-        far_m = self._stopping_m(tick_s)
-        free_m = far_m * at_rest.allowed_share((far_m * hx, far_m * hy), 1.0)
-        return min(brake(free_m, self._params.max_accel_mps2, held_s) / max(speed, 1e-9), 1.0)
+    def _kept_off(
+        self,
+        velocity: Point,
+        goal_m: float,
+        yaw_rad: float,
+        speeds: Speeds,
+        position: Point,
+        near: np.ndarray,
+        circles: Sequence[Circle],
+        tick_s: float,
+    ) -> tuple[Point, float]:
+        """The velocity by which nothing that stands is touched before the robot can stop."""
+        params = self._params
+        radius = params.robot_radius_m + _LEAST_M
+        standing = [Circle(center_m=(x, y), radius_m=radius) for x, y in near.tolist()]
+        if params.turns:
+            # The end of a wall that comes into view may be taken for something slow.
+            slow = [c for c in circles if math.hypot(*c.velocity_mps) < _SLOW_MPS]
+            standing += [replace(c, velocity_mps=(0.0, 0.0)) for c in slow]
+        at_rest = ObstaclesAtRest(position, [*standing, *circles])
+        if params.turns:
+            return clear_velocity(
+                velocity, goal_m, yaw_rad, speeds, params, tick_s, at_rest.relative
+            )
+        share = at_rest.allowed_share(velocity, STOPPING_TICKS * tick_s)
+        return (share * velocity[0], share * velocity[1]), share
 
     def _stopping_m(self, tick_s: float) -> float:
         """The way on which the base stops from its full speed."""
@@ -200,15 +221,15 @@ class MapPlanning:
         found: Found,
         position: Point,
         turn: float,
+        speeds: Speeds,
         near: np.ndarray,
         circles: Sequence[Circle],
         tick_s: float,
     ) -> Move:
         params = self._params
         if found.cost >= FORBIDDEN_M:
-            reason = "what stands leaves no way out"
             return Move(
-                velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=found.closed,
+                velocity=(0.0, 0.0), reason=ENCLOSED, event=Event.NO_GAP, vs=found.closed,
                 vg=found.closed,
             )  # fmt: skip
         (qx, qy), to_go = found.waypoint, self._search.to_go
@@ -224,23 +245,17 @@ class MapPlanning:
         if speed * tick_s > goal_m:
             scale *= goal_m / (speed * tick_s)
         ux, uy = qx * scale, qy * scale
-        radius = params.robot_radius_m + _LEAST_M
-        standing = [Circle(center_m=(x, y), radius_m=radius) for x, y in near.tolist()]
-        at_rest = ObstaclesAtRest(position, [*standing, *circles])
-        share = at_rest.allowed_share((ux, uy), STOPPING_TICKS * tick_s)
-        if params.turns:
-            share *= self._braking_share(
-                at_rest, obs.pose.yaw + turn, (share * ux, share * uy), tick_s
-            )
-        vx, vy = rotated((ux, uy), -turn)
-        percent = 1e2 * share * math.hypot(ux, uy) / params.speed_mps
+        (ux, uy), share = self._kept_off(
+            (ux, uy), goal_m, obs.pose.yaw + turn, speeds, position, near, circles, tick_s
+        )
+        percent = 1e2 * share * speed / params.speed_mps
         reason = _STRAIGHT
         if not found.free or not to_go.is_straight:
             reason = f"the way through the map is {found.to_go_m:.3g} m"
             if not found.free:
                 reason += f"; costs {found.cost - found.to_go_m:.3g} m more"
         return Move(
-            velocity=(share * vx, share * vy),
+            velocity=rotated((ux, uy), -turn),
             reason=f"{reason}, at {percent:.0f} % speed",
             event=Event.CLEAR if found.free and to_go.is_straight else Event.OBSTACLE,
             vs=found.closed,

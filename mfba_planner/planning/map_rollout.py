@@ -29,6 +29,7 @@ CLOSE_M = 1.0  # cost of a pass beside what stands without clearance
 FORBIDDEN_M = 1000.0  # cost of a contact before the waypoint with what stands
 CARROT_M = 0.4  # a differential base aims so far ahead along the shortest way
 SLOW_ROOM_M, SLOWEST = 0.15, 0.4  # room below which a differential base slows down, and to what
+FINE_STEPS, COARSE_TICKS = 12, 2  # of a differential base: steps of one tick, then of two
 _REACHED_M = 0.1
 _ROUNDING = 1.0 - 1e-9
 _LONGEST = 2.0  # horizons, waiting and turning included
@@ -36,11 +37,11 @@ _LONGEST = 2.0  # horizons, waiting and turning included
 
 @dataclass(frozen=True, slots=True)
 class Paths:
-    """Positions (m, t + 1), time and driving time (t + 1,) or (m, t + 1), steps to waypoints."""
+    """Positions (m, t + 1), duration of the steps (t,), driving time and steps to waypoints."""
 
     x: Array
     y: Array
-    step_s: float
+    step_s: Array
     driven_s: Array  # (m, t + 1)
     arrived: Array  # (m,) number of the step that ends at the waypoint
 
@@ -131,7 +132,7 @@ class MapRollout:
                 arrived[reached] = k + 1
                 on_first &= ~reached
                 any_first, any_second = bool(on_first.any()), not on_first.all()
-        return Paths(xs, ys, h, driven, arrived)
+        return Paths(xs, ys, np.full(steps, h), driven, arrived)
 
     def _straight(self, qx: Array, qy: Array, t1: Array) -> Paths:
         """The straight lines to the waypoints alone."""
@@ -141,15 +142,19 @@ class MapRollout:
         share = np.linspace(0.0, 1.0, steps + 1)
         (px, py), driven = self._position, length[:, None] * share / self._full
         x, y = px + qx[:, None] * share, py + qy[:, None] * share
-        return Paths(x, y, self._tick_s, driven, np.full(qx.size, steps))
+        step_s = np.full(steps, self._tick_s)
+        return Paths(x, y, step_s, driven, np.full(qx.size, steps))
 
     def _turning(self, qx: Array, qy: Array, t1: Array, horizon_s: float) -> Paths:
         base, full, (px, py) = self._base, self._full, self._position
         accel, alpha = base.max_accel_mps2, base.max_turn_accel_radps2
         fastest, first_rad = base.max_turn_radps, base.turn_first_rad
-        h = self._tick_s
+        held_s = self._tick_s  # a command's
         m = qx.size
-        steps = math.ceil(_LONGEST * horizon_s / h)
+        left = max(math.ceil(_LONGEST * horizon_s / held_s) - FINE_STEPS, 0)
+        coarse = [COARSE_TICKS * held_s] * math.ceil(left / COARSE_TICKS)
+        step_s = np.array([held_s] * FINE_STEPS + coarse)
+        steps, t = step_s.size, 0.0
         xs, ys = np.empty((m, steps + 1)), np.empty((m, steps + 1))
         driven = np.zeros((m, steps + 1))
         x, y, yaw = np.full(m, px), np.full(m, py), np.full(m, self._yaw)
@@ -162,16 +167,18 @@ class MapRollout:
         gx, gy = self._to_go.goal
         arrived = np.full(m, steps)
         on_first = np.ones(m, dtype=bool)
-        most, most_turn = accel * h, alpha * h
+        fastest_mps = max(full, abs(self._speeds.v))
+        braking_m = fastest_mps * (held_s + 0.5 * fastest_mps / accel)
+        farthest_m = fastest_mps * float(step_s.sum()) + braking_m
+        near_goal = (gx - px) ** 2 + (gy - py) ** 2 < farthest_m * farthest_m
         xs[:, 0], ys[:, 0] = x, y
-        for k in range(steps):
+        for k, h in enumerate(step_s.tolist()):
+            most, most_turn = accel * h, alpha * h
             dx, dy = qx - x, qy - y
-            if not on_first.all():
+            if not self.alone and not on_first.all():
                 ax, ay = self._to_go.direction(x, y)
                 dx = np.where(on_first, dx, CARROT_M * ax)
                 dy = np.where(on_first, dy, CARROT_M * ay)
-            goal_x, goal_y = gx - x, gy - y
-            goal_m = np.sqrt(goal_x * goal_x + goal_y * goal_y)
             error = np.arctan2(dy, dx) - yaw
             error = np.remainder(error + math.pi, 2.0 * math.pi) - math.pi
             back = np.abs(error) > 0.5 * math.pi if base.reverse else None
@@ -181,12 +188,15 @@ class MapRollout:
             else:
                 back = None
             off = np.abs(error)
-            turn = np.copysign(np.minimum(_brake(off, alpha, h), fastest), error)
+            turn = np.copysign(np.minimum(_brake(off, alpha, held_s), fastest), error)
             room = self._clearance.at(x, y) - self._radius_m
             wanted = full * np.minimum(np.maximum(room / SLOW_ROOM_M, SLOWEST), 1.0)
-            if any_waits and k * h < longest_wait_s:
-                wanted = np.where(waits & (k * h < t1), waiting_mps, wanted)
-            wanted = np.minimum(wanted, _brake(goal_m, accel, h))
+            if any_waits and t < longest_wait_s:
+                wanted = np.where(waits & (t < t1), waiting_mps, wanted)
+            if near_goal:
+                goal_x, goal_y = gx - x, gy - y
+                goal_m = np.sqrt(goal_x * goal_x + goal_y * goal_y)
+                wanted = np.minimum(wanted, _brake(goal_m, accel, held_s))
             wanted = wanted * np.maximum(1.0 - off / first_rad, 0.0)
             if back is not None:
                 wanted = np.where(back, -wanted, wanted)
@@ -207,20 +217,25 @@ class MapRollout:
             )
             xs[:, k + 1], ys[:, k + 1] = x, y
             driven[:, k + 1] = driven[:, k] + np.abs(mean) * h / full
+            t += h
             if on_first.any():
                 reach = np.maximum(_REACHED_M, np.abs(v) * h)
                 dx, dy = qx - x, qy - y
                 ended = dx * dx + dy * dy < reach * reach
                 if any_waits:
-                    ended = np.where(waits, (k + 1) * h >= t1, ended)
+                    ended = np.where(waits, t >= t1, ended)
                 reached = on_first & ended
                 arrived[reached] = k + 1
                 on_first &= ~reached
             if not on_first.any() if self.alone else float(driven[:, k + 1].min()) >= horizon_s:
                 steps = k + 1
                 break
-        arrived = np.minimum(arrived, steps)
-        return Paths(xs[:, : steps + 1], ys[:, : steps + 1], h, driven[:, : steps + 1], arrived)
+        arrived, n = np.minimum(arrived, steps), steps + 1
+        xs, ys, driven = xs[:, :n], ys[:, :n], driven[:, :n]
+        if self.alone:  # beyond its waypoint a path does not count, however long the others are
+            ends = np.minimum(np.arange(n), arrived[:, None])
+            xs, ys, driven = (np.take_along_axis(a, ends, axis=1) for a in (xs, ys, driven))
+        return Paths(xs, ys, step_s[:steps], driven, arrived)
 
     def standing_risk(self, paths: Paths, risk: RiskParams, margin_m: float) -> Array:
         """Risk (m,) of what stands; FORBIDDEN_M more for a contact before the waypoint."""
@@ -255,7 +270,7 @@ class MapRollout:
         rows = np.concatenate((self._circles, np.array(around)), axis=1)
         cx, cy, vx, vy, r, margin, close = rows.T[:, :, None, None]
         h, tau = paths.step_s, risk.horizon_s
-        t = np.arange(paths.x.shape[1] - 1) * h
+        t = np.cumsum(h) - h
         x = cx + vx * t - paths.x[:, :-1]
         y = cy + vy * t - paths.y[:, :-1]
         wx = vx - (paths.x[:, 1:] - paths.x[:, :-1]) / h

@@ -26,7 +26,7 @@ LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of waypoints, in reach_m
 WAITS_S = (0.4, 1.0, 2.0)
 SPEEDS = (1e-6, 0.5)
 LEAST_SHARE = 0.5  # of the speed, where nothing moves
-BATCH = 40  # candidates evaluated at once
+BATCH, GROWTH = 40, 3  # candidates evaluated at once; more if the first do not suffice
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
 WINDOW_M = 6.5  # side of the square in which clearances are known
 _STEP_M = 0.1
@@ -107,8 +107,10 @@ class MapSearch:
         lower = np.sqrt(qx * qx + qy * qy) + to_go.at(qx + px, qy + py)
         lower += risk.waiting * (speed_mps * t - np.sqrt(qx * qx + qy * qy))
         order = np.argsort(lower, kind="stable")
-        for start in range(0, order.size, BATCH):
-            batch = order[start : start + BATCH]
+        start, size = 0, BATCH
+        while start < order.size:
+            batch = order[start : start + size]
+            start, size = start + size, GROWTH * size
             if lower[batch[0]] >= best_cost:
                 break
             cost, _ = evaluate(qx[batch], qy[batch], t[batch])

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.geometry import Point, distance
+from ..core.geometry import Point, bearing, distance
 from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory
@@ -22,7 +22,7 @@ from ..swarm.search_region import Disc
 from .base_planner import BasePlanner, Move
 from .differential_drive import Speeds, apply_command, command
 from .drive_rollout import DriveRollout
-from .map_planning import MapPlanning
+from .map_planning import ENCLOSED, MapPlanning
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
@@ -34,6 +34,7 @@ from .trajectory_cost import (
     circles_from_sectors,
     predicted_circles,
 )
+from .turn_to_observe import turn_to_observe
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
 WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
@@ -98,6 +99,20 @@ class Predictive(BasePlanner):
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """Choose waypoint and speed, and never touch what stands before the robot can stop."""
+        move = self._move(obs, goal)
+        if self._unobserved is None or not self.params.turns:
+            return move
+        if move.reason == ENCLOSED:
+            wanted_rad = self._map_planning.path_heading_rad(obs.pose)
+        elif move.reason == UNOBSERVED:
+            wanted_rad = bearing(obs.pose.position, goal)
+        else:
+            return move
+        return turn_to_observe(
+            move, self._unobserved, wanted_rad, obs.pose.yaw, self._speeds, self.params
+        )
+
+    def _move(self, obs: Observation, goal: Point) -> Move:
         position = obs.pose.position
         last_waypoint, self._waypoint = self._waypoint, None
         self._perceived = circles = self._circles(obs)
