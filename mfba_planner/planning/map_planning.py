@@ -58,7 +58,7 @@ class MapPlanning:
         self._risk = risk.for_turning() if params.turns else risk
         self._search_m = search_m
         self.map = StaticMap(map_params)
-        self._search = MapSearch(route, params.robot_radius_m, headings, reach_m)
+        self.search = MapSearch(route, params.robot_radius_m, headings, reach_m)
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
 
@@ -87,7 +87,7 @@ class MapPlanning:
         if not known.count:
             return None
         position, turn = self._in_map(obs.pose.position)
-        to_go = self._search.to_go
+        to_go = self.search.to_go
         to_go.update(obs.pose_ns, known, position, self._in_map(goal)[0])
         if to_go.closed_by:
             return Move(
@@ -106,7 +106,7 @@ class MapPlanning:
                 return None
         points = known.present_points()
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
-        clearance = self._search.clearance(known, position, obs.pose_ns)
+        clearance = self.search.clearance(known, position, obs.pose_ns)
         circles = self._not_in_map(circles, position)
         speed = params.speed_mps
         rollout = MapRollout(
@@ -122,7 +122,7 @@ class MapPlanning:
             delay = TurnDelay(params, obs.pose.yaw + turn, speeds.omega)
         near_m = max(NEAR_POINTS_M, params.robot_radius_m + _LEAST_M + self._stopping_m(tick_s))
         observed = None if unobserved is None else ~unobserved
-        found = self._search.search(
+        found = self.search.search(
             rollout, position, self._risk, speed, tick_s, delay, observed, last,
             lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
         )  # fmt: skip
@@ -133,7 +133,7 @@ class MapPlanning:
     def path_heading_rad(self, pose: Pose2D) -> float:
         """Direction of the shortest way in odom, after move() has not returned None."""
         (x, y), turn = self._in_map(pose.position)
-        ux, uy = self._search.to_go.direction(np.array([x]), np.array([y]))
+        ux, uy = self.search.to_go.direction(np.array([x]), np.array([y]))
         return math.atan2(float(uy[0]), float(ux[0])) - turn
 
     def _swarm(self, center: Point, stamp_ns: int) -> BatSwarm:
@@ -232,11 +232,11 @@ class MapPlanning:
                 velocity=(0.0, 0.0), reason=ENCLOSED, event=Event.NO_GAP, vs=found.closed,
                 vg=found.closed,
             )  # fmt: skip
-        (qx, qy), to_go = found.waypoint, self._search.to_go
+        (qx, qy), to_go = found.waypoint, self.search.to_go
         length = math.sqrt(qx * qx + qy * qy)
         scale = 1.0 / max(found.t1, length / params.speed_mps)
         if params.turns:
-            clearance = self._search.clearance(self.map, position, obs.pose_ns)
+            clearance = self.search.clearance(self.map, position, obs.pose_ns)
             room = float(clearance.at(np.array([position[0]]), np.array([position[1]]))[0])
             room -= params.robot_radius_m
             scale *= min(max(room / SLOW_ROOM_M, SLOWEST), 1.0)

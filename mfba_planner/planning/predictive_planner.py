@@ -70,6 +70,7 @@ class Predictive(BasePlanner):
 
     reads_sectors = False
     has_bats = True
+    has_map = True
     preset = staticmethod(preset)
     _perceived: Sequence[Circle] = ()
     _by_sectors = True
@@ -118,7 +119,7 @@ class Predictive(BasePlanner):
         self._perceived = circles = self._circles(obs)
         self._by_sectors = obs.circles is None and obs.scan is None
         self._unobserved = None if obs.scan is None else self._coverage.unsafe(obs.pose_ns)
-        if obs.scan is not None and obs.circles is None:
+        if obs.scan is not None and obs.circles is None and self.has_map:
             among = self._map_planning.move(
                 obs,
                 goal,

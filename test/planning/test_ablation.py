@@ -2,6 +2,7 @@
 """Ablations of the predictive planner: each lacks the named component, and arrives."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -9,13 +10,16 @@ import pytest
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.planner_types import Circle, Mode, Observation
 from mfba_planner.evaluation.metrics import evaluate
+from mfba_planner.evaluation.suites.scenario_suite import single_scenario
 from mfba_planner.evaluation.sweep.single_run import run_one
-from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting
+from mfba_planner.evaluation.sweep.sweep_spec import Run, Setting, default_setting
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.peers import ablation
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive_planner import Predictive, preset
 from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.obstacle_motion import Obstacle
+from mfba_planner.simulation.scenario import Scenario
 
 SETTING = Setting(params=preset(PlannerParams(speed_mps=0.8)))
 NAMES = (
@@ -122,3 +126,40 @@ def test_without_memory_a_circle_out_of_range_is_ignored() -> None:
         velocities[make] = decision.velocity
     assert velocities[ablation.no_memory] == pytest.approx((0.8, 0.0))
     assert velocities[Predictive] != pytest.approx((0.8, 0.0), abs=0.01)
+
+
+U = ((1.5, 0.9, 3.0, 0.9), (3.0, 0.9, 3.0, -0.9), (3.0, -0.9, 1.5, -0.9))
+PERSON = Obstacle(center_m=(4.0, 0.0), radius_m=0.3, speed_mps=1.0, heading_rad=math.pi)
+
+
+def driven(name: str, **world: Any) -> Any:
+    """The result in a world, from a lidar."""
+    scenario = Scenario(
+        name="one", start_m=(0.0, 0.0), goal_m=(5.0, 0.0), time_limit_s=20.0, **world
+    )
+    scenarios = single_scenario(scenario)
+    setting = replace(default_setting(scenarios.name, scenarios), params=SETTING.params)
+    planner = name if name == "predictive" else f"{ablation.__name__}:{name}"
+    outcome = run_one(Run(scenarios.name, 0, planner, 0), setting)
+    assert outcome.fault == ""
+    return evaluate(outcome.episode)
+
+
+@pytest.mark.parametrize("name", ["predictive", "NoBats", "NoTracker"])
+def test_a_dead_end_takes_map_and_distance_to_go(name: str) -> None:
+    assert driven(name, segments_m=U).success
+
+
+@pytest.mark.parametrize("name", ["NoMap", "NoDistanceToGo"])
+def test_a_dead_end_holds_what_lacks_map_or_distance_to_go(name: str) -> None:
+    result = driven(name, segments_m=U)
+    assert not result.success
+    assert result.collisions == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "evades"),
+    [("predictive", True), ("NoMap", True), ("NoDistanceToGo", True), ("NoTracker", False)],
+)
+def test_a_person_is_evaded_by_what_tracks(name: str, evades: bool) -> None:
+    assert driven(name, obstacles=(PERSON,)).success == evades

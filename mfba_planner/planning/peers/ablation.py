@@ -9,11 +9,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
 from ...core.geometry import Point, wrap_angle
 from ...core.planner_types import NANO, Circle, Observation
 from ...perception.obstacle_memory import ObstacleMemoryParams
+from ...perception.obstacle_tracker import Tracker
 from ...perception.sensory_vector import SensorParams
+from ...perception.static_map import StaticMap
 from ..base_planner import Move
+from ..distance_to_go import DistanceToGo
 from ..mode_transitions import Event
 from ..planner_params import PlannerParams
 from ..predictive_planner import Predictive, PredictiveParams
@@ -103,3 +108,41 @@ class NoVelocities(Predictive):
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
         return [replace(circle, velocity_mps=(0.0, 0.0)) for circle in super()._circles(obs)]
+
+
+class NoMap(Predictive):
+    """From a scan: tracked circles alone, without a map of what stands."""
+
+    has_map = False
+
+
+class NoDistanceToGo(Predictive):
+    """The map, but in eq. 1 the straight line to the goal whatever stands on it."""
+
+    def forget(self) -> None:
+        """As Predictive."""
+        super().forget()
+        search = self._map_planning.search
+        search.to_go = _StraightToGo(self.options.route, self.params.robot_radius_m)
+
+
+class _StraightToGo(DistanceToGo):
+    def update(self, stamp_ns: int, known: StaticMap, position: Point, goal: Point) -> None:
+        self.goal = goal
+
+
+class NoTracker(Predictive):
+    """The map alone: what moves is kept out of it, and otherwise unknown."""
+
+    def forget(self) -> None:
+        """As Predictive."""
+        super().forget()
+        self._tracker = _NothingTracked(self.options.tracking)
+
+
+class _NothingTracked(Tracker):
+    def circles(self, now_ns: int, robot_radius_m: float) -> tuple[Circle, ...]:
+        return ()
+
+    def moving(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.empty((0, 5)), np.empty(0, dtype=bool)
