@@ -183,7 +183,7 @@ def _sweep_spec(parsed: argparse.Namespace) -> tuple[SweepSpec, list[str]]:
             latency_ticks=parsed.latency,
             suite_seed=parsed.suite_seed,
             patience_s=parsed.patience,
-            robot=robot,
+            robot=tuple(robot.items()),
         ),
         own={name: preset for name, preset in own.items() if preset != params},
     )
@@ -227,7 +227,7 @@ def command_line(spec: SweepSpec) -> str:
         params = spec.setting_of(planner).params
         for name, value in _non_default(params, own_preset(planner, default.params)):
             changes[f"planner.{name}"] = value
-    changes |= {f"robot.{name}": value for name, value in setting.robot.items()}
+    changes |= {f"robot.{name}": value for name, value in setting.robot}
     for name, value in changes.items():
         text = str(value).lower() if isinstance(value, bool) else value
         arguments += ["--set", f"{name}={text}"]

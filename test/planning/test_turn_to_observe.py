@@ -54,7 +54,7 @@ def test_a_goal_behind_the_robot_is_reached(reverse: bool) -> None:
 
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize("radius_m", [0.22, 0.3])
-def test_the_way_out_of_a_narrow_pocket_is_behind(reverse: bool, radius_m: float) -> None:
+def test_a_narrow_pocket_is_left_backwards(reverse: bool, radius_m: float) -> None:
     episode = driven(Drive.DIFFERENTIAL, reverse, radius_m, 3.0, segments_m=POCKET)
     assert evaluate(episode).success
     if not reverse:

@@ -53,6 +53,7 @@ def _spec(facts: dict[str, Any]) -> SweepSpec:
     setting = dict(facts["setting"])
     params = override(PlannerParams(), setting.pop("params"))
     sensor = override(SensorParams(), setting.pop("sensor"))
+    setting["robot"] = tuple(setting["robot"].items())
     scenarios = from_facts(facts["scenarios"]) if "scenarios" in facts else None
     return SweepSpec(
         suite=facts["suite"],

@@ -55,7 +55,7 @@ class Setting:
     simulation.planner_observations.Perception. patience_s is the wall time after which a run
     counts as hung; nothing else in a run depends on a clock. scenarios are the worlds of the
     user's own suite; None: those of a built-in one. robot holds changed options of the robot of a
-    lidar's perception, by their names in --set.
+    lidar's perception: names as in --set, and values.
     """
 
     params: PlannerParams = field(default_factory=lambda: PlannerParams(speed_mps=SPEED_MPS))
@@ -66,7 +66,7 @@ class Setting:
     suite_seed: int = 0
     patience_s: float = PATIENCE_S
     scenarios: ScenarioSet | None = None
-    robot: Mapping[str, Scalar] = field(default_factory=dict)
+    robot: tuple[tuple[str, Scalar], ...] = ()
 
     def __post_init__(self) -> None:
         """Raise ConfigError for an invalid value."""
@@ -75,7 +75,7 @@ class Setting:
             raise ConfigError(f"perception {self.perception!r}: unknown; {known}")
         if self.robot and self.perception not in LIDAR_PERCEPTIONS:
             raise ConfigError(
-                f"--set robot.{next(iter(self.robot))}: --perception {self.perception} has no "
+                f"--set robot.{self.robot[0][0]}: --perception {self.perception} has no "
                 f"robot; give one of {', '.join(LIDAR_PERCEPTIONS)}"
             )
         # Also of lidars: the same limits of noise and latency.
@@ -96,7 +96,7 @@ class Setting:
         world = self.suite(run.suite).world(run.world, self.params.speed_mps)
         if self.perception not in LIDAR_PERCEPTIONS:
             return world
-        return with_lidar(world, self.perception, self.noise_m, self.robot)
+        return with_lidar(world, self.perception, self.noise_m, dict(self.robot))
 
     def observer(self, seed: int, *, sectors: bool = True) -> Observe:
         """The perception of a run with this seed; a lidar's always computes the sectors."""
