@@ -68,8 +68,7 @@ def outline_of(
     )
     nearest = np.full(groups, np.inf)
     np.minimum.at(nearest, group, np.minimum.reduceat(found.range_m, found.first))
-    origin = places[:, :groups] + places[:, groups:]
-    origin *= 0.5
+    origin = 0.5 * (places[:, :groups] + places[:, groups:])
     whole = sure[:groups] & sure[groups:]
     outermost, time_s = found.xy.take(ends, axis=1), beams.time_s.take(beam)
     dx, dy = outermost[:, groups:] - outermost[:, :groups]

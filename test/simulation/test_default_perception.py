@@ -13,6 +13,7 @@ from mfba_planner.planning.planner_params import Method, PerceptionInput, Planne
 from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.scenarios.run_config import with_perception
 from mfba_planner.scenarios.scenario_files import load_scenario
+from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.robot_model import Lidar, Robot
@@ -69,3 +70,25 @@ def test_a_lidar_is_kept_as_it_is() -> None:
     scenario = replace(load_scenario("case1"), robot=robot)
     assert with_perception(scenario, PREDICTIVE)[0] == scenario
     assert with_perception(scenario, PlannerParams())[0] == scenario
+
+
+@pytest.mark.parametrize("drive", Drive)
+def test_whole_numbers_are_numbers(drive: Drive) -> None:
+    """A scenario written in Python with integers: the same decisions as with floats."""
+    digests = []
+    for number in (int, float):
+        scenario = Scenario(
+            name="whole",
+            start_m=(number(0), number(0)),
+            goal_m=(number(5), number(0)),
+            obstacles=(
+                Obstacle(center_m=(number(2), number(0)), radius_m=number(1)),
+                Obstacle(center_m=(number(3), number(2)), radius_m=number(1), speed_mps=number(1)),
+            ),
+            segments_m=((number(1), number(-2), number(4), number(-2)),),
+            robot=Robot(drive=drive, lidar=Lidar(beams=360)),
+        )
+        params = replace(PREDICTIVE, speed_mps=number(1))
+        episode = simulate(scenario, planner=params, sensor=SensorParams(), seed=0)
+        digests.append(digest(episode.ticks))
+    assert digests[0] == digests[1]
