@@ -30,6 +30,7 @@ from .sector_ring import Ring, ring_of
 from .view_bounds import View
 
 Z_SECTOR, Z_TRACK, Z_OBSTACLE, Z_RING, Z_PATH, Z_MARK = (2.0 + 0.1 * i for i in range(6))
+MOST_NUMBERS = 40  # of obstacles; more would cover the picture
 _LONG = 0.75  # times (width + height of the view): longer tracks would cover the picture
 _ARROW_M = 1e-3  # length of track before an arrow's tip that gives its direction
 _ARROW_TRIES = 400  # positions tried for an arrow, from the end of the track backwards
@@ -197,7 +198,10 @@ def draw_ends(ax: Axes, episode: Episode, start: style.Looks = style.START) -> N
 
 
 def label_numbers(ax: Axes, episode: Episode, view: View, passes: Sequence[Pass]) -> None:
-    """Write each visible obstacle's number into its circle, or at a free position beside it."""
+    """Write each visible obstacle's number into its circle, or at a free position beside it.
+
+    Of more than MOST_NUMBERS obstacles only the nearest passes get one, where there is room.
+    """
     points_per_m = ax.bbox.width / ax.figure.dpi * 72.0 / view.width
     size = 1.35 * style.SMALL / points_per_m  # of a number, in metres
     bodies = [(p.center_m, episode.scenario.obstacles[p.number - 1].radius_m) for p in passes]
@@ -207,7 +211,10 @@ def label_numbers(ax: Axes, episode: Episode, view: View, passes: Sequence[Pass]
         apart = all(distance(spot, other) > size for other in taken)
         return apart and all(distance(spot, c) > r + 0.3 * size for c, r in bodies if c != own)
 
-    for moment, (center, radius) in zip(passes, bodies):
+    crowded = len(passes) > MOST_NUMBERS
+    nearest = sorted(passes, key=lambda p: p.gap_m)[:MOST_NUMBERS] if crowded else passes
+    for moment in nearest:
+        center, radius = bodies[passes.index(moment)]
         if not view.holds(center):
             continue
         reach = max(radius, 0.3 * size) + 0.6 * size
@@ -218,7 +225,10 @@ def label_numbers(ax: Axes, episode: Episode, view: View, passes: Sequence[Pass]
             for turn in range(1, 9)
         ]
         spots = [spot for spot in spots if view.holds(spot, -0.5 * size)] or spots
-        spot = next((spot for spot in spots if is_free(spot, center)), spots[0])
+        found = next((spot for spot in spots if is_free(spot, center)), None)
+        if found is None and crowded:
+            continue
+        spot = found or spots[0]
         taken.append(spot)
         text = ax.text(*spot, str(moment.number), zorder=Z_MARK, **style.NUMBER)
         text.set_gid(f"number:{moment.number}")

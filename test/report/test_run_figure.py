@@ -407,6 +407,20 @@ def test_no_text_is_cut_and_none_overlap(episode: Episode, figure: Figure) -> No
         assert not first.padded(-1).overlaps(second.padded(-1)), (a, b)
 
 
+def test_of_hundreds_of_obstacles_the_nearest_have_a_number() -> None:
+    posts = tuple(_still(0.5 + 0.2 * (k % 50), 0.8 + 0.2 * (k // 50), 0.08) for k in range(200))
+    episode = run(
+        Scenario(name="posts", start_m=(0.0, 0.0), goal_m=(10.0, 0.0), obstacles=posts),
+        planner=PlannerParams(speed_mps=1.0),
+    )
+    drawn = artists(draw(episode), "number")
+    nearest = sorted(closest_passes(episode), key=lambda p: p.gap_m)[:40]
+    assert 5 < len(drawn) <= 40
+    assert {int(text.get_text()) for text in drawn} <= {p.number for p in nearest}
+    places = [text.get_position() for text in drawn]
+    assert min(math.dist(a, b) for a, b in combinations(places, 2)) > 0.1
+
+
 def test_a_metre_is_as_long_along_both_axes(episode: Episode, figure: Figure) -> None:
     ax = figure.axes[0]
     (x0, y0), (x1, y1) = ax.transData.transform([(0.0, 0.0), (1.0, 1.0)])
