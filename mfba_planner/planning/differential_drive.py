@@ -43,16 +43,22 @@ def heading_law(
 ) -> Speeds:
     """track() of a wanted velocity, m/s, with remaining_m left to the goal."""
     ux, uy = velocity
-    wanted, sign = math.sqrt(ux * ux + uy * uy), 1.0
+    wanted = math.sqrt(ux * ux + uy * uy)
     if wanted == 0.0:
         return Speeds()
-    error = wrap_angle(bearing((0.0, 0.0), velocity) - yaw_rad)
-    if base.reverse and abs(error) > 0.5 * math.pi:
-        error, sign = wrap_angle(error + math.pi), -1.0
+    error, sign = heading_error(velocity, yaw_rad, base)
     turn = min(base.max_turn_radps, brake(abs(error), base.max_turn_accel_radps2, tick_s))
     speed = min(wanted, base.max_speed_mps, brake(remaining_m, base.max_accel_mps2, tick_s))
     share = max(0.0, 1.0 - abs(error) / base.turn_first_rad)
     return Speeds(sign * speed * share, math.copysign(turn, error))
+
+
+def heading_error(velocity: Point, yaw_rad: float, base: Base) -> tuple[float, float]:
+    """Angle by which the base turns to drive at a velocity; 1 for forwards, -1 for backwards."""
+    error = wrap_angle(bearing((0.0, 0.0), velocity) - yaw_rad)
+    if base.reverse and abs(error) > 0.5 * math.pi:
+        return wrap_angle(error + math.pi), -1.0
+    return error, 1.0
 
 
 def brake(remaining: float, deceleration: float, held_s: float) -> float:

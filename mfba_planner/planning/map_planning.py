@@ -181,16 +181,15 @@ class MapPlanning:
         """The velocity by which nothing that stands is touched before the robot can stop."""
         params = self._params
         radius = params.robot_radius_m + _LEAST_M
-        standing = [Circle(center_m=(x, y), radius_m=radius) for x, y in near.tolist()]
         if params.turns:
             # The end of a wall that comes into view may be taken for something slow.
             slow = [c for c in circles if math.hypot(*c.velocity_mps) < _SLOW_MPS]
-            standing += [replace(c, velocity_mps=(0.0, 0.0)) for c in slow]
-        at_rest = ObstaclesAtRest(position, [*standing, *circles])
-        if params.turns:
-            return clear_velocity(
-                velocity, goal_m, yaw_rad, speeds, params, tick_s, at_rest.relative
-            )
+            rows = [(x, y, radius) for x, y in near.tolist()]
+            rows += [(*c.center_m, c.radius_m) for c in slow]
+            standing = np.array(rows).reshape(-1, 3) - (*position, 0.0)
+            return clear_velocity(velocity, goal_m, yaw_rad, speeds, params, tick_s, standing)
+        points = [Circle(center_m=(x, y), radius_m=radius) for x, y in near.tolist()]
+        at_rest = ObstaclesAtRest(position, [*points, *circles])
         share = at_rest.allowed_share(velocity, STOPPING_TICKS * tick_s)
         return (share * velocity[0], share * velocity[1]), share
 

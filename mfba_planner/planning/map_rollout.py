@@ -20,6 +20,7 @@ from ..core.robot_base import Base
 from ..perception.distance_field import DistanceField
 from .differential_drive import Speeds
 from .distance_to_go import DistanceToGo
+from .drive_rollout import COARSE_TICKS, LONGEST, REACHED_M
 from .trajectory_cost import SLOW, RiskParams
 
 Array = np.ndarray
@@ -29,10 +30,8 @@ CLOSE_M = 1.0  # cost of a pass beside what stands without clearance
 FORBIDDEN_M = 1000.0  # cost of a contact before the waypoint with what stands
 CARROT_M = 0.4  # a differential base aims so far ahead along the shortest way
 SLOW_ROOM_M, SLOWEST = 0.15, 0.4  # room below which a differential base slows down, and to what
-FINE_STEPS, COARSE_TICKS = 12, 2  # of a differential base: steps of one tick, then of two
-_REACHED_M = 0.1
+FINE_STEPS = 12  # of a differential base, of one tick; then come those of COARSE_TICKS
 _ROUNDING = 1.0 - 1e-9
-_LONGEST = 2.0  # horizons, waiting and turning included
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +98,7 @@ class MapRollout:
         longest = math.ceil(
             (horizon_s + float((t1 - np.sqrt(qx * qx + qy * qy) / full).max())) / h
         )
-        steps = min(max(steps, longest), math.ceil(_LONGEST * horizon_s / h))
+        steps = min(max(steps, longest), math.ceil(LONGEST * horizon_s / h))
         xs, ys = np.empty((m, steps + 1)), np.empty((m, steps + 1))
         driven = np.zeros((m, steps + 1))
         x, y = np.full(m, px), np.full(m, py)
@@ -151,7 +150,7 @@ class MapRollout:
         fastest, first_rad = base.max_turn_radps, base.turn_first_rad
         held_s = self._tick_s  # a command's
         m = qx.size
-        left = max(math.ceil(_LONGEST * horizon_s / held_s) - FINE_STEPS, 0)
+        left = max(math.ceil(LONGEST * horizon_s / held_s) - FINE_STEPS, 0)
         coarse = [COARSE_TICKS * held_s] * math.ceil(left / COARSE_TICKS)
         step_s = np.array([held_s] * FINE_STEPS + coarse)
         steps, t = step_s.size, 0.0
@@ -219,7 +218,7 @@ class MapRollout:
             driven[:, k + 1] = driven[:, k] + np.abs(mean) * h / full
             t += h
             if on_first.any():
-                reach = np.maximum(_REACHED_M, np.abs(v) * h)
+                reach = np.maximum(REACHED_M, np.abs(v) * h)
                 dx, dy = qx - x, qy - y
                 ended = dx * dx + dy * dy < reach * reach
                 if any_waits:

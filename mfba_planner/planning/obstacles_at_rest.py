@@ -34,11 +34,6 @@ class ObstaclesAtRest:
         self.circles = [circle for circle in circles if is_at_rest(circle)]
         self._rows = [(c.center_m[0] - px, c.center_m[1] - py, c.radius_m) for c in self.circles]
 
-    @property
-    def relative(self) -> np.ndarray:
-        """Rows (x, y, r): centres relative to the robot, m, and radii; (n, 3)."""
-        return np.array(self._rows).reshape(-1, 3)
-
     def misplaced(self) -> str:
         """The reason to stop for a return that no obstacle can have caused, "" without any.
 

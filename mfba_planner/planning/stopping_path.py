@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 
-from ..core.geometry import Point, Pose2D, rotated, wrap_angle
+from ..core.geometry import Point, Pose2D, rotated
 from ..core.planner_types import NANO
 from ..core.robot_base import Base
-from .differential_drive import Speeds, apply_command, heading_law
+from .differential_drive import Speeds, apply_command, heading_error, heading_law
 from .obstacles_at_rest import STOPPING_TICKS
 
-SHARES = (1.0, 0.7, 0.4, 0.2)  # of a velocity
+SHARES = (1.0, 0.7, 0.4, 0.2)  # of a velocity, the last also sideways
 SIDEWAYS_RAD = (0.15, -0.15, 0.3, -0.3, 0.6, -0.6)  # past something that is grazed
 ALIGNED_RAD = math.radians(3.0)  # so near to the velocity's heading, turning does not help
 CREEP_MPS = 0.005  # the heading law turns towards a velocity, which is not 0
@@ -63,28 +63,19 @@ def clear_velocity(
         away = np.sqrt((path[:, :1] - x) ** 2 + (path[:, 1:] - y) ** 2)
         return bool((away >= limit).all())
 
-    slowest = (SHARES[-1] * velocity[0], SHARES[-1] * velocity[1])
-    sideways = [rotated(slowest, angle) for angle in SIDEWAYS_RAD]
     for share in SHARES:
         scaled = (share * velocity[0], share * velocity[1])
         if is_clear(scaled, yaw_rad, speeds):
             return scaled, share
+    sideways = [rotated(scaled, angle) for angle in SIDEWAYS_RAD]
     for wanted in sideways:
         if is_clear(wanted, yaw_rad, speeds):
-            return wanted, SHARES[-1]
-    for wanted in (slowest, *sideways):
-        turn = _turn_to(wanted, yaw_rad, base)
+            return wanted, share
+    for wanted in (scaled, *sideways):
+        turn, _ = heading_error(wanted, yaw_rad, base)
         if abs(turn) > ALIGNED_RAD and is_clear(wanted, yaw_rad + turn, Speeds()):
             return turn_in_place(yaw_rad, turn, base), 0.0
     return (0.0, 0.0), 0.0
-
-
-def _turn_to(velocity: Point, yaw_rad: float, base: Base) -> float:
-    """Angle by which the base turns to drive at a velocity, forwards or backwards."""
-    turn = wrap_angle(math.atan2(velocity[1], velocity[0]) - yaw_rad)
-    if base.reverse and abs(turn) > 0.5 * math.pi:
-        turn = wrap_angle(turn + math.pi)
-    return turn
 
 
 def turn_in_place(yaw_rad: float, turn: float, base: Base) -> Point:

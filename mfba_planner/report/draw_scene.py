@@ -211,10 +211,10 @@ def label_numbers(ax: Axes, episode: Episode, view: View, passes: Sequence[Pass]
         apart = all(distance(spot, other) > size for other in taken)
         return apart and all(distance(spot, c) > r + 0.3 * size for c, r in bodies if c != own)
 
-    crowded = len(passes) > MOST_NUMBERS
-    nearest = sorted(passes, key=lambda p: p.gap_m)[:MOST_NUMBERS] if crowded else passes
-    for moment in nearest:
-        center, radius = bodies[passes.index(moment)]
+    numbered, crowded = list(zip(passes, bodies)), len(passes) > MOST_NUMBERS
+    if crowded:
+        numbered = sorted(numbered, key=lambda pair: pair[0].gap_m)[:MOST_NUMBERS]
+    for moment, (center, radius) in numbered:
         if not view.holds(center):
             continue
         reach = max(radius, 0.3 * size) + 0.6 * size
