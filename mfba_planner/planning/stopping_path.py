@@ -51,7 +51,8 @@ def clear_velocity(
     """The largest share of a velocity whose stopping path touches nothing, and that share.
 
     standing: rows (x, y, r), relative to the robot, enlarged by its radius. Where no share is
-    allowed the base drives a little sideways, or turns in place until one is; else it stops.
+    allowed the base drives a little sideways, or turns in place until one is; else it turns in
+    place towards the velocity, and along it it stops.
     """
     if not standing.shape[0] or velocity == (0.0, 0.0):
         return velocity, 1.0
@@ -67,15 +68,18 @@ def clear_velocity(
         scaled = (share * velocity[0], share * velocity[1])
         if is_clear(scaled, yaw_rad, speeds):
             return scaled, share
-    sideways = [rotated(scaled, angle) for angle in SIDEWAYS_RAD]
-    for wanted in sideways:
+    for wanted in (scaled, *(rotated(scaled, angle) for angle in SIDEWAYS_RAD)):
+        turn, _ = heading_error(wanted, yaw_rad, base)
+        # While it turns it hardly moves: what counts is where it drives once it has turned.
+        if not is_clear(wanted, yaw_rad + turn, Speeds()):
+            continue
         if is_clear(wanted, yaw_rad, speeds):
             return wanted, share
-    for wanted in (scaled, *sideways):
-        turn, _ = heading_error(wanted, yaw_rad, base)
-        if abs(turn) > ALIGNED_RAD and is_clear(wanted, yaw_rad + turn, Speeds()):
+        if abs(turn) > ALIGNED_RAD:
             return turn_in_place(yaw_rad, turn, base), 0.0
-    return (0.0, 0.0), 0.0
+    turn, _ = heading_error(velocity, yaw_rad, base)
+    still = abs(turn) <= ALIGNED_RAD
+    return (0.0, 0.0) if still else turn_in_place(yaw_rad, turn, base), 0.0
 
 
 def turn_in_place(yaw_rad: float, turn: float, base: Base) -> Point:
