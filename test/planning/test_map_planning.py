@@ -12,7 +12,7 @@ from mapped_scenes import wall
 from point_maps import PointMap
 
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.planner_types import Decision, Mode, Observation
+from mfba_planner.core.planner_types import Circle, Decision, Mode, Observation
 from mfba_planner.core.robot_base import Drive
 from mfba_planner.core.segments import Segment
 from mfba_planner.evaluation.metrics import evaluate
@@ -195,6 +195,17 @@ def test_it_never_touches_a_point_of_the_map(
     for x, y in made.map.map_points().tolist():
         away = np.hypot(x - path[:, 0], y - path[:, 1])
         assert away.min() >= min(math.hypot(x, y), RADIUS_M) - nearer_m
+
+
+@pytest.mark.parametrize(("speed", "kept"), [(0.2, False), (1.0, True)])
+def test_a_differential_base_keeps_off_something_slow(speed: float, kept: bool) -> None:
+    """It may be the end of a wall; what is faster has left before the base arrives."""
+    circle = Circle(center_m=(0.4, 0.0), velocity_mps=(0.0, speed), radius_m=0.3)
+    made = planning([], Drive.DIFFERENTIAL)
+    _, share = made._kept_off(
+        (0.8, 0.0), 3.0, 0.0, Speeds(0.3, 0.0), START, np.empty((0, 2)), [circle], 0.08
+    )
+    assert (share == 1.0) == kept
 
 
 def test_only_directions_that_were_observed_are_driven() -> None:

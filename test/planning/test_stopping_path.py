@@ -69,6 +69,12 @@ def test_the_velocity_is_kept_where_nothing_is_near() -> None:
         )  # fmt: skip
 
 
+def test_what_is_in_contact_already_is_left() -> None:
+    behind = np.array([(-0.29, 0.0, 0.3)])
+    found = clear_velocity((0.8, 0.0), GOAL_M, 0.0, Speeds(), BASE, TICK_S, behind)
+    assert found == ((0.8, 0.0), 1.0)
+
+
 def test_ahead_it_slows_down_and_what_is_grazed_is_passed() -> None:
     speeds = Speeds(0.3, 0.0)
     ahead = np.array([(0.4, 0.0, 0.3)])
