@@ -29,6 +29,7 @@ _MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
 _MOST_CELLS = 20_000  # about 8 ms
 _SAME_GOAL_M = 0.1  # noise of the odometry moves the goal in the map's frame
 _CLOSED_NS = 1_500_000_000
+_PASSAGE_NS = 30_000_000_000  # so long a passage counts as closed that the robot did not pass
 _FARTHEST_M = 20.0  # a goal farther away is replaced by a point on the line to it
 
 
@@ -62,6 +63,7 @@ class DistanceToGo:
         self._closing = ""  # the same, at this moment
         self._closed_ns: int | None = None  # since when
         self._margin_m = _MARGIN_M
+        self._not_passed: list[tuple[int, Point]] = []
         self._computed: tuple[int, int, Point] | None = None  # stamp, map version, goal
         self._to_go: Array | None = None
         self._beyond_m = 0.0
@@ -85,9 +87,19 @@ class DistanceToGo:
             if fresh and same and self._is_inside(position):
                 self._closed_for(stamp_ns)
                 return
+        self._not_passed = [
+            (then_ns, place)
+            for then_ns, place in self._not_passed
+            if 0 <= stamp_ns - then_ns < _PASSAGE_NS
+        ]
         self._closing = self._compute(known, position, goal)
         self._computed = (stamp_ns, known.version, goal)
         self._closed_for(stamp_ns)
+
+    def close(self, stamp_ns: int, position: Point) -> None:
+        """Count the passage at a position as closed for a while: the robot does not pass it."""
+        self._not_passed.append((stamp_ns, position))
+        self._computed = None
 
     def _closed_for(self, stamp_ns: int) -> None:
         """Say what closes the way once it has for long enough."""
@@ -118,6 +130,10 @@ class DistanceToGo:
         widest_m = _widest(field.distance_m, per_cell)
         speed = _speed(widest_m, self._radius_m)
         height, width = speed.shape
+        for _, (x, y) in self._not_passed:
+            dx = self._origin[0] + (np.arange(width) + 0.5) * self._cell_m - x
+            dy = self._origin[1] + (np.arange(height)[:, None] + 0.5) * self._cell_m - y
+            speed[dx * dx + dy * dy < self._radius_m**2] = _CLOSED
         i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
         j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
         to_go = eikonalfm.fast_marching(speed, (j, i), (self._cell_m, self._cell_m), 2)

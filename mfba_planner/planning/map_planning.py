@@ -17,6 +17,7 @@ from ..perception.static_map import StaticMap, StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import Move
+from .blocked_headings import BlockedHeadings
 from .differential_drive import Speeds
 from .distance_to_go import RouteParams, is_clear
 from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
@@ -34,7 +35,9 @@ NEAR_M = 3.5  # of a straight way: with so much room beside it the map is not ne
 ROOM_M = 0.25
 NEAR_POINTS_M = 1.0  # contact within a tick is ruled out with what stands so near
 _LEAST_M = 0.005  # kept from what stands, beyond the robot's radius
+_BESIDE_M = 0.15
 _SLOW_MPS, _ESTABLISHED_M = 0.5, 0.05
+_DRIVES_MPS = 0.1  # a slower velocity is a wait
 ENCLOSED = "what stands leaves no way out"
 _STRAIGHT = "the straight way is free"
 
@@ -61,6 +64,8 @@ class MapPlanning:
         self.search = MapSearch(route, params.robot_radius_m, headings, reach_m)
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
+        self._blocked = BlockedHeadings()
+        self._headings_rad = 2.0 * math.pi / headings * np.arange(1, headings + 1)
 
     def update(self, stamp_ns: int, pose: Pose2D, tracker: Tracker) -> None:
         """Take the scan that the tracker has just taken, from the pose."""
@@ -102,7 +107,8 @@ class MapPlanning:
                 position[0] + share * (gx - position[0]),
                 position[1] + share * (gy - position[1]),
             )
-            if is_clear(known, position, near, params.robot_radius_m + ROOM_M):
+            room_m = params.robot_radius_m + ROOM_M
+            if is_clear(known, position, near, room_m) and not self._is_beside(position):
                 return None
         points = known.present_points()
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
@@ -121,9 +127,11 @@ class MapPlanning:
         if params.turns:
             delay = TurnDelay(params, obs.pose.yaw + turn, speeds.omega)
         near_m = max(NEAR_POINTS_M, params.robot_radius_m + _LEAST_M + self._stopping_m(tick_s))
-        observed = None if unobserved is None else ~unobserved
+        drivable = self._blocked.open(obs.pose_ns, position, self._headings_rad)
+        if unobserved is not None:
+            drivable = ~unobserved if drivable is None else drivable & ~unobserved
         found = self.search.search(
-            rollout, position, self._risk, speed, tick_s, delay, observed, last,
+            rollout, position, self._risk, speed, tick_s, delay, drivable, last,
             lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
         )  # fmt: skip
         return self._as_move(
@@ -166,6 +174,12 @@ class MapPlanning:
             for c, cx, cy, keep in zip(circles, x.tolist(), y.tolist(), kept.tolist())
             if keep
         ]
+
+    def _is_beside(self, position: Point) -> bool:
+        """Whether something stands so near that it may be touched by a turn away from it."""
+        beside_m = self._params.robot_radius_m + _BESIDE_M
+        away = self.map.established_points() - position
+        return bool(((away**2).sum(axis=1) < beside_m * beside_m).any())
 
     def _kept_off(
         self,
@@ -247,6 +261,10 @@ class MapPlanning:
         (ux, uy), share = self._kept_off(
             (ux, uy), goal_m, obs.pose.yaw + turn, speeds, position, near, circles, tick_s
         )
+        if (ux, uy) != (0.0, 0.0) or speed < _DRIVES_MPS:
+            self._blocked.drives()
+        elif self._blocked.stands(obs.pose_ns, position, math.atan2(qy, qx)):
+            to_go.close(obs.pose_ns, position)
         percent = 1e2 * share * speed / params.speed_mps
         reason = _STRAIGHT
         if not found.free or not to_go.is_straight:

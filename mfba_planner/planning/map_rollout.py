@@ -30,6 +30,7 @@ CLOSE_M = 1.0  # cost of a pass beside what stands without clearance
 FORBIDDEN_M = 1000.0  # cost of a contact before the waypoint with what stands
 CARROT_M = 0.4  # a differential base aims so far ahead along the shortest way
 SLOW_ROOM_M, SLOWEST = 0.15, 0.4  # room below which a differential base slows down, and to what
+TIGHT_M, PIVOT_RAD = 0.04, 0.15  # with so little room it turns in place, to within so much
 FINE_STEPS = 12  # of a differential base, of one tick; then come those of COARSE_TICKS
 _ROUNDING = 1.0 - 1e-9
 
@@ -148,6 +149,8 @@ class MapRollout:
         base, full, (px, py) = self._base, self._full, self._position
         accel, alpha = base.max_accel_mps2, base.max_turn_accel_radps2
         fastest, first_rad = base.max_turn_radps, base.turn_first_rad
+        if self._is_tight():  # as stopping_path.clear_velocity will
+            first_rad = min(first_rad, PIVOT_RAD)
         held_s = self._tick_s  # a command's
         m = qx.size
         left = max(math.ceil(LONGEST * horizon_s / held_s) - FINE_STEPS, 0)
@@ -235,6 +238,11 @@ class MapRollout:
             ends = np.minimum(np.arange(n), arrived[:, None])
             xs, ys, driven = (np.take_along_axis(a, ends, axis=1) for a in (xs, ys, driven))
         return Paths(xs, ys, step_s[:steps], driven, arrived)
+
+    def _is_tight(self) -> bool:
+        px, py = self._position
+        room = float(self._clearance.at(np.array([px]), np.array([py]))[0]) - self._radius_m
+        return room < TIGHT_M
 
     def standing_risk(self, paths: Paths, risk: RiskParams, margin_m: float) -> Array:
         """Risk (m,) of what stands; FORBIDDEN_M more for a contact before the waypoint."""

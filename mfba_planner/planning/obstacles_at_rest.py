@@ -34,6 +34,10 @@ class ObstaclesAtRest:
         self.circles = [circle for circle in circles if is_at_rest(circle)]
         self._rows = [(c.center_m[0] - px, c.center_m[1] - py, c.radius_m) for c in self.circles]
 
+    def rows(self) -> np.ndarray:
+        """Rows (x, y, r), m, relative to the robot; (n, 3)."""
+        return np.array(self._rows).reshape(-1, 3)
+
     def misplaced(self) -> str:
         """The reason to stop for a return that no obstacle can have caused, "" without any.
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.geometry import Point, bearing, distance
+from ..core.geometry import Point, Pose2D, bearing, distance
 from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
 from ..perception.obstacle_memory import ObstacleMemory
@@ -28,6 +28,7 @@ from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
 from .predictive_params import PredictiveParams
 from .sector_changes import SectorChanges
+from .stopping_path import clear_velocity
 from .trajectory_cost import (
     Candidate,
     TrajectoryCost,
@@ -140,7 +141,8 @@ class Predictive(BasePlanner):
         at_rest = ObstaclesAtRest(position, circles)
         if misplaced := at_rest.misplaced():
             return _blocked(misplaced)
-        move = self._kept_off(self._choose(obs, goal, last_waypoint, at_rest), at_rest)
+        chosen = self._choose(obs, goal, last_waypoint, at_rest)
+        move = self._kept_off(chosen, at_rest, obs.pose, distance(position, goal))
         if not all(move.vs or (0,)):
             self._changes.not_enclosed()
         return move
@@ -240,13 +242,20 @@ class Predictive(BasePlanner):
                 return ""
         return at_rest.enclosure()
 
-    def _kept_off(self, move: Move, at_rest: ObstaclesAtRest) -> Move:
+    def _kept_off(self, move: Move, at_rest: ObstaclesAtRest, pose: Pose2D, goal_m: float) -> Move:
         """The move, shortened so that it touches nothing at rest until the robot can stop."""
-        share = at_rest.allowed_share(move.velocity, STOPPING_TICKS * self.tick_s)
+        (vx, vy), params = move.velocity, self.params
+        if params.turns:
+            velocity, share = clear_velocity(
+                (vx, vy), goal_m, pose.yaw, self._speeds, params, self.tick_s, at_rest.rows()
+            )
+        else:
+            share = at_rest.allowed_share((vx, vy), STOPPING_TICKS * self.tick_s)
+            velocity = (share * vx, share * vy)
         if share == 1.0:
             return move
-        (vx, vy), note = move.velocity, f"{1e2 * share:.0f} % of it, as contact is near"
-        return replace(move, velocity=(share * vx, share * vy), reason=f"{move.reason}; {note}")
+        note = f"{1e2 * share:.0f} % of it, as contact is near"
+        return replace(move, velocity=velocity, reason=f"{move.reason}; {note}")
 
     def surroundings(self, position: Point) -> Ranges:
         """Range per sector to the circles of the last decision, inf where there are none.

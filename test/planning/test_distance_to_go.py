@@ -286,3 +286,23 @@ def test_the_path_round_a_long_wall_is_found(half_m: float) -> None:
     shortest = 2.0 * math.hypot(2.0, half_m)
     assert shortest < found < 1.1 * shortest + 2.0
     assert closed_by(known, (4.0, 0.0), 5.0) == ""
+
+
+def test_a_passage_that_is_not_passed_is_gone_round_for_a_while() -> None:
+    """A wall with a door, and an end farther away."""
+    half, start, goal = RADIUS_M + 0.15, (0.0, 1.2), (4.0, 0.0)
+    known = PointMap(polyline((2.0, -9.0), (2.0, -half)) + polyline((2.0, half), (2.0, 3.0)))
+    to_go = made(known, goal, start)
+    through_m, round_m = at(to_go, start), math.hypot(2.0, 1.8) + math.hypot(2.0, 3.0)
+    assert through_m < 4.8 < round_m
+    now_ns = 2 * SECOND_NS
+    to_go.close(now_ns, (2.0, 0.0))
+    to_go.update(now_ns, known, start, goal)
+    assert at(to_go, start) > round_m
+    assert not to_go.closed_by
+    known.version += 1  # only then it is computed again
+    to_go.update(now_ns + 30 * SECOND_NS - 1, known, start, goal)
+    assert at(to_go, start) > round_m
+    known.version += 1
+    to_go.update(now_ns + 31 * SECOND_NS, known, start, goal)
+    assert at(to_go, start) == pytest.approx(through_m, abs=1e-3)

@@ -19,6 +19,7 @@ from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.perception.static_map import StaticMapParams
+from mfba_planner.planning.blocked_headings import STANDS_NS
 from mfba_planner.planning.differential_drive import Speeds
 from mfba_planner.planning.distance_to_go import RouteParams, is_clear
 from mfba_planner.planning.map_planning import MapPlanning
@@ -225,6 +226,40 @@ def test_without_points_near_it_leaves_the_decision_to_the_open_planner() -> Non
     for points in ([], [(9.0, 5.0)]):
         goal = (3.0, 0.0)
         assert planning(points).move(at_start(goal), goal, [], Speeds(), None, None, 0.08) is None
+
+
+@pytest.mark.parametrize("beside_m", [0.1, 0.2])
+def test_right_beside_a_wall_the_map_decides(beside_m: float) -> None:
+    """The way leads away from it; a turn may still touch it."""
+    away_m = RADIUS_M + beside_m
+    made = planning([(-away_m, y / 20.0) for y in range(-10, 11)])
+    move = made.move(at_start((3.0, 0.0)), (3.0, 0.0), [], Speeds(), None, None, 0.08)
+    assert (move is None) == (beside_m > 0.15)
+
+
+def test_where_the_check_of_the_points_stops_it_it_chooses_another_heading(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The search knows distances on a grid, the check the points: they differ by millimetres."""
+
+    def kept_off(_: MapPlanning, velocity: Point, *__: object) -> tuple[Point, float]:
+        ahead = abs(math.atan2(velocity[1], velocity[0])) < 0.3
+        return ((0.0, 0.0), 0.0) if ahead else (velocity, 1.0)
+
+    monkeypatch.setattr(MapPlanning, "_kept_off", kept_off)
+    made, goal = planning([(1.5, 0.05)]), (3.0, 0.0)
+    closed = []
+    monkeypatch.setattr(made.search.to_go, "close", lambda *at: closed.append(at))
+    found = []
+    for tick in range(20):
+        obs = replace(at_start(goal), stamp_ns=tick * PARAMS.tick_ns + 1)
+        move = made.move(obs, goal, [], Speeds(), None, None, 0.08)
+        assert move is not None
+        found.append(move.velocity)
+    ticks = math.ceil(STANDS_NS / PARAMS.tick_ns)
+    assert found[: ticks + 1] == [(0.0, 0.0)] * (ticks + 1)
+    assert all(v != (0.0, 0.0) for v in found[ticks + 1 :])
+    assert closed == [(ticks * PARAMS.tick_ns + 1, START)]
 
 
 def reasons(decisions: tuple[Decision, ...]) -> set[str]:

@@ -344,3 +344,14 @@ def test_it_is_forbidden_exactly_where_the_line_comes_too_near(away_m: float, at
         assert found < FORBIDDEN_M
     if nearest > RADIUS_M + MARGIN_M + 0.05:
         assert found == 0.0
+
+
+def test_with_little_room_a_differential_base_turns_before_it_drives() -> None:
+    """Driving while it turns, it may touch what stands beside it."""
+    begins = []
+    for room_m in (0.03, 0.05):
+        off = RADIUS_M + room_m
+        made, _ = rollout(PointMap([(0.0, off)]), yaw=0.35, base=TURNS)
+        x = through(made, (1.5, 0.0)).x[0]
+        begins.append(int((x > 0.005).argmax()))
+    assert 0 < begins[1] < begins[0] - 1
