@@ -96,8 +96,11 @@ def _scans(episode: Episode) -> Iterator[Scan | None]:
     params = episode.planner
     world = World(episode.scenario, params.tick_ns, params.goal_tolerance_m, episode.seed)
     for number, tick in enumerate(episode.ticks):
-        world.tick = number
-        world.pose = episode.truth[number] if episode.truth else tick.pose
+        pose = episode.truth[number] if episode.truth else tick.pose
+        if number:
+            world.follow(pose)
+        else:
+            world.pose = pose
         yield world.read().scan
 
 
