@@ -20,7 +20,7 @@ from .nearby_obstacles import Nearby
 from .obstacle_motion import Obstacle, Turn
 from .planner_observations import Observe, observe_sectors
 from .scenario import Scenario
-from .triggers import after_triggers
+from .triggers import after_triggers, before_triggers
 from .world import World
 
 FLEET_STREAM = 6  # spawn key of the robots' SeedSequence children; one number per purpose
@@ -110,7 +110,7 @@ class Fleet:
         """Put every robot at its start. Raises ConfigError for a scenario without robots."""
         if not scenario.robots:
             raise ConfigError(f"scenario {scenario.name!r}: names no robots; add robots to it")
-        self.scenario, self.tick_ns, self.seed = scenario, tick_ns, seed
+        self.scenario, self.tick_ns, self.seed = before_triggers(scenario), tick_ns, seed
         self.tick = 0
         count = len(scenario.robots)
         self.robot_worlds = [RobotWorld(self, number, goal_tolerance_m) for number in range(count)]

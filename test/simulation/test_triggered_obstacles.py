@@ -62,7 +62,7 @@ def straight(world: Scenario, seed: int = 0) -> Episode:
 
 
 def trigger_times(episode: Episode) -> list[float | None]:
-    return [o.trigger and o.trigger.at_s for o in episode.scenario.obstacles]
+    return [o.trigger.at_s if o.trigger else None for o in episode.scenario.obstacles]
 
 
 # Coordinates in tenths, times in hundredths: far from every tie of rounding.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -109,7 +110,7 @@ def _tick_messages(
 ) -> Iterator[tuple[topics.Topic, Any]]:
     """The messages of world, sensor and planner; velocity is that of the previous tick."""
     scenario, stamp, time_s = episode.scenario, tick.stamp_ns, episode.time_s(tick.stamp_ns)
-    circles = scenario.enlarged(time_s)
+    circles = [circle for circle in scenario.enlarged(time_s) if not math.isnan(circle[0][0])]
     ranges = tick.ranges_m or sense_circles_and_segments(
         tick.pose.position, circles, scenario.segments, scenario.robot_radius_m, episode.sensor
     )
