@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from shown_commands import ROOT
@@ -26,7 +27,7 @@ from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.robot_model import Noise
 from mfba_planner.simulation.run_episode import simulate, simulate_fleet
-from mfba_planner.simulation.scenario import FleetRobot
+from mfba_planner.simulation.scenario import FleetRobot, Scenario
 from mfba_planner.simulation.triggers import before_triggers
 from mfba_planner.verification.verify_bag import verify, verify_each
 
@@ -89,6 +90,22 @@ def test_the_graph_decides_as_the_core_and_its_bag_is_verified(
     found = summarize(tmp_path / "bag")
     assert (found.result, found.digest) == (evaluate(expected), digest(expected.ticks))
     assert cli.main(["verify", str(tmp_path / "bag"), "--closed-loop"]) == 0
+
+
+@pytest.mark.parametrize("noise", [EXACT, Noise(odom_m=0.02, odom_latency_s=0.5)])
+def test_a_bag_in_real_time_gives_the_times_of_its_world(
+    noise: Noise, tmp_path: Path, domain_id: int
+) -> None:
+    one = replace(config(Method.PAPER, noise), real_time=True, speed_factor=8.0)
+    ended: list[Scenario] = []
+
+    def keep(world: Any) -> bool:
+        ended[:] = [world.scenario]
+        return True
+
+    run_in_process(one, tmp_path / "bag", domain_id=domain_id, on_turn=keep)
+    assert [read_episode(tmp_path / "bag").scenario] == ended
+    assert times(read_episode(tmp_path / "bag"))[0] is not None
 
 
 def test_another_path_reaches_the_triggers_at_its_own_times(
