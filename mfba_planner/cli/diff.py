@@ -16,6 +16,7 @@ from ..recording.read_episode import Recording, read_recording
 from ..report.result_table import comparison_text
 from ..simulation.decision_digest import digest
 from ..simulation.episode import Episode
+from ..simulation.triggers import before_triggers
 from ..verification.compare_decisions import first_divergence, side_by_side
 
 
@@ -74,6 +75,6 @@ def _settings(left: Episode, right: Episode) -> list[tuple[str, object, object]]
         rows += [(f"{group}.{name}", a[name], b[name]) for name in a if a[name] != b[name]]
     if left.seed != right.seed:
         rows.append(("seed", left.seed, right.seed))
-    if left.scenario != right.scenario:
+    if before_triggers(left.scenario) != before_triggers(right.scenario):
         rows.append(("scenario", left.scenario.name, right.scenario.name))
     return rows

@@ -27,6 +27,7 @@ from ..evaluation.sweep.sweep_spec import (
     read_run,
 )
 from ..evaluation.sweep.table_columns import Row, run_row
+from ..simulation.triggers import with_triggers
 
 _DESCRIPTION = """Repeat a run of a sweep and explain its outcome.
 
@@ -141,7 +142,8 @@ def _time_limit(limit_s: float) -> Iterator[None]:
 def _oracle_lines(completed: CompletedRun, setting: Setting) -> Iterator[str]:
     solution = solve(completed.episode.scenario, setting.params.speed_mps)
     length = f", {solution.length_m:.3f} m" if solution.waypoints else ""
-    yield f"oracle: {solution.certificate.value} at {solution.speed_mps:g} m/s{length}"
+    why = f" ({solution.reason})" if with_triggers(completed.episode.scenario) else ""
+    yield f"oracle: {solution.certificate.value} at {solution.speed_mps:g} m/s{length}{why}"
 
 
 def _write(

@@ -9,8 +9,6 @@ from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
-from ..core.errors import BagError, InputError
-from ..core.geometry import Pose2D
 from ..core.planner_types import Decision
 from ..evaluation.metrics import MetricsAccumulator, Result, evaluate
 from ..simulation.decision_digest import Digest, digest
@@ -19,11 +17,9 @@ from ..simulation.fleet import scenarios_with_others
 from ..simulation.scenario import Scenario
 from .bag_reader import BagReader
 from .decisions_with_sectors import rising_decisions, stream_decisions
-from .fleet_topics import NO_NAMESPACE, messages_by_robot, robot_topic, select_robots
-from .from_messages import robot_pose, stamp_ns
+from .fleet_topics import NO_NAMESPACE, select_robots
 from .run_parameters import read_setup, read_setups
-
-TRUTH = "/ground_truth"
+from .true_poses import read_truth
 
 
 class Recording(NamedTuple):
@@ -52,7 +48,7 @@ def read_recording(
         omitted: dict[str, str] = {}
         for recorded in stream_decisions(reader, names, omitted):
             ticks[recorded.robot].setdefault(recorded.decision.stamp_ns, recorded.decision)
-        truth = _read_truth(reader, names)
+        truth = read_truth(reader, names)
     episodes = {
         name: setup.episode(
             tuple(decision for _, decision in sorted(ticks[name].items())), truth[name]
@@ -93,7 +89,7 @@ def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
     Raises as read_episode(), and BagError if the stamp of a decision decreases.
     """
     with BagReader(path, salvage=salvage) as reader:
-        setup, truth = read_setup(reader), _read_truth(reader, [NO_NAMESPACE])[NO_NAMESPACE]
+        setup, truth = read_setup(reader), read_truth(reader, [NO_NAMESPACE])[NO_NAMESPACE]
         omitted: dict[str, str] = {}
         stream = (
             recorded.decision for recorded in rising_decisions(reader, [NO_NAMESPACE], omitted)
@@ -123,17 +119,3 @@ def summaries(
         name: Summary(e, evaluate(e), digest(e.ticks), recorded.omitted.get(name, ""))
         for name, e in recorded.episodes.items()
     }
-
-
-def _read_truth(reader: BagReader, robots: Sequence[str]) -> dict[str, dict[int, Pose2D]]:
-    """The true pose of each robot by stamp; empty if the bag has no ground truth."""
-    recorded: dict[str, dict[int, Pose2D]] = {robot: {} for robot in robots}
-    if not any(robot_topic(robot, TRUTH) in reader.topics for robot in robots):
-        return recorded
-    for robot, message in messages_by_robot(reader, robots, [TRUTH]):
-        odom = message.message
-        try:
-            recorded[robot][stamp_ns(odom.header.stamp)] = robot_pose(odom)
-        except InputError as error:
-            raise BagError(f"{reader.path}: {robot_topic(robot, TRUTH)}: {error}") from None
-    return recorded

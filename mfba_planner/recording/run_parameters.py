@@ -17,10 +17,12 @@ from ..scenarios.scenario_files import load_scenario
 from ..simulation.episode import Episode, Outcome
 from ..simulation.fleet import scenarios_with_others
 from ..simulation.scenario import Scenario
+from ..simulation.triggers import after_triggers
 from ..simulation.world import World
 from .bag_reader import BagReader
 from .configuration_attachment import read_configuration
 from .fleet_topics import NO_NAMESPACE
+from .true_poses import recorded_moments
 
 T = TypeVar("T")
 
@@ -39,7 +41,10 @@ BEHAVIOUR_THEN = {"progress.time_allowance_s": 0.0}
 
 
 class Setup(NamedTuple):
-    """The setup of one robot; in a fleet's scenario the others stand at their starts."""
+    """The setup of one robot; in a fleet's scenario the others stand at their starts.
+
+    Of obstacles that wait for a trigger the scenario is that of the recorded run.
+    """
 
     scenario: Scenario
     sensor: SensorParams
@@ -84,7 +89,8 @@ def read_setups(reader: BagReader) -> Setups:
         scenario = load_scenario(world["scenario_json"])
         names = scenario.robot_names
         starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
-        worlds = scenarios_with_others(scenario, starts, world["tick_ns"]) if names else [scenario]
+        run = after_triggers(scenario, recorded_moments(reader, names, world["tick_ns"]))
+        worlds = scenarios_with_others(run, starts, world["tick_ns"]) if names else [run]
         setups = {}
         for name, robot_scenario in zip(names or (NO_NAMESPACE,), worlds):
             prefix = f"{name}/" if name else ""

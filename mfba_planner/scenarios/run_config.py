@@ -21,9 +21,9 @@ from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PerceptionInput, PlannerParams
 from ..planning.stopping_distance import too_fast_for_lidar, too_fast_for_sectors
 from ..simulation.fleet import robot_seed, scenarios_with_others
-from ..simulation.recorded_motion import ALWAYS, presence
 from ..simulation.robot_model import DEFAULT_BEAMS
 from ..simulation.scenario import Scenario
+from ..simulation.triggered_motion import may_be_absent
 from .scenario_json import scenario_to_json, segments_text
 
 Parameters = dict[str, dict[str, Any]]
@@ -109,7 +109,7 @@ def _radii(scenario: Scenario) -> list[float]:
     Raises ConfigError for different radii then: the obstacles topic does not say which are there.
     """
     radii = [obstacle.radius_m for obstacle in scenario.obstacles]
-    if all(presence(obstacle) == ALWAYS for obstacle in scenario.obstacles):
+    if not any(map(may_be_absent, scenario.obstacles)):
         return radii
     if len(set(radii)) > 1 and not scenario.robot.lidar.beams:
         raise ConfigError(

@@ -17,13 +17,15 @@ from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.recorded_motion import Knot
 from ..simulation.robot_model import Robot
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
+from ..simulation.triggered_motion import with_trigger
 
 EXAMPLE = "compare config/scenarios/case1.yaml"
 
 
 LIMIT = 1e6  # no number in a scenario is larger
 # Keys of an obstacle that are left out where unused.
-OPTIONAL = ("turns", "trajectory", "loop", "stays", "appears_s", "vanishes_s")
+OPTIONAL = ("turns", "trajectory", "loop", "stays", "appears_s", "vanishes_s", "trigger")
+TRIGGER = ("within_m", "point_m", "absent_before")  # of a trigger, the last one if true
 
 
 def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
@@ -38,11 +40,21 @@ def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
         del plain["robots"]
     if not scenario.segments_m:
         del plain["segments_m"]
-    for obstacle in plain["obstacles"]:
-        for name in OPTIONAL:
-            if obstacle[name] in ([], False, None, 0.0):
-                del obstacle[name]
+    plain["obstacles"] = [_plain_obstacle(obstacle) for obstacle in plain["obstacles"]]
     return plain
+
+
+def _plain_obstacle(written: dict[str, Any]) -> dict[str, Any]:
+    """An obstacle as configured: of one with a trigger its motion, not that of a run."""
+    trigger = written["trigger"]
+    obstacle = trigger["motion"] if trigger else written
+    if trigger:
+        obstacle["trigger"] = {key: trigger[key] for key in TRIGGER if trigger[key] is not False}
+    return {
+        name: value
+        for name, value in obstacle.items()
+        if name not in OPTIONAL or value not in ([], False, None, 0.0)
+    }
 
 
 def scenario_to_json(scenario: Scenario) -> str:
@@ -148,7 +160,7 @@ def _kidnapping(data: Any) -> Kidnapping:
 
 def _obstacle(data: Any) -> Obstacle:
     _require_keys(data, Obstacle, *OPTIONAL)
-    return Obstacle(
+    motion = Obstacle(
         center_m=_point(data["center_m"]),
         radius_m=_positive(data["radius_m"]),
         speed_mps=_not_negative(data["speed_mps"]),
@@ -159,6 +171,17 @@ def _obstacle(data: Any) -> Obstacle:
         stays=_flag(data.get("stays", False)),
         appears_s=_not_negative(data.get("appears_s", 0.0)),
         vanishes_s=_positive(data["vanishes_s"]) if "vanishes_s" in data else None,
+    )
+    if "trigger" not in data:
+        return motion
+    trigger = data["trigger"]
+    if not isinstance(trigger, dict) or not {*TRIGGER[:2]} <= set(trigger) <= {*TRIGGER}:
+        raise UnusualError
+    return with_trigger(
+        motion,
+        _positive(trigger["within_m"]),
+        _point(trigger["point_m"]),
+        absent_before=_flag(trigger.get("absent_before", False)),
     )
 
 

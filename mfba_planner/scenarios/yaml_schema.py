@@ -15,8 +15,9 @@ from pydantic import BaseModel, Field, ValidationError
 
 from ..core.errors import ConfigError
 from ..core.option_specs import did_you_mean
-from ..simulation.obstacle_motion import Obstacle, Turn, Walls
+from ..simulation.obstacle_motion import Obstacle, Trigger, Turn, Walls
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
+from ..simulation.triggered_motion import with_trigger
 from .place_schema import MEANINGS as _PLACE_MEANINGS
 from .place_schema import SHAPES as _PLACE_SHAPES
 from .place_schema import Box, Place
@@ -60,6 +61,12 @@ class _Turn(_Heading):
         return Turn(at_s=self.at_s, speed_mps=self.speed_mps, heading_rad=self.heading())
 
 
+class _Trigger(_Strict):
+    within_m: _Positive
+    point_m: _Point | None = None
+    absent_before: bool = _default(Trigger, "absent_before")
+
+
 class _Obstacle(_Heading):
     center_m: _Point
     radius_m: _Positive
@@ -71,8 +78,17 @@ class _Obstacle(_Heading):
     stays: bool = _default(Obstacle, "stays")
     appears_s: _NotNegative = _default(Obstacle, "appears_s")
     vanishes_s: _Positive | None = _default(Obstacle, "vanishes_s")
+    trigger: _Trigger | None = _default(Obstacle, "trigger")
 
     def build(self) -> Obstacle:
+        trigger, motion = self.trigger, self._motion()
+        if trigger is None:
+            return motion
+        return with_trigger(
+            motion, trigger.within_m, trigger.point_m, absent_before=trigger.absent_before
+        )
+
+    def _motion(self) -> Obstacle:
         return Obstacle(
             center_m=self.center_m,
             radius_m=self.radius_m,
@@ -171,6 +187,10 @@ _MEANINGS = {
     "stays": "it stands at the ends of its trajectory before and afterwards",
     "appears_s": "simulated time from which it is there, s",
     "vanishes_s": "simulated time until which it is there, s",
+    "trigger": "it waits for a robot; all its times count from then",
+    "within_m": "it starts at the first tick with the centre of a robot as near to the point, m",
+    "point_m": "the point; left out, the centre of the obstacle at its t = 0, m",
+    "absent_before": "it is absent before it starts, instead of standing there",
     "at_s": "simulated time since the start, s",
     "robot": "base, lidar and noise, where they differ from the paper",
     "kidnappings": "times at which the robot is moved elsewhere, sorted by time",
@@ -272,6 +292,7 @@ def _keys_at(location: tuple[Any, ...]) -> list[str]:
     models: dict[Any, type[BaseModel]] = {
         "obstacles": _Obstacle,
         "turns": _Turn,
+        "trigger": _Trigger,
         "kidnappings": _Kidnapping,
         "robots": _Member,
         "walls": _Walls,

@@ -61,7 +61,9 @@ class Motion:
         self._turning = [(i, [row[0] for row in s[1:]]) for i, s in enumerate(stretches)]
         self._turning = [(i, since) for i, since in self._turning if since]
         self._loops = [
-            (i, o.trajectory[0][0], o.trajectory[-1][0]) for i, o in enumerate(obstacles) if o.loop
+            (i, o.trajectory[0][0], o.trajectory[-1][0], o.stays)
+            for i, o in enumerate(obstacles)
+            if o.loop
         ]
         limits = [(i, *presence(o)) for i, o in enumerate(obstacles)]
         self._limits = [limit for limit in limits if limit[1:] != ALWAYS]
@@ -147,9 +149,10 @@ class Motion:
         times = times_s[:, None]
         if self._loops:
             times = np.repeat(times, len(self.radius_m), axis=1)
-        for i, first, last in self._loops:
+        for i, first, last, stays in self._loops:
             laps = np.floor((times_s - first) / (last - first))
-            times[:, i] = np.clip(times_s - laps * (last - first), first, last)
+            own = np.clip(times_s - laps * (last - first), first, last)
+            times[:, i] = np.where(times_s < first, times_s, own) if stays else own
         return times
 
     def _broken(self, times_s: Array) -> Array | None:
@@ -157,8 +160,9 @@ class Motion:
         if not (self._loops or self._limits):
             return None
         broken = np.zeros((len(times_s) - 1, len(self.radius_m)), dtype=bool)
-        for i, first, last in self._loops:
-            broken[:, i] |= np.diff(np.floor((times_s - first) / (last - first))) != 0.0
+        for i, first, last, stays in self._loops:
+            laps = np.floor((times_s - first) / (last - first))
+            broken[:, i] |= np.diff(np.maximum(laps, 0.0) if stays else laps) != 0.0
         for i, *ends in self._limits:
             for end in ends:
                 broken[:, i] |= (times_s[:-1] <= end) & (end <= times_s[1:])

@@ -11,6 +11,7 @@ from ..core.planner_types import NANO, Decision
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from .scenario import Scenario
+from .triggers import after_triggers
 
 
 class Outcome(Enum):
@@ -23,7 +24,10 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Episode:
-    """A run under any driver: one Decision per tick, the first at tick 0."""
+    """A run under any driver: one Decision per tick, the first at tick 0.
+
+    Its scenario says when each trigger was reached: derived from the true poses, if not given.
+    """
 
     scenario: Scenario
     sensor: SensorParams = field(default_factory=SensorParams)
@@ -34,6 +38,14 @@ class Episode:
     outcome: Outcome
     truth: tuple[Pose2D, ...] = ()  # true pose at each tick; (): those of the decisions
     planner_name: str = ""  # the planner, where `planner` (its parameters) does not name it
+
+    def __post_init__(self) -> None:
+        """Make the scenario that of this run, where obstacles wait for a trigger."""
+        poses = self.truth or tuple(tick.pose for tick in self.ticks)
+        moments = (
+            (self.time_s(tick.stamp_ns), [pose.position]) for tick, pose in zip(self.ticks, poses)
+        )
+        object.__setattr__(self, "scenario", after_triggers(self.scenario, moments))
 
     @property
     def label(self) -> str:

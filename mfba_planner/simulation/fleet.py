@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from .nearby_obstacles import Nearby
 from .obstacle_motion import Obstacle, Turn
 from .planner_observations import Observe, observe_sectors
 from .scenario import Scenario
+from .triggers import after_triggers, before_triggers
 from .world import World
 
 FLEET_STREAM = 6  # spawn key of the robots' SeedSequence children; one number per purpose
@@ -60,6 +61,9 @@ class RobotWorld(World):
         self.seed = seed
         self._fleet, self._number = fleet, number
         self._own = len(self.scenario.obstacles)
+
+    def _check_triggers(self) -> None:
+        """The Fleet does: any of its robots may reach a trigger."""
 
     @property
     def others(self) -> list[RobotWorld]:
@@ -106,13 +110,19 @@ class Fleet:
         """Put every robot at its start. Raises ConfigError for a scenario without robots."""
         if not scenario.robots:
             raise ConfigError(f"scenario {scenario.name!r}: names no robots; add robots to it")
-        self.scenario, self.tick_ns, self.seed = scenario, tick_ns, seed
+        self.scenario, self.tick_ns, self.seed = before_triggers(scenario), tick_ns, seed
         self.tick = 0
         count = len(scenario.robots)
         self.robot_worlds = [RobotWorld(self, number, goal_tolerance_m) for number in range(count)]
         self.outcomes: list[Outcome | None] = [
             robot_world.outcome() for robot_world in self.robot_worlds
         ]
+        self._check_triggers()
+
+    def _check_triggers(self) -> None:
+        positions = [robot_world.pose.position for robot_world in self.robot_worlds]
+        for robot_world in self.robot_worlds:
+            robot_world.start_triggered(positions)
 
     @property
     def running(self) -> list[int]:
@@ -134,6 +144,7 @@ class Fleet:
                 robot_world.tick += 1  # its obstacles keep moving
             robot_world.poses.append(robot_world.pose)
         self.tick += 1
+        self._check_triggers()
         for number in running:
             self.outcomes[number] = self.robot_worlds[number].outcome()
 
@@ -143,8 +154,17 @@ def scenarios_with_others(
 ) -> list[Scenario]:
     """The scenario of each robot, with the other robots as obstacles that move along their poses.
 
-    poses holds the poses of each robot, one per tick until its run ended.
+    poses holds the poses of each robot, one per tick until its run ended. Triggers are those
+    that any robot reached.
     """
+    ticks = zip_longest(*poses)  # a robot whose run has ended reaches nothing new
+    scenario = after_triggers(
+        scenario,
+        (
+            (tick * tick_ns * NANO, [pose.position for pose in some if pose is not None])
+            for tick, some in enumerate(ticks)
+        ),
+    )
     paths = [path_as_obstacle(path, tick_ns, scenario.robot_radius_m) for path in poses]
     found = []
     for number in range(len(paths)):

@@ -33,11 +33,26 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Trigger:
+    """An obstacle waits until a robot is within a distance (m) of a point (m): `motion` from then.
+
+    at_s (s) is when that was in one run; None: not yet, or never (triggered_motion.py).
+    """
+
+    within_m: float
+    point_m: Point
+    motion: Obstacle
+    absent_before: bool = False
+    at_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacle:
     """A row of Table 4 or 6: centre at t = 0 (m), radius (m), speed (m/s), heading (rad).
 
     turns change speed and heading, sorted by time; the paper has none. With a trajectory of knots
     (t, x, y) the obstacle follows that instead, and walls do not stop it (recorded_motion.py).
+    With a trigger the other fields are its motion in one run, derived from trigger.motion.
     """
 
     center_m: Point
@@ -50,6 +65,7 @@ class Obstacle:
     stays: bool = False
     appears_s: float = 0.0
     vanishes_s: float | None = None
+    trigger: Trigger | None = None
 
     def __hash__(self) -> int:
         """Hash without the turns, for speed: stretches_of caches by obstacle."""

@@ -4,7 +4,8 @@
 A trajectory is straight and uniform between two knots, and exact at each. Its obstacle is there
 from its first to its last knot; with `loop` it begins anew then, with `stays` it stands at the
 first one before, at the last one afterwards. appears_s and vanishes_s shorten that for any
-obstacle. While it is absent nothing touches or sees it.
+obstacle. While it is absent nothing touches or sees it. loop and stays together, standing before
+the first lap, is only of an obstacle that waited for a trigger.
 """
 
 from __future__ import annotations
@@ -96,6 +97,13 @@ def lap_time(trajectory: tuple[Knot, ...], t_s: float) -> float:
     return min(last, max(first, t_s - lap(trajectory, t_s) * (last - first)))
 
 
+def _time_within(obstacle: Timed, t_s: float) -> float:
+    """Time t, or while an obstacle loops, t brought into the first lap."""
+    if not obstacle.loop or (obstacle.stays and t_s < obstacle.trajectory[0][0]):
+        return t_s
+    return lap_time(obstacle.trajectory, t_s)
+
+
 @lru_cache(maxsize=4096)
 def _stamps(trajectory: tuple[Knot, ...]) -> tuple[float, ...]:
     return tuple(stamp for stamp, _, _ in trajectory)
@@ -121,14 +129,12 @@ def slope(trajectory: tuple[Knot, ...], k: int) -> Point:
 
 def point_at(obstacle: Timed, t_s: float) -> Point:
     """Centre at time t of an obstacle with a trajectory, present or not."""
-    trajectory = obstacle.trajectory
-    return between(trajectory, lap_time(trajectory, t_s) if obstacle.loop else t_s)
+    return between(obstacle.trajectory, _time_within(obstacle, t_s))
 
 
 def velocity_along(obstacle: Timed, t_s: float) -> Point:
     """(vx, vy) at time t in m/s of an obstacle with a trajectory; at a knot, that after it."""
-    trajectory = obstacle.trajectory
-    t = lap_time(trajectory, t_s) if obstacle.loop else t_s
+    trajectory, t = obstacle.trajectory, _time_within(obstacle, t_s)
     k = bisect_right(_stamps(trajectory), t) - 1
     return slope(trajectory, k) if 0 <= k < len(trajectory) - 1 else (0.0, 0.0)
 
@@ -145,6 +151,10 @@ def trajectory_pieces(obstacle: Timed, t0_s: float, t1_s: float) -> Iterator[Pie
     if not obstacle.loop:
         yield from _lap_pieces(trajectory, 0.0, t0_s, t1_s)
         return
+    if obstacle.stays and t0_s < first:
+        yield from _lap_pieces(trajectory, 0.0, t0_s, min(t1_s, first))
+        if t1_s <= first:
+            return
     begin = max(t0_s, first)
     for number in range(lap(trajectory, begin), lap(trajectory, t1_s) + 1):
         offset_s = number * (last - first)

@@ -15,6 +15,7 @@ from .episode import Episode, Outcome
 from .fleet import Fleet, run_fleet
 from .planner_observations import Observe, observe_scan, observe_sectors
 from .scenario import Scenario
+from .triggers import before_triggers
 from .world import World
 
 T = TypeVar("T")
@@ -47,7 +48,7 @@ def episode_generator(
         ticks.append(path_planner.plan(obs))
         truth.append(world.pose)
     return Episode(
-        scenario=scenario,
+        scenario=before_triggers(scenario),  # which may be that of another run
         sensor=sensor,
         planner=planner,
         seed=seed,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isnan
 
 from ..core.errors import ConfigError
@@ -15,6 +16,8 @@ from .nearby_obstacles import Nearby, NearbyObstacles
 from .obstacle_motion import velocity_at
 from .scenario import Scenario
 from .sensor_noise import NoisySensors, Reading
+from .triggered_motion import is_waiting, start_triggered
+from .triggers import before_triggers
 
 GOAL_SIGMAS = 4.0  # standard deviations of odometry by which the goal may be missed
 
@@ -26,21 +29,26 @@ def advance(pose: Pose2D, velocity: Point, tick_ns: int) -> Pose2D:
 
 
 class World:
-    """State of the simulated world at one tick; the node world_sim wraps it."""
+    """State of the simulated world at one tick; the node world_sim wraps it.
+
+    Obstacles that wait for a trigger start at the ticks at which the robot reaches it; `scenario`
+    is that of the run so far.
+    """
 
     def __init__(
         self, scenario: Scenario, tick_ns: int, goal_tolerance_m: float, seed: int = 0
     ) -> None:
         """Put the robot at the start, at tick 0; seed is that of the sensor noise.
 
-        Raises ConfigError for a scenario of several robots.
+        All triggers are unreached, even if the scenario is that of a run before. Raises
+        ConfigError for a scenario of several robots.
         """
         if scenario.robots:
             raise ConfigError(
                 f"scenario {scenario.name!r}: names {len(scenario.robots)} robots, not "
                 "one; use simulation.fleet"
             )
-        self.scenario = scenario
+        self.scenario = before_triggers(scenario)
         self.segments = scenario.segments
         self.tick_ns = tick_ns
         self.goal_tolerance_m = goal_tolerance_m
@@ -49,7 +57,25 @@ class World:
         self.speeds = Speeds()  # of a differential drive
         self._instruments = NoisySensors(scenario, tick_ns, seed)
         self._read: tuple[int, Reading] | None = None
-        self._nearby = NearbyObstacles(Motion(scenario), tick_ns)
+        self._set_obstacles()
+        self._check_triggers()
+
+    def _set_obstacles(self) -> None:
+        self._nearby = NearbyObstacles(Motion(self.scenario), self.tick_ns)
+        self._waits = any(map(is_waiting, self.scenario.obstacles))
+
+    def _check_triggers(self) -> None:
+        """Start the obstacles whose trigger is reached at this tick."""
+        self.start_triggered([self.pose.position])
+
+    def start_triggered(self, positions: list[Point]) -> None:
+        """Start, at this tick, the obstacles whose trigger a robot at a position reaches."""
+        if not self._waits:
+            return
+        obstacles = start_triggered(self.scenario.obstacles, self.time_s, positions)
+        if obstacles != self.scenario.obstacles:
+            self.scenario = replace(self.scenario, obstacles=obstacles)
+            self._set_obstacles()
 
     def near(self, reach_m: float, position: Point | None = None) -> Nearby:
         """Indices, and (centre, enlarged radius), of the obstacles that may be within reach now.
@@ -120,6 +146,13 @@ class World:
         for kidnapping in self.scenario.kidnappings:
             if before_s < kidnapping.at_s <= self.time_s:
                 self.put(Pose2D(*kidnapping.to_m, self.pose.yaw))
+        self._check_triggers()
+
+    def follow(self, pose: Pose2D) -> None:
+        """Advance by one tick to a pose, as recorded of a run, instead of by a command."""
+        self.pose = pose
+        self.tick += 1
+        self._check_triggers()
 
     def put(self, pose: Pose2D) -> None:
         """Place the robot at a pose, at rest."""

@@ -268,6 +268,26 @@ def test_reset_restores_everything_but_the_stamps(graph: Graph) -> None:
     assert len(goals) == 2
 
 
+def test_a_reset_makes_triggers_unreached(graph: Graph) -> None:
+    trigger = {"within_m": 0.9, "point_m": [1.0, 0.0]}
+    waits = [{**OBSTACLES[0], "trigger": trigger}]
+    driver = Driver(graph, LOCKSTEP | {"scenario": scenario(obstacles=waits, goal_m=[5.0, 0.0])})
+    driver.wait_for_ticks(1)
+
+    def centers(count: int) -> list[tuple[float, float]]:
+        for _ in range(3):
+            driver.drive(twist(0.5))
+        graph.until(lambda: len(driver.obstacles) == count)
+        return [(m.poses[0].position.x, m.poses[0].position.y) for m in driver.obstacles]
+
+    first = centers(4)
+    number = next(k for k, (x, y) in enumerate(driver.positions) if math.hypot(x - 1.0, y) <= 0.9)
+    assert [point == (3.0, 9.0) for point in first] == [k <= number for k in range(4)]
+    driver.trigger("reset")
+    driver.wait_for_ticks(5)
+    assert centers(8)[4:] == first
+
+
 def test_a_command_from_before_a_reset_does_not_move_the_new_run(driver: Driver) -> None:
     driver.trigger("reset")
     driver.wait_for_ticks(2)

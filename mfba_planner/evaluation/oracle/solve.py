@@ -13,6 +13,7 @@ from ...core.geometry import distance
 from ...simulation.constant_velocity_segments import UniformSegments, uniform_segments
 from ...simulation.obstacle_motion import Walls
 from ...simulation.scenario import Scenario
+from ...simulation.triggers import with_triggers
 from .distance_to_go import DistanceToGo
 from .infeasibility_proof import unreachable
 from .lattice_search import LatticeParams, lattice_paths
@@ -39,11 +40,18 @@ def solve(
     """The shortest collision-free trajectory found at constant speed, with full knowledge.
 
     The robot may cross Scenario.walls, as in every run, but no wall segment; inside keeps its
-    centre within a rectangle (start and goal have to lie in it). Raises ConfigError for a speed
-    that is not above 0.
+    centre within a rectangle (start and goal have to lie in it). Undecided where an obstacle
+    waits for a trigger. Raises ConfigError for a speed that is not above 0.
     """
     if not (math.isfinite(speed_mps) and speed_mps > 0.0):
         raise ConfigError(f"speed_mps={speed_mps}: no speed; give a number above 0")
+    if numbers := with_triggers(scenario):
+        return Solution(
+            certificate=Certificate.UNDECIDED,
+            speed_mps=speed_mps,
+            straight_m=distance(scenario.start_m, scenario.goal_m),
+            reason=f"obstacle {numbers[0]} waits for a trigger: its motion depends on the path",
+        )
     task = _Task(scenario, speed_mps, params or SearchParams(), inside)
     reason = ""
     for points in task.paths():

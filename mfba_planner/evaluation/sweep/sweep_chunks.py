@@ -10,6 +10,7 @@ from typing import Any
 
 from ...core.errors import MfbaError
 from ...simulation.scenario import Scenario
+from ...simulation.triggers import with_triggers
 from ..oracle import solve
 from ..study.chunk import Columns
 from ..suites.scenario_suite import ScenarioSet
@@ -126,11 +127,14 @@ def solve_world(world: int, optima: OracleChunk) -> Row:
     scenario = optima.world(world)
     solution = solve(scenario, optima.speed_mps)
     area = ROOM if optima.scenarios is None else area_of(scenario)
+    share = None  # a robot that stands still may or may not have started what waits
+    if not with_triggers(scenario):
+        share = survivability(scenario, optima.speed_mps, area).share
     return {
         "world": world,
         "certificate": solution.certificate.value,
         "optimum_m": round(solution.length_m, DIGITS),
-        "survivability": survivability(scenario, optima.speed_mps, area).share,
+        "survivability": share,
     }
 
 

@@ -30,6 +30,7 @@ from mfba_planner.simulation.batched_motion import Motion
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.obstacle_motion import velocity_at
+from mfba_planner.simulation.triggers import before_triggers
 
 MOST_RUNS = 6  # side by side
 MOST_ROBOTS = 36  # of a fleet in one scene: colours and dashes distinguish 36 lines
@@ -55,7 +56,7 @@ def page_data(
         _union(
             view
             for view, (_, other) in zip(views, runs)
-            if roster or other.scenario == episode.scenario
+            if roster or before_triggers(other.scenario) == before_triggers(episode.scenario)
         )
         for _, episode in runs
     ]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -96,8 +97,11 @@ def _scans(episode: Episode) -> Iterator[Scan | None]:
     params = episode.planner
     world = World(episode.scenario, params.tick_ns, params.goal_tolerance_m, episode.seed)
     for number, tick in enumerate(episode.ticks):
-        world.tick = number
-        world.pose = episode.truth[number] if episode.truth else tick.pose
+        pose = episode.truth[number] if episode.truth else tick.pose
+        if number:
+            world.follow(pose)
+        else:
+            world.pose = pose
         yield world.read().scan
 
 
@@ -106,7 +110,7 @@ def _tick_messages(
 ) -> Iterator[tuple[topics.Topic, Any]]:
     """The messages of world, sensor and planner; velocity is that of the previous tick."""
     scenario, stamp, time_s = episode.scenario, tick.stamp_ns, episode.time_s(tick.stamp_ns)
-    circles = scenario.enlarged(time_s)
+    circles = [circle for circle in scenario.enlarged(time_s) if not math.isnan(circle[0][0])]
     ranges = tick.ranges_m or sense_circles_and_segments(
         tick.pose.position, circles, scenario.segments, scenario.robot_radius_m, episode.sensor
     )
