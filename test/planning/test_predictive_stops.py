@@ -10,9 +10,14 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.geometry import Pose2D, distance
 from mfba_planner.core.planner_types import Circle, Mode, Observation
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.base_planner import Move
+from mfba_planner.planning.differential_drive import Speeds
+from mfba_planner.planning.obstacles_at_rest import ObstaclesAtRest
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive_planner import Predictive, preset
+from mfba_planner.planning.stopping_path import stopping_path
 
 PARAMS = preset(PlannerParams(speed_mps=0.8))
 GOAL = (9.0, 8.0)
@@ -106,6 +111,25 @@ def test_no_velocity_brings_contact_with_what_stands_before_the_robot_can_stop(
             edge = distance((POSE.x + vx * t, POSE.y + vy * t), c.center_m) - c.radius_m
             before = distance(POSE.position, c.center_m) - c.radius_m
             assert edge >= min(0.0, before) - 1e-7
+
+
+@given(st.floats(0.1, 0.8), st.floats(-math.pi, math.pi), st.floats(-0.4, 0.4))
+def test_a_differential_base_in_the_open_keeps_off_by_the_way_on_which_it_brakes(
+    v: float, yaw: float, aside_rad: float
+) -> None:
+    """Whatever is chosen: here full speed at what is as near as it may be to stop in time."""
+    made = Predictive(replace(PARAMS, drive=Drive.DIFFERENTIAL), SensorParams(), 0)
+    made._speeds = speeds = Speeds(v, 0.0)
+    goal_m = distance(POSE.position, GOAL)
+    still = stopping_path((0.0, 0.0), goal_m, yaw, speeds, made.params, made.tick_s)
+    away_m = 0.5 + math.hypot(*still[-1].tolist()) + 0.01
+    x, y = POSE.x + away_m * math.cos(yaw + aside_rad), POSE.y + away_m * math.sin(yaw + aside_rad)
+    at_rest = ObstaclesAtRest(POSE.position, [Circle(center_m=(x, y), radius_m=0.5)])
+    chosen = Move(velocity=(0.8 * math.cos(yaw), 0.8 * math.sin(yaw)), reason="ahead")
+    velocity = made._kept_off(chosen, at_rest, Pose2D(POSE.x, POSE.y, yaw), goal_m).velocity
+    path = stopping_path(velocity, goal_m, yaw, speeds, made.params, made.tick_s)
+    nearest_m = min(distance((POSE.x + px, POSE.y + py), (x, y)) for px, py in path.tolist())
+    assert nearest_m >= 0.5 - 1e-3
 
 
 def sector_observation(tick: int, *ranges: float) -> Observation:
