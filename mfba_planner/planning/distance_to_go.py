@@ -3,7 +3,8 @@
 
 In eq. 1 it takes the place of the straight line from a waypoint to the goal. It solves the
 eikonal equation |grad D| F = 1 by fast marching (Sethian 1996) from the goal; F is the share of
-the full speed, small near what stands. Unknown space counts as free.
+the full speed, small near what stands, by the lidar or by a known map. Unknown space counts as
+free.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
 from ..core.planner_types import NANO
-from ..perception.distance_field import DistanceField, bilinear
+from ..perception.distance_field import DistanceField, bilinear, distance_field
+from ..perception.known_map import UnclearedMap
 from ..perception.static_map import StaticMap
 
 Array = np.ndarray
@@ -56,13 +58,15 @@ class DistanceToGo:
     def __init__(self, params: RouteParams, radius_m: float) -> None:
         """radius_m is the robot's."""
         self._params, self._radius_m = params, radius_m
+        self.known_map: UnclearedMap | None = None
         self.goal: Point = (0.0, 0.0)
         self.is_straight = True
         self.closed_by = ""  # what stands between robot and goal on every way, "" if one is open
         self._closing = ""  # the same, at this moment
         self._closed_ns: int | None = None  # since when
         self._margin_m = _MARGIN_M
-        self._computed: tuple[int, int, Point] | None = None  # stamp, map version, goal
+        # stamp, versions of the maps, goal
+        self._computed: tuple[int, tuple[int, int], Point] | None = None
         self._to_go: Array | None = None
         self._beyond_m = 0.0
         self._step: Array | None = None  # unit vectors of the shortest way, complex
@@ -72,22 +76,47 @@ class DistanceToGo:
     def update(self, stamp_ns: int, known: StaticMap, position: Point, goal: Point) -> None:
         """Take the map as it is now."""
         self.goal = goal
-        self.is_straight = is_clear(known, position, goal, self._radius_m + _CLEAR_M)
+        room_m = self._radius_m + _CLEAR_M
+        self.is_straight = is_clear(known, position, goal, room_m) and self._is_clear(
+            position, goal, room_m
+        )
         if self.is_straight:
             self.closed_by, self._closing, self._closed_ns = "", "", None
             self._margin_m = _MARGIN_M
             return
+        now = (known.version, self.known_map.version if self.known_map else 0)
         if self._computed is not None:
-            then_ns, version, then_goal = self._computed
+            then_ns, versions, then_goal = self._computed
             age_s = (stamp_ns - then_ns) * NANO
-            fresh = 0.0 <= age_s < self._params.refresh_s or version == known.version
+            fresh = 0.0 <= age_s < self._params.refresh_s or versions == now
             same = distance(then_goal, goal) < _SAME_GOAL_M
             if fresh and same and self._is_inside(position):
                 self._closed_for(stamp_ns)
                 return
         self._closing = self._compute(known, position, goal)
-        self._computed = (stamp_ns, known.version, goal)
+        self._computed = (stamp_ns, now, goal)
         self._closed_for(stamp_ns)
+
+    def _is_clear(self, start: Point, end: Point, room_m: float) -> bool:
+        """is_clear() by the known map."""
+        if self.known_map is None:
+            return True
+        low = (min(start[0], end[0]) - room_m, min(start[1], end[1]) - room_m)
+        high = (max(start[0], end[0]) + room_m, max(start[1], end[1]) + room_m)
+        return are_clear(self.known_map.near(low, high), start, end, room_m)
+
+    def _field(self, known: StaticMap, low: Point, high: Point, cell_m: float) -> DistanceField:
+        """Distances to what stands in a rectangle, by the lidar and by the known map."""
+        if self.known_map is None:
+            return known.rectangle_field(low, high, cell_m)
+        cap_m = known.params.widest_m
+        beside = cap_m + cell_m
+        more = self.known_map.near(
+            (low[0] - beside, low[1] - beside), (high[0] + beside, high[1] + beside)
+        )
+        # In a cell with points of both the last counts, which is the lidar's.
+        x, y = np.concatenate((more, known.established_points())).T
+        return distance_field(x, y, low, high, cell_m, cap_m)
 
     def _closed_for(self, stamp_ns: int) -> None:
         """Say what closes the way once it has for long enough."""
@@ -113,7 +142,7 @@ class DistanceToGo:
         fine = known.params.cell_m
         low, high, per_cell = _domain(position, target, fine, self._margin_m)
         self._cell_m = fine * per_cell
-        field = known.rectangle_field(low, high, fine)
+        field = self._field(known, low, high, fine)
         self._origin = field.origin_m
         widest_m = _widest(field.distance_m, per_cell)
         speed = _speed(widest_m, self._radius_m)
@@ -208,7 +237,11 @@ class DistanceToGo:
 
 def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:
     """Whether no point of the map is nearer to the line than room_m; its ends may be."""
-    points = known.established_points()
+    return are_clear(known.established_points(), start, end, room_m)
+
+
+def are_clear(points: Array, start: Point, end: Point, room_m: float) -> bool:
+    """is_clear() of points (n, 2)."""
     if not points.shape[0]:
         return True
     x, y = points[:, 0] - start[0], points[:, 1] - start[1]

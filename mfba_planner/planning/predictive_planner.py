@@ -12,6 +12,7 @@ import numpy as np
 from ..core.geometry import Point, bearing, distance
 from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
+from ..perception.known_map import KnownMap
 from ..perception.obstacle_memory import ObstacleMemory
 from ..perception.obstacle_tracker import Tracker
 from ..perception.scan_coverage import ScanCoverage
@@ -77,6 +78,7 @@ class Predictive(BasePlanner):
     _speeds: Speeds = Speeds()
     _unobserved: np.ndarray | None = None  # headings the lidar has not covered; None: none
     _coverage: ScanCoverage
+    _known_map: KnownMap | None = None
 
     def __init__(
         self,
@@ -295,7 +297,14 @@ class Predictive(BasePlanner):
         self._map_planning = MapPlanning(
             self.params, self.options.map, self.options.route, self.options.risk,
             self.options.headings, self.options.reach_m, self.options.search_m, self.seed,
+            self._known_map,
         )  # fmt: skip
+
+    def set_known_map(self, known_map: KnownMap | None) -> None:
+        """Take a map that is known before the drive; another one than before: forget()."""
+        if known_map is not self._known_map:
+            self._known_map = known_map
+            self.forget()
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
         """Circles at obs.pose_ns: given and remembered, tracked, or one for each set sector."""

@@ -15,6 +15,7 @@ from .episode import Episode, Outcome
 from .fleet import Fleet, run_fleet
 from .planner_observations import Observe, observe_scan, observe_sectors
 from .scenario import Scenario
+from .scenario_map import with_known_map
 from .world import World
 
 T = TypeVar("T")
@@ -109,7 +110,7 @@ def simulate(
         sensor=sensor,
         seed=seed,
         go_on=go_on,
-        path_planner=make_planner(params, sensor, seed),
+        path_planner=with_known_map(make_planner(params, sensor, seed), params, scenario),
         observe=observe_scan if params.reads_scan else observe_sectors,
     )
 
@@ -130,6 +131,8 @@ def simulate_fleet(
         sensor=sensor,
         seed=seed,
         go_on=go_on,
-        path_planner=lambda child: make_planner(params, sensor, child),
+        path_planner=lambda child: with_known_map(
+            make_planner(params, sensor, child), params, scenario
+        ),
         observe=observe_scan if params.reads_scan else observe_sectors,
     )
