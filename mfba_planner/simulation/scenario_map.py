@@ -36,8 +36,8 @@ def scenario_grid(scenario: Scenario) -> OccupancyGrid:
     count = np.ceil(length / (CELL_M / _PER_CELL)).astype(np.int64) + 1
     if width * height > MOST_CELLS or int(count.sum()) > _MOST_SAMPLES:
         raise ConfigError(
-            f"known_map=true: the walls of scenario {scenario.name!r} make a map of {width} x "
-            f"{height} cells of {CELL_M:.2f} m, more than {MOST_CELLS}; leave known_map out"
+            f"the walls of scenario {scenario.name!r} make a map of {width} x {height} cells of "
+            f"{CELL_M:.2f} m, more than {MOST_CELLS}; leave known_map and publish_map out"
         )
     cells = np.full((height, width), FREE, dtype=np.int8)
     if scenario.segments_m:
@@ -53,6 +53,7 @@ def scenario_grid(scenario: Scenario) -> OccupancyGrid:
 
 def with_known_map(path_planner: P, params: PlannerParams, scenario: Scenario) -> P:
     """The planner, with the scenario's walls as its map if params.known_map says so."""
-    if params.known_map and isinstance(path_planner, TakesKnownMap):
-        path_planner.set_known_map(known_map(scenario_grid(scenario)))
+    takes: object = path_planner
+    if params.known_map and isinstance(takes, TakesKnownMap):
+        takes.set_known_map(known_map(scenario_grid(scenario)))
     return path_planner
