@@ -27,6 +27,7 @@ _LEVEL_RAD = 1e-6  # a yaw that is rounding
 _SCANS = 2  # in a row that must see through a point
 _BEHIND_M = 0.3  # they must end so much behind it: a cell is not where its wall is exactly
 _TURN_SD_RAD = 0.01
+_LINE_M = 5.0  # a line is looked at in parts of this length
 
 
 class KnownMap:
@@ -134,6 +135,23 @@ class UnclearedMap:
     def near(self, low: Point, high: Point) -> Array:
         """Points (k, 2) between two corners."""
         return self._known.points_m[self._near(low, high)]
+
+    def along(self, start: Point, end: Point, room_m: float) -> Array:
+        """Points (k, 2) near a line: all that are nearer to it than room_m, and others."""
+        (x0, y0), (x1, y1) = start, end
+        parts = max(math.ceil(max(abs(x1 - x0), abs(y1 - y0)) / _LINE_M), 1)
+        found = []
+        for k in range(parts):
+            ax, bx = (x0 + (x1 - x0) * m / parts for m in (k, k + 1))
+            ay, by = (y0 + (y1 - y0) * m / parts for m in (k, k + 1))
+            low = (min(ax, bx) - room_m, min(ay, by) - room_m)
+            found.append(self.near(low, (max(ax, bx) + room_m, max(ay, by) + room_m)))
+        return np.concatenate(found)
+
+    def bounds(self) -> tuple[Point, Point]:
+        """The corners of all points."""
+        (x0, y0), (x1, y1) = (f(self._known.points_m, axis=0).tolist() for f in (np.min, np.max))
+        return (x0, y0), (x1, y1)
 
     def _near(self, low: Point, high: Point) -> Array:
         found = self._known.near(low, high)

@@ -20,13 +20,12 @@ from ..core.planner_types import NANO
 from ..perception.distance_field import DistanceField, bilinear, distance_field
 from ..perception.known_map import UnclearedMap
 from ..perception.static_map import StaticMap
+from .eikonal import downhill, march, speed_share
+from .known_route import KnownRoute
 
 Array = np.ndarray
 
 _CLEAR_M = 0.04  # beside the robot's radius: a straight line with so much room is driven
-_TOUCH_M = 0.01  # nearer than so much beyond the radius counts as closed
-_CLOSED = 0.02  # F there; not 0, so that the distance to go stays finite
-_SLOWEST, _ROOM_M = 0.5, 0.3  # F beside what stands, and from where it is 1
 _MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
 _MOST_CELLS = 20_000  # about 8 ms
 _SAME_GOAL_M = 0.1  # noise of the odometry moves the goal in the map's frame
@@ -55,10 +54,14 @@ class DistanceToGo:
     distance to go is the straight line.
     """
 
-    def __init__(self, params: RouteParams, radius_m: float) -> None:
+    def __init__(
+        self, params: RouteParams, radius_m: float, known_map: UnclearedMap | None = None
+    ) -> None:
         """radius_m is the robot's."""
         self._params, self._radius_m = params, radius_m
-        self.known_map: UnclearedMap | None = None
+        self.known_map = known_map
+        self._route = None if known_map is None else KnownRoute(known_map, radius_m)
+        self._by_route = False  # also to a goal that is near: its way leads far round
         self.goal: Point = (0.0, 0.0)
         self.is_straight = True
         self.closed_by = ""  # what stands between robot and goal on every way, "" if one is open
@@ -82,7 +85,7 @@ class DistanceToGo:
         )
         if self.is_straight:
             self.closed_by, self._closing, self._closed_ns = "", "", None
-            self._margin_m = _MARGIN_M
+            self._margin_m, self._by_route = _MARGIN_M, False
             return
         now = (known.version, self.known_map.version if self.known_map else 0)
         if self._computed is not None:
@@ -93,17 +96,15 @@ class DistanceToGo:
             if fresh and same and self._is_inside(position):
                 self._closed_for(stamp_ns)
                 return
-        self._closing = self._compute(known, position, goal)
+        self._closing = self._compute(stamp_ns, known, position, goal)
         self._computed = (stamp_ns, now, goal)
         self._closed_for(stamp_ns)
 
     def _is_clear(self, start: Point, end: Point, room_m: float) -> bool:
         """is_clear() by the known map."""
-        if self.known_map is None:
-            return True
-        low = (min(start[0], end[0]) - room_m, min(start[1], end[1]) - room_m)
-        high = (max(start[0], end[0]) + room_m, max(start[1], end[1]) + room_m)
-        return are_clear(self.known_map.near(low, high), start, end, room_m)
+        return self.known_map is None or are_clear(
+            self.known_map.along(start, end, room_m), start, end, room_m
+        )
 
     def _field(self, known: StaticMap, low: Point, high: Point, cell_m: float) -> DistanceField:
         """Distances to what stands in a rectangle, by the lidar and by the known map."""
@@ -126,32 +127,33 @@ class DistanceToGo:
         lasts = self._closed_ns is not None and stamp_ns - self._closed_ns >= _CLOSED_NS
         self.closed_by = self._closing if lasts else ""
 
-    def _compute(self, known: StaticMap, position: Point, goal: Point) -> str:
+    def _compute(self, stamp_ns: int, known: StaticMap, position: Point, goal: Point) -> str:
         """Compute the distance to go; what closes every way to the goal, "" if nothing."""
-        import eikonalfm  # only here: most runs in the open do not need it
-
-        target = goal
+        target, low, high = goal, position, goal
+        self._beyond_m = 0.0
         away = distance(position, goal)
-        if away > _FARTHEST_M:
+        if self._route is not None and (self._by_route or away > _FARTHEST_M):
+            stood = known.established_points()
+            target, self._beyond_m, low, high = self._route.part(stamp_ns, position, goal, stood)
+        elif away > _FARTHEST_M:
             share = _FARTHEST_M / away
             target = (
                 position[0] + share * (goal[0] - position[0]),
                 position[1] + share * (goal[1] - position[1]),
             )
-        self._beyond_m = distance(target, goal)
+            high, self._beyond_m = target, distance(target, goal)
         fine = known.params.cell_m
-        low, high, per_cell = _domain(position, target, fine, self._margin_m)
+        low, high, per_cell = _domain(low, high, fine, self._margin_m)
         self._cell_m = fine * per_cell
         field = self._field(known, low, high, fine)
         self._origin = field.origin_m
         widest_m = _widest(field.distance_m, per_cell)
-        speed = _speed(widest_m, self._radius_m)
+        speed = speed_share(widest_m, self._radius_m)
         height, width = speed.shape
         i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
         j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
-        to_go = eikonalfm.fast_marching(speed, (j, i), (self._cell_m, self._cell_m), 2)
-        self._to_go = to_go
-        self._step = _downhill(to_go)
+        self._to_go = march(speed, (j, i), self._cell_m)
+        self._step = downhill(self._to_go)
         if self._beyond_m:
             return ""  # the map does not reach so far
         cell = (position[0] - self._origin[0]) / self._cell_m
@@ -161,7 +163,10 @@ class DistanceToGo:
         if leads_out and self._margin_m < all_m:
             # Beyond what the map holds, all is free: a way round is known or assumed there.
             self._margin_m = all_m
-            return self._compute(known, position, goal)
+            return self._compute(stamp_ns, known, position, goal)
+        if leads_out and self._route is not None and not self._by_route:
+            self._by_route = True
+            return self._compute(stamp_ns, known, position, goal)
         return closing
 
     def _closed(
@@ -281,27 +286,3 @@ def _widest(values: Array, per_cell: int) -> Array:
     rows = functools.reduce(np.maximum, parts)
     largest: Array = functools.reduce(np.maximum, [rows[j::per_cell] for j in range(per_cell)])
     return largest
-
-
-def _speed(clearance_m: Array, radius_m: float) -> Array:
-    """Share of the full speed at distances from what stands."""
-    room = (clearance_m - radius_m - _TOUCH_M) / _ROOM_M
-    speed = _SLOWEST + (1.0 - _SLOWEST) * np.minimum(room, 1.0)
-    speed[room < 0.0] = _CLOSED
-    return speed
-
-
-def _downhill(to_go: Array) -> Array:
-    """Unit vectors (complex) down the distance to go; 0 at its least.
-
-    By differences to the lower neighbours alone, as in the scheme that computes it: central ones
-    would point across a narrow door, at what closes it.
-    """
-    padded = np.pad(to_go, 1, constant_values=np.inf)
-    left, right = to_go - padded[1:-1, :-2], to_go - padded[1:-1, 2:]
-    below, above = to_go - padded[:-2, 1:-1], to_go - padded[2:, 1:-1]
-    step = np.maximum(np.maximum(left, right), 0.0) * np.where(right > left, 1.0, -1.0) + 1j * (
-        np.maximum(np.maximum(below, above), 0.0) * np.where(above > below, 1.0, -1.0)
-    )
-    found: Array = step / (np.abs(step) + 1e-12)
-    return found

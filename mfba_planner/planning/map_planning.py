@@ -60,11 +60,10 @@ class MapPlanning:
         self._risk = risk.for_turning() if params.turns else risk
         self._search_m = search_m
         self.map = StaticMap(map_params)
-        self.search = MapSearch(route, params.robot_radius_m, headings, reach_m)
         self._known_map: UnclearedMap | None = None
         if known_map is not None and known_map.count:
             self._known_map = UnclearedMap(known_map, map_params.spacing_m)
-        self.search.to_go.known_map = self._known_map
+        self.search = MapSearch(route, params.robot_radius_m, headings, reach_m, self._known_map)
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
 
