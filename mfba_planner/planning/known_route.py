@@ -15,7 +15,7 @@ from .eikonal import downhill, march, speed_share
 Array = np.ndarray
 
 _CELL_M, _COARSEST_M = 0.1, 0.2  # of the grid
-_MOST_CELLS = 250_000  # about 60 ms
+_MOST_CELLS = 250_000  # about 0.1 s, once per goal
 _MARGIN_M, _BESIDE_M = 4.0, 30.0  # around the map; around robot and goal if it is too large
 _CLOSED_SHARE = 0.75  # of a cell: so near to a wall its middle is closed, or walls would leak
 _CAP_M = 0.8
