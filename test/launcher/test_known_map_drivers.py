@@ -6,16 +6,23 @@ from pathlib import Path
 
 import pytest
 from launched_programs import complete
+from ros_graph import Graph
 
 from mfba_planner import cli
 from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.launcher import in_process_driver
 from mfba_planner.launcher.run_arguments import read_request
+from mfba_planner.planning.planner_params import Method, PerceptionInput
 from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.from_messages import known_map_from
+from mfba_planner.recording.from_messages import decision, known_map_from, sector_ranges
 from mfba_planner.recording.read_episode import read_episode
+from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.episode_to_bag import write_episode_bag
-from mfba_planner.scenarios.run_config import Driver, RunConfig
+from mfba_planner.ros.nodes.planner import PlannerNode
+from mfba_planner.ros.nodes.replay import Replay
+from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
+from mfba_planner.ros.replaying.replay_arguments import parse
+from mfba_planner.scenarios.run_config import Driver, RunConfig, graph_parameters
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.run_episode import simulate
@@ -119,6 +126,33 @@ def test_the_bag_of_a_core_run_verifies_by_the_scenario(expected: Episode, tmp_p
         assert "/map" not in reader.topics
     report = verify(tmp_path / "bag")
     assert report.is_identical, report.faults
+
+
+def test_the_bag_of_a_planner_that_takes_no_map_is_written(
+    expected: Episode, tmp_path: Path
+) -> None:
+    """In a sweep the option is given for all planners."""
+    planner = replace(expected.planner, perception=PerceptionInput.AUTO, method=Method.PAPER)
+    other = replace(expected, planner=planner, planner_name="dwa")
+    write_episode_bag(other, tmp_path / "bag")
+    assert not read_episode(tmp_path / "bag").planner.known_map
+
+
+def test_a_replayed_bag_gives_the_map_and_the_same_decisions(
+    graph: Graph, bag: Path, config: RunConfig, expected: Episode
+) -> None:
+    """The map is one message, and no tick is repeated for a planner that waits for it."""
+    decisions, sectors = graph.collect(topics.DECISION), graph.collect(topics.SECTORS)
+    parameters = graph_parameters(config, ())
+    graph.start(VirtualSensor, parameters["virtual_sensor"] | {"wait_for": "planner"})
+    graph.start(PlannerNode, parameters["planner"])
+    line = "--as-fast-as-possible --inputs-of virtual_sensor planner --exclude obstacles"
+    replay = graph.start(Replay, {}, settings=parse([str(bag), *line.split()]))
+    while not replay.finished:
+        replay.spin_once(graph.executor)
+    graph.until(lambda: len(decisions) >= len(expected.ticks))
+    found = [decision(why, sector_ranges(ring)) for why, ring in zip(decisions, sectors)]
+    assert digest(found) == digest(expected.ticks)
 
 
 def test_a_fleet_has_the_map_for_each_robot(tmp_path: Path, domain_id: int) -> None:

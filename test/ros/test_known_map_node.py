@@ -33,7 +33,12 @@ class Robot:
     def __init__(self, graph: Graph, **parameters: Any) -> None:
         self.graph, self.tick = graph, 0
         self.diagnostics = graph.collect(topics.DIAGNOSTICS)
-        values = {**flatten(SCANNING), **LOCKSTEP, "known_map": True} | parameters
+        values = {
+            **flatten(SCANNING),
+            **LOCKSTEP,
+            "known_map": True,
+            "wait_for": "probe",
+        } | parameters
         self.harness = PlannerHarness(graph, values, at=(9.0, 0.0))
         self.node = self.harness.node
         self.scans: Publisher = graph.writer(topics.SCAN)
@@ -69,12 +74,18 @@ def refused(robot: Robot) -> dict[str, int]:
 def test_in_lockstep_it_waits_for_the_map_and_then_drives_round_the_wall(graph: Graph) -> None:
     robot = Robot(graph)
     assert robot.node.missing() == NONE_YET
-    assert robot.decide() == []
+    assert robot.decide() + robot.decide() == []
     robot.publish(wall_map())
     assert robot.node.missing() == ""
+    assert len(robot.harness.decisions) == 2, "of the ticks before, as a replay does not repeat"
     (decision,) = robot.decide()
     assert "the way through the map is 1" in fields(decision)["reason"]
     assert robot.harness.velocity[1] < -0.1, "towards its near end"
+
+
+def test_without_peers_ready_does_not_wait_for_the_map(graph: Graph) -> None:
+    """A replay that waits for ~/ready is what publishes it."""
+    assert Robot(graph, wait_for="").node.missing() == ""
 
 
 def test_diagnostics_name_what_it_waits_for(graph: Graph) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -32,6 +33,8 @@ from ..runtime.stamp_pairing import StampPairs
 from .known_map_subscription import KnownMapSubscription
 from .planner_diagnostics import PlannerDiagnostics
 
+MOST_HELD = 1000
+
 
 class InputSubscriptions:
     """Calls on_inputs for each pair of odom and sectors; a refused message is its error text.
@@ -56,7 +59,9 @@ class InputSubscriptions:
         self._is_subscribed = self._is_subscribed_to_scan = False
         self._refused_inputs, self._diagnostics = refused_inputs, diagnostics
         self._on_inputs = on_inputs
-        self.map = KnownMapSubscription(node, settings.odom_frame, refused_inputs, diagnostics)
+        self.map = KnownMapSubscription(
+            node, settings.odom_frame, refused_inputs, diagnostics, self._deliver_held
+        )
         self.range_max_m = 0.0  # of the newest sectors
         self.fields: dict[str, str] = {}  # of planner/decision: see scan_fields
         self.reset()
@@ -68,6 +73,7 @@ class InputSubscriptions:
             LockstepInputs() if lockstep else NewestInputs()
         )
         limit = None if lockstep else PAIRED
+        self._held: deque[Inputs] = deque(maxlen=MOST_HELD)  # lockstep: until there is a map
         self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True, limit=limit)
         self._monitor.reset()
 
@@ -200,8 +206,16 @@ class InputSubscriptions:
                 self._refuse(name, fault)
             return
         self._diagnostics.input_received(name, stamp, now_s, fault)
-        if inputs is not None:
+        if inputs is None:
+            return
+        if self._settings.lockstep and self.map.missing:
+            self._held.append(inputs)  # a bag that is replayed does not repeat them
+        else:
             self._on_inputs(inputs)
+
+    def _deliver_held(self) -> None:
+        while self._held:
+            self._on_inputs(self._held.popleft())
 
     def _convert(self, name: str, message: Any, convert: Any, frame: str) -> tuple[Any, str]:
         """The value and "", or the error text twice: as the value and as the fault."""

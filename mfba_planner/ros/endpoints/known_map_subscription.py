@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from ...core.errors import InputError
@@ -30,11 +31,12 @@ class KnownMapSubscription:
         frame: str,
         refused_inputs: RefusedInputs,
         diagnostics: PlannerDiagnostics,
+        on_taken: Callable[[], None],
     ) -> None:
-        """Subscribe to nothing yet; frame is that of the map."""
+        """Subscribe to nothing yet; frame is that of the map; on_taken is called for the first."""
         self._node, self._frame = node, frame
         self._refused_inputs, self._diagnostics = refused_inputs, diagnostics
-        self._params = PlannerParams()
+        self._params, self._on_taken = PlannerParams(), on_taken
         self.reset()
 
     def reset(self) -> None:
@@ -75,8 +77,10 @@ class KnownMapSubscription:
         except InputError as error:
             self._refused_inputs.add(error, "map")
             self._refusal = str(error)
-        else:
-            if self._received is None:
-                self._received = received
-                self._node.get_logger().info(f"map: {received.count} points are known")
-        self._tell()
+            self._tell()
+            return
+        if self._received is None:
+            self._received = received
+            self._node.get_logger().info(f"map: {received.count} points are known")
+            self._tell()
+            self._on_taken()

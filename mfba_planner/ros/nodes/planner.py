@@ -74,10 +74,10 @@ class PlannerNode(ManagedNode):
             self.deactivate()
 
     def missing(self) -> str:
-        """Besides the subscribers: the map, and the goal when ~/ready waits for peers."""
-        needs_goal = self._peers and not self.goals.goal_queue.goal
-        own = self._inputs.map.missing or ("no goal_pose yet" if needs_goal else "")
-        return super().missing() or own
+        """Besides the subscribers: the map and the goal, when ~/ready waits for peers."""
+        no_goal = "" if self.goals.goal_queue.goal else "no goal_pose yet"
+        own = self._inputs.map.missing or no_goal
+        return super().missing() or (own if self._peers else "")
 
     def _reset(self) -> None:
         self.path_planner.reset()
@@ -119,7 +119,7 @@ class PlannerNode(ManagedNode):
         if self.settings.lockstep and self._last and self._last.stamp_ns == inputs.stamp_ns:
             self._outputs.publish_command(self._last)  # a repeated tick: the command may be lost
             return
-        if self.settings.lockstep and (self._inputs.map.missing or self.goals.is_expected()):
+        if self.settings.lockstep and self.goals.is_expected():
             return  # just started: world_sim repeats the tick
         self._publish(self._plan(self._perceive(inputs)))
 
