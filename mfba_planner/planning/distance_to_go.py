@@ -167,6 +167,8 @@ class DistanceToGo:
         if leads_out and self._route is not None and not self._by_route:
             self._by_route = True
             return self._compute(stamp_ns, known, position, goal)
+        if closing and self.known_map is not None:
+            closing += ", by the known map or the lidar"
         return closing
 
     def _closed(

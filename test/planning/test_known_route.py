@@ -9,6 +9,7 @@ import pytest
 from point_maps import polyline
 
 from mfba_planner.core.geometry import Point
+from mfba_planner.core.planner_types import Mode
 from mfba_planner.core.segments import Segment
 from mfba_planner.perception.known_map import KnownMap, UnclearedMap
 from mfba_planner.perception.sensory_vector import SensorParams
@@ -113,12 +114,33 @@ def test_a_wall_that_is_not_in_the_map_is_not_touched() -> None:
     assert scenario.segments.distances(path[:, :1], path[:, 1:]).min() > 0.2
 
 
+def test_a_goal_that_the_map_closes_off_is_named_with_the_map() -> None:
+    scenario = place((6.0, 0.0), ())
+    params = scenario.planner_params(PARAMS)
+    planner = make_planner(params, SensorParams(), 0)
+    corners = [(5.0, -1.0), (7.0, -1.0), (7.0, 1.0), (5.0, 1.0), (5.0, -1.0)]
+    planner.set_known_map(KnownMap(np.array(polyline(*corners))))
+    episode = run(
+        scenario,
+        planner=params,
+        sensor=SensorParams(),
+        path_planner=planner,
+        observe=observe_scan,
+        go_on=lambda world: world.tick < 30,
+    )
+    reason = next(t.reason for t in episode.ticks if t.mode is Mode.BLOCKED)
+    assert reason.startswith(
+        "no way to the goal: closed by what stands around the goal, without a gap as wide as the "
+        "robot, by the known map or the lidar"
+    )
+
+
 def route(walls: tuple[Segment, ...]) -> KnownRoute:
     points = [p for x0, y0, x1, y1 in walls for p in polyline((x0, y0), (x1, y1))]
     return KnownRoute(UnclearedMap(KnownMap(np.array(points)), 0.12), 0.2)
 
 
-def test_the_parts_of_the_way_lead_round_the_walls_to_the_goal() -> None:
+def test_the_parts_lead_round_the_walls_to_the_goal() -> None:
     known_route, goal, position = route(TWO_WALLS), (32.0, 0.0), (0.0, 0.0)
     found = [position]
     for _ in range(10):
