@@ -35,6 +35,11 @@ bits.
 **Decisions.** `planner/decision` explains each decision: mode, Vs, Vg, chosen gap, waypoint, bat
 positions, and the reason as text.
 
+**Map.** `map` is a map known before the drive. `planner` reads it where its parameter `known_map`
+is true: from 65 on a cell is occupied, unknown counts as free. Its frame must be `odom_frame`, as
+no tf is read. The first that is not refused counts, and the planner waits for it. With
+`publish_map`, `world_sim` publishes the walls of its scenario.
+
 **Local map.** `local_map` is the map of `predictive` with a lidar: 100 occupied, 0 seen free, -1
 unknown, cut to the known cells. Its stamp is that of the newest scan. The origin has a small yaw
 where the map corrects the odometry. It is published when it has changed, at most once per

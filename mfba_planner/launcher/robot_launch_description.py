@@ -40,6 +40,7 @@ PLANNER_ARGUMENTS = {
     "cmd_vel": LaunchArgument("cmd_vel", "topic of the velocity command"),
     "goal_pose": LaunchArgument("goal_pose", "topic of a goal (RViz: 2D Goal Pose)"),
     "waypoints": LaunchArgument("waypoints", "topic of a sequence of goals (nav_msgs/Path)"),
+    "map": LaunchArgument("map", "topic of a map known before, where known_map is true"),
     "stamped": LaunchArgument("false", "cmd_vel is a TwistStamped, as in Nav2", TRUE_OR_FALSE),
 }
 
@@ -67,7 +68,7 @@ def robot_nodes(given: Mapping[str, str]) -> list[NodeStart]:
                 "enable_stamped_cmd_vel": ENABLED[given["stamped"]],
             },
             files=files,
-            remaps=remaps("scan", "odom", "cmd_vel", "goal_pose", "waypoints"),
+            remaps=remaps("scan", "odom", "cmd_vel", "goal_pose", "waypoints", "map"),
         ),
     ]
 

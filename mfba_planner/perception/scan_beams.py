@@ -112,3 +112,28 @@ class BeamReader:
             longest_m=scan.range_max_m,
             turns=count > 1 and spacing * count > 2.0 * math.pi - 0.5 * spacing,
         )
+
+
+def clear_lengths(beams: Beams, bearing: Array, turn_sd: float) -> tuple[Array, Array]:
+    """Least free length of the beams at and beside each bearing; angle to the nearest beam.
+
+    0 where one of them tells nothing.
+    """
+    clear = np.zeros(beams.count)
+    clear[beams.number] = np.minimum(beams.range_m, beams.longest_m)
+    beside = 1 + math.floor(2.0 * turn_sd / beams.spacing_rad)
+    least = clear.copy()
+    for k in range(1, beside + 1):
+        np.minimum(least[k:], clear[:-k], out=least[k:])
+        np.minimum(least[:-k], clear[k:], out=least[:-k])
+        if beams.turns:
+            np.minimum(least[:k], clear[-k:], out=least[:k])
+            np.minimum(least[-k:], clear[:k], out=least[-k:])
+    if not beams.turns:
+        least[:beside] = least[least.size - beside :] = 0.0
+    number = beams.index_of(bearing)
+    inside = (number >= 0) & (number < beams.count)
+    number[~inside] = 0
+    off = np.remainder(bearing - beams.angle_min_rad - number * beams.spacing_rad, 2.0 * math.pi)
+    off = np.minimum(off, 2.0 * math.pi - off)
+    return np.where(inside, least[number], 0.0), off

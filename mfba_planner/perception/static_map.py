@@ -18,7 +18,7 @@ from .distance_field import DistanceField, distance_field
 from .free_space import FreeSpace
 from .moving_returns import MovingReturns
 from .occupancy_grid import ObservedCells, OccupancyGrid, cut_to_known, occupancy
-from .scan_beams import Beams
+from .scan_beams import Beams, clear_lengths
 from .scan_matching import ScanMatching
 from .scan_surfaces import Surfaces, surfaces
 from .static_map_params import StaticMapParams
@@ -272,7 +272,7 @@ class StaticMap:
             d = np.sqrt(d2[judged])
             bearing = np.arctan2(dy[judged], dx[judged]) + m.error[2]
             spacing_m = d * beams.spacing_rad
-            clear, off = _clear_lengths(beams, bearing, m.sd_rad)
+            clear, off = clear_lengths(beams, bearing, m.sd_rad)
             passes = clear - d
             unsure_m = off * d + m.sd_rad * d + m.sd_m
             thin = (data[WIDTH][judged] < spacing_m) & (unsure_m > _ALONE_M)
@@ -373,28 +373,3 @@ class StaticMap:
         x, y = self._matching.measured(np.array([left]), np.array([low]), self._origin)
         origin = Pose2D(float(x[0]), float(y[0]), float(self._matching.error[2]))
         return OccupancyGrid(self._stamp_ns, origin, self.params.cell_m, cells)
-
-
-def _clear_lengths(beams: Beams, bearing: Array, turn_sd: float) -> tuple[Array, Array]:
-    """Least free length of the beams at and beside each bearing; angle to the nearest beam.
-
-    0 where one of them tells nothing.
-    """
-    clear = np.zeros(beams.count)
-    clear[beams.number] = np.minimum(beams.range_m, beams.longest_m)
-    beside = 1 + math.floor(2.0 * turn_sd / beams.spacing_rad)
-    least = clear.copy()
-    for k in range(1, beside + 1):
-        np.minimum(least[k:], clear[:-k], out=least[k:])
-        np.minimum(least[:-k], clear[k:], out=least[:-k])
-        if beams.turns:
-            np.minimum(least[:k], clear[-k:], out=least[:k])
-            np.minimum(least[-k:], clear[:k], out=least[-k:])
-    if not beams.turns:
-        least[:beside] = least[least.size - beside :] = 0.0
-    number = beams.index_of(bearing)
-    inside = (number >= 0) & (number < beams.count)
-    number[~inside] = 0
-    off = np.remainder(bearing - beams.angle_min_rad - number * beams.spacing_rad, 2.0 * math.pi)
-    off = np.minimum(off, 2.0 * math.pi - off)
-    return np.where(inside, least[number], 0.0), off

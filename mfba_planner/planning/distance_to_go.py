@@ -3,7 +3,8 @@
 
 In eq. 1 it takes the place of the straight line from a waypoint to the goal. It solves the
 eikonal equation |grad D| F = 1 by fast marching (Sethian 1996) from the goal; F is the share of
-the full speed, small near what stands. Unknown space counts as free.
+the full speed, small near what stands, by the lidar or by a known map. Unknown space counts as
+free.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ import numpy as np
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
 from ..core.planner_types import NANO
-from ..perception.distance_field import DistanceField, bilinear
+from ..perception.distance_field import DistanceField, bilinear, distance_field
+from ..perception.known_map import UnclearedMap
 from ..perception.static_map import StaticMap
+from .eikonal import CLOSED, downhill, march, speed_share
+from .known_route import KnownRoute
 
 Array = np.ndarray
 
 _CLEAR_M = 0.04  # beside the robot's radius: a straight line with so much room is driven
-_TOUCH_M = 0.01  # nearer than so much beyond the radius counts as closed
-_CLOSED = 0.02  # F there; not 0, so that the distance to go stays finite
-_SLOWEST, _ROOM_M = 0.5, 0.3  # F beside what stands, and from where it is 1
 _MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
 _MOST_CELLS = 20_000  # about 8 ms
 _SAME_GOAL_M = 0.1  # noise of the odometry moves the goal in the map's frame
@@ -54,9 +55,14 @@ class DistanceToGo:
     distance to go is the straight line.
     """
 
-    def __init__(self, params: RouteParams, radius_m: float) -> None:
+    def __init__(
+        self, params: RouteParams, radius_m: float, known_map: UnclearedMap | None = None
+    ) -> None:
         """radius_m is the robot's."""
         self._params, self._radius_m = params, radius_m
+        self.known_map = known_map
+        self._route = None if known_map is None else KnownRoute(known_map, radius_m)
+        self._by_route = False  # also to a goal that is near: its way leads far round
         self.goal: Point = (0.0, 0.0)
         self.is_straight = True
         self.closed_by = ""  # what stands between robot and goal on every way, "" if one is open
@@ -64,7 +70,8 @@ class DistanceToGo:
         self._closed_ns: int | None = None  # since when
         self._margin_m = _MARGIN_M
         self._not_passed: list[tuple[int, Point]] = []
-        self._computed: tuple[int, int, Point] | None = None  # stamp, map version, goal
+        # stamp, versions of the maps, goal
+        self._computed: tuple[int, tuple[int, int], Point] | None = None
         self._to_go: Array | None = None
         self._beyond_m = 0.0
         self._step: Array | None = None  # unit vectors of the shortest way, complex
@@ -74,15 +81,19 @@ class DistanceToGo:
     def update(self, stamp_ns: int, known: StaticMap, position: Point, goal: Point) -> None:
         """Take the map as it is now."""
         self.goal = goal
-        self.is_straight = is_clear(known, position, goal, self._radius_m + _CLEAR_M)
+        room_m = self._radius_m + _CLEAR_M
+        self.is_straight = is_clear(known, position, goal, room_m) and self._is_clear(
+            position, goal, room_m
+        )
         if self.is_straight:
             self.closed_by, self._closing, self._closed_ns = "", "", None
-            self._margin_m = _MARGIN_M
+            self._margin_m, self._by_route = _MARGIN_M, False
             return
+        now = (known.version, self.known_map.version if self.known_map else 0)
         if self._computed is not None:
-            then_ns, version, then_goal = self._computed
+            then_ns, versions, then_goal = self._computed
             age_s = (stamp_ns - then_ns) * NANO
-            fresh = 0.0 <= age_s < self._params.refresh_s or version == known.version
+            fresh = 0.0 <= age_s < self._params.refresh_s or versions == now
             same = distance(then_goal, goal) < _SAME_GOAL_M
             if fresh and same and self._is_inside(position):
                 self._closed_for(stamp_ns)
@@ -92,14 +103,33 @@ class DistanceToGo:
             for then_ns, place in self._not_passed
             if 0 <= stamp_ns - then_ns < _PASSAGE_NS
         ]
-        self._closing = self._compute(known, position, goal)
-        self._computed = (stamp_ns, known.version, goal)
+        self._closing = self._compute(stamp_ns, known, position, goal)
+        self._computed = (stamp_ns, now, goal)
         self._closed_for(stamp_ns)
 
     def close(self, stamp_ns: int, position: Point) -> None:
         """Count the passage at a position as closed for a while: the robot does not pass it."""
         self._not_passed.append((stamp_ns, position))
         self._computed = None
+
+    def _is_clear(self, start: Point, end: Point, room_m: float) -> bool:
+        """is_clear() by the known map."""
+        return self.known_map is None or are_clear(
+            self.known_map.along(start, end, room_m), start, end, room_m
+        )
+
+    def _field(self, known: StaticMap, low: Point, high: Point, cell_m: float) -> DistanceField:
+        """Distances to what stands in a rectangle, by the lidar and by the known map."""
+        if self.known_map is None:
+            return known.rectangle_field(low, high, cell_m)
+        cap_m = known.params.widest_m
+        beside = cap_m + cell_m
+        more = self.known_map.near(
+            (low[0] - beside, low[1] - beside), (high[0] + beside, high[1] + beside)
+        )
+        # In a cell with points of both the last counts, which is the lidar's.
+        x, y = np.concatenate((more, known.established_points())).T
+        return distance_field(x, y, low, high, cell_m, cap_m)
 
     def _closed_for(self, stamp_ns: int) -> None:
         """Say what closes the way once it has for long enough."""
@@ -109,36 +139,37 @@ class DistanceToGo:
         lasts = self._closed_ns is not None and stamp_ns - self._closed_ns >= _CLOSED_NS
         self.closed_by = self._closing if lasts else ""
 
-    def _compute(self, known: StaticMap, position: Point, goal: Point) -> str:
+    def _compute(self, stamp_ns: int, known: StaticMap, position: Point, goal: Point) -> str:
         """Compute the distance to go; what closes every way to the goal, "" if nothing."""
-        import eikonalfm  # only here: most runs in the open do not need it
-
-        target = goal
+        target, low, high = goal, position, goal
+        self._beyond_m = 0.0
         away = distance(position, goal)
-        if away > _FARTHEST_M:
+        if self._route is not None and (self._by_route or away > _FARTHEST_M):
+            stood = known.established_points()
+            target, self._beyond_m, low, high = self._route.part(stamp_ns, position, goal, stood)
+        elif away > _FARTHEST_M:
             share = _FARTHEST_M / away
             target = (
                 position[0] + share * (goal[0] - position[0]),
                 position[1] + share * (goal[1] - position[1]),
             )
-        self._beyond_m = distance(target, goal)
+            high, self._beyond_m = target, distance(target, goal)
         fine = known.params.cell_m
-        low, high, per_cell = _domain(position, target, fine, self._margin_m)
+        low, high, per_cell = _domain(low, high, fine, self._margin_m)
         self._cell_m = fine * per_cell
-        field = known.rectangle_field(low, high, fine)
+        field = self._field(known, low, high, fine)
         self._origin = field.origin_m
         widest_m = _widest(field.distance_m, per_cell)
-        speed = _speed(widest_m, self._radius_m)
+        speed = speed_share(widest_m, self._radius_m)
         height, width = speed.shape
         for _, (x, y) in self._not_passed:
             dx = self._origin[0] + (np.arange(width) + 0.5) * self._cell_m - x
             dy = self._origin[1] + (np.arange(height)[:, None] + 0.5) * self._cell_m - y
-            speed[dx * dx + dy * dy < self._radius_m**2] = _CLOSED
+            speed[dx * dx + dy * dy < self._radius_m**2] = CLOSED
         i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
         j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
-        to_go = eikonalfm.fast_marching(speed, (j, i), (self._cell_m, self._cell_m), 2)
-        self._to_go = to_go
-        self._step = _downhill(to_go)
+        self._to_go = march(speed, (j, i), self._cell_m)
+        self._step = downhill(self._to_go)
         if self._beyond_m:
             return ""  # the map does not reach so far
         cell = (position[0] - self._origin[0]) / self._cell_m
@@ -148,7 +179,12 @@ class DistanceToGo:
         if leads_out and self._margin_m < all_m:
             # Beyond what the map holds, all is free: a way round is known or assumed there.
             self._margin_m = all_m
-            return self._compute(known, position, goal)
+            return self._compute(stamp_ns, known, position, goal)
+        if leads_out and self._route is not None and not self._by_route:
+            self._by_route = True
+            return self._compute(stamp_ns, known, position, goal)
+        if closing and self.known_map is not None:
+            closing += ", by the known map or the lidar"
         return closing
 
     def _closed(
@@ -224,7 +260,11 @@ class DistanceToGo:
 
 def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:
     """Whether no point of the map is nearer to the line than room_m; its ends may be."""
-    points = known.established_points()
+    return are_clear(known.established_points(), start, end, room_m)
+
+
+def are_clear(points: Array, start: Point, end: Point, room_m: float) -> bool:
+    """is_clear() of points (n, 2)."""
     if not points.shape[0]:
         return True
     x, y = points[:, 0] - start[0], points[:, 1] - start[1]
@@ -264,27 +304,3 @@ def _widest(values: Array, per_cell: int) -> Array:
     rows = functools.reduce(np.maximum, parts)
     largest: Array = functools.reduce(np.maximum, [rows[j::per_cell] for j in range(per_cell)])
     return largest
-
-
-def _speed(clearance_m: Array, radius_m: float) -> Array:
-    """Share of the full speed at distances from what stands."""
-    room = (clearance_m - radius_m - _TOUCH_M) / _ROOM_M
-    speed = _SLOWEST + (1.0 - _SLOWEST) * np.minimum(room, 1.0)
-    speed[room < 0.0] = _CLOSED
-    return speed
-
-
-def _downhill(to_go: Array) -> Array:
-    """Unit vectors (complex) down the distance to go; 0 at its least.
-
-    By differences to the lower neighbours alone, as in the scheme that computes it: central ones
-    would point across a narrow door, at what closes it.
-    """
-    padded = np.pad(to_go, 1, constant_values=np.inf)
-    left, right = to_go - padded[1:-1, :-2], to_go - padded[1:-1, 2:]
-    below, above = to_go - padded[:-2, 1:-1], to_go - padded[2:, 1:-1]
-    step = np.maximum(np.maximum(left, right), 0.0) * np.where(right > left, 1.0, -1.0) + 1j * (
-        np.maximum(np.maximum(below, above), 0.0) * np.where(above > below, 1.0, -1.0)
-    )
-    found: Array = step / (np.abs(step) + 1e-12)
-    return found

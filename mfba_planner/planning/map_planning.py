@@ -12,6 +12,7 @@ import numpy as np
 from ..core.geometry import Point, Pose2D, distance, rotated
 from ..core.planner_types import Circle, Observation
 from ..core.random_streams import stream
+from ..perception.known_map import KnownMap, UnclearedMap
 from ..perception.obstacle_tracker import Tracker
 from ..perception.static_map import StaticMap, StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
@@ -55,13 +56,17 @@ class MapPlanning:
         reach_m: float,
         search_m: float,
         seed: int,
+        known_map: KnownMap | None = None,
     ) -> None:
-        """Start with an empty map."""
+        """Start with an empty map, beside the one that is known before the drive."""
         self._params, self._seed = params, seed
         self._risk = risk.for_turning() if params.turns else risk
         self._search_m = search_m
         self.map = StaticMap(map_params)
-        self.search = MapSearch(route, params.robot_radius_m, headings, reach_m)
+        self._known_map: UnclearedMap | None = None
+        if known_map is not None and known_map.count:
+            self._known_map = UnclearedMap(known_map, map_params.spacing_m)
+        self.search = MapSearch(route, params.robot_radius_m, headings, reach_m, self._known_map)
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
         self._blocked = BlockedHeadings()
@@ -74,6 +79,8 @@ class MapPlanning:
         self._radii_m = tracker.radii_m
         self._reach_m = self.map.params.spacing_m / tracker.beams.spacing_rad
         self.map.update(stamp_ns, pose, tracker.beams, moving, surely, tracker.pose_error)
+        if self._known_map is not None:
+            self._known_map.update(tracker.beams, *self._in_map(pose.position))
 
     def move(
         self,
@@ -89,7 +96,7 @@ class MapPlanning:
     ) -> Move | None:
         """The next move; None where nothing stands in the way."""
         known, params = self.map, self._params
-        if not known.count:
+        if not known.count and self._known_map is None:
             return None
         position, turn = self._in_map(obs.pose.position)
         to_go = self.search.to_go

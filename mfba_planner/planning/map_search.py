@@ -13,6 +13,7 @@ import numpy as np
 from ..core.geometry import Point
 from ..core.planner_types import Bits
 from ..perception.distance_field import DistanceField
+from ..perception.known_map import UnclearedMap
 from ..perception.static_map import StaticMap
 from ..swarm.bat_swarm import BatSwarm
 from .distance_to_go import DistanceToGo, RouteParams
@@ -48,10 +49,17 @@ class Found(NamedTuple):
 class MapSearch:
     """Keeps the distance to go and the clearances between decisions."""
 
-    def __init__(self, route: RouteParams, radius_m: float, headings: int, reach_m: float) -> None:
+    def __init__(
+        self,
+        route: RouteParams,
+        radius_m: float,
+        headings: int,
+        reach_m: float,
+        known_map: UnclearedMap | None = None,
+    ) -> None:
         """radius_m is the robot's; headings is the number of bits."""
         self._radius_m, self._n, self._reach_m = radius_m, headings, reach_m
-        self.to_go = DistanceToGo(route, radius_m)
+        self.to_go = DistanceToGo(route, radius_m, known_map)
         angles = 2.0 * math.pi / headings * np.arange(1, headings + 1)
         self._cos, self._sin = np.cos(angles), np.sin(angles)
         lengths = np.array(LENGTHS) * reach_m

@@ -58,6 +58,9 @@ class PlannerParams(Base):
         PerceptionInput.AUTO,
         "predictive: obstacles from the scan or from the sectors; auto: the scan if there is one",
     )
+    known_map: bool = option(
+        False, "predictive: find ways by a map known before (topic map, or the scenario's walls)"
+    )
     robot_radius_m: float = option(
         ROBOT_RADIUS_M,
         "radius of the robot: every obstacle is enlarged by it (Fig. 4)",
@@ -114,6 +117,11 @@ class PlannerParams(Base):
     def reads_scan(self) -> bool:
         """Whether the planner uses a scan, if there is one, in addition to the sectors."""
         return self.method is Method.PREDICTIVE and self.perception is not PerceptionInput.SECTORS
+
+    @property
+    def reads_known_map(self) -> bool:
+        """Whether the planner waits for a known map; without a scan it would not use it."""
+        return self.known_map and self.reads_scan
 
     def for_robot(self, radius_m: float, base: Base) -> PlannerParams:
         """These options for a robot of that radius, drive and limits."""

@@ -12,6 +12,7 @@ import numpy as np
 from ..core.geometry import Point, Pose2D, bearing, distance
 from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
+from ..perception.known_map import KnownMap
 from ..perception.obstacle_memory import ObstacleMemory
 from ..perception.obstacle_tracker import Tracker
 from ..perception.scan_coverage import ScanCoverage
@@ -78,6 +79,7 @@ class Predictive(BasePlanner):
     _speeds: Speeds = Speeds()
     _unobserved: np.ndarray | None = None  # headings the lidar has not covered; None: none
     _coverage: ScanCoverage
+    _known_map: KnownMap | None = None
 
     def __init__(
         self,
@@ -122,15 +124,9 @@ class Predictive(BasePlanner):
         self._unobserved = None if obs.scan is None else self._coverage.unsafe(obs.pose_ns)
         if obs.scan is not None and obs.circles is None and self.has_map:
             among = self._map_planning.move(
-                obs,
-                goal,
-                circles,
-                self._speeds,
-                self._unobserved,
-                last_waypoint,
-                self.tick_s,
+                obs, goal, circles, self._speeds, self._unobserved, last_waypoint, self.tick_s,
                 bats=self.has_bats,
-            )
+            )  # fmt: skip
             if among is not None:
                 self._waypoint = among.waypoint if among.event is Event.OBSTACLE else None
                 return among
@@ -304,7 +300,14 @@ class Predictive(BasePlanner):
         self._map_planning = MapPlanning(
             self.params, self.options.map, self.options.route, self.options.risk,
             self.options.headings, self.options.reach_m, self.options.search_m, self.seed,
+            self._known_map,
         )  # fmt: skip
+
+    def set_known_map(self, known_map: KnownMap | None) -> None:
+        """Take a map that is known before the drive; another one than before: forget()."""
+        if known_map is not self._known_map:
+            self._known_map = known_map
+            self.forget()
 
     def _circles(self, obs: Observation) -> Sequence[Circle]:
         """Circles at obs.pose_ns: given and remembered, tracked, or one for each set sector."""

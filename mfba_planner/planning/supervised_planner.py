@@ -17,6 +17,7 @@ from .recovery import Phase, Recovery, advance, most_room, wait_after
 from .speed_limit import allowed_speed_share
 
 if TYPE_CHECKING:  # the paper's planner has no map and must not load it
+    from ..perception.known_map import KnownMap
     from ..perception.static_map import StaticMap
 
 TRAIL_STEP_M = 0.05  # least distance of two remembered positions
@@ -48,6 +49,15 @@ class HasLocalMap(Protocol):
 
     def local_map(self) -> StaticMap:
         """The map, as of its last decision; another one after a reset."""
+        ...
+
+
+@runtime_checkable
+class TakesKnownMap(Protocol):
+    """A planner that takes a map known before the drive."""
+
+    def set_known_map(self, known_map: KnownMap | None) -> None:
+        """Take it; None: there is none."""
         ...
 
 
@@ -94,8 +104,13 @@ class SupervisedPlanner:
         """The map of the wrapped planner, None if it keeps none."""
         return self.inner.local_map() if isinstance(self.inner, HasLocalMap) else None
 
+    def set_known_map(self, known_map: KnownMap | None) -> None:
+        """Give the map to the wrapped planner, if it takes one."""
+        if isinstance(self.inner, TakesKnownMap):
+            self.inner.set_known_map(known_map)
+
     def reset(self) -> None:
-        """Drop all state but parameters and seed (after a clock reset, before a new trip)."""
+        """Drop all state but parameters, seed and known map (a clock reset, a new trip)."""
         self.inner.reset()
         self._forget()
 

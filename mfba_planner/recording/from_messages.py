@@ -17,6 +17,7 @@ from ..core.errors import FrameError, InputError
 from ..core.geometry import Point, Pose2D, rotated, yaw_from_quaternion
 from ..core.planner_types import Decision, Mode, Ranges, RefusalReason, Scan
 from ..core.robot_base import Base
+from ..perception.known_map import KnownMap, check_cells, known_map
 from ..perception.no_return import NoReturn, rep_117
 from ..perception.occupancy_grid import OccupancyGrid
 from ..perception.sensory_vector import blind
@@ -190,6 +191,18 @@ def occupancy_grid(message: Any) -> OccupancyGrid:
     cells = np.array(message.data, dtype=np.int8).reshape(info.height, info.width)
     origin = pose2d(info.origin, "occupancy grid origin")
     return OccupancyGrid(stamp_ns(message.header.stamp), origin, info.resolution, cells)
+
+
+def known_map_from(message: Any, frame: str = "") -> KnownMap:
+    """nav_msgs/OccupancyGrid to a map known before the drive; InputError as known_map()."""
+    given = message.header.frame_id
+    if frame and given != frame:
+        raise FrameError(
+            f"map is in frame {given!r}, not {frame!r}, and no tf is read; set the map server's "
+            f"frame_id to {frame!r} if the robot starts at the map's origin"
+        )
+    check_cells(message.info.height, message.info.width)
+    return known_map(occupancy_grid(message))
 
 
 def velocity(twist: Any) -> tuple[float, float, float]:

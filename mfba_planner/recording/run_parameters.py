@@ -31,6 +31,7 @@ NEWER_OPTIONS = (
     "method",
     "jump_m",
     "perception",
+    "known_map",
     "robot_radius_m",
     "speed_limit.",
     "recovery.",

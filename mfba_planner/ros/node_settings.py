@@ -57,6 +57,7 @@ class WorldSimSettings:
     answer_retries: int = option(
         4, "lockstep: give up after this many repetitions", minimum=0, maximum=1_000_000
     )
+    publish_map: bool = option(False, "publish map: the cells that the scenario's walls pass")
     cmd_vel_timeout_s: float = option(
         0.5,
         "real time: rest after this time without cmd_vel, but not within a tick; 0: never",

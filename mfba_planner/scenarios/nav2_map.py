@@ -18,10 +18,9 @@ import numpy as np
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
+from ..perception.known_map import COARSEST_M, FARTHEST_M, FINEST_M, MOST_CELLS
 from .map_outline import outline
 
-MOST_CELLS = 25_000_000  # 250 m x 250 m of 5 cm
-FINEST_M, COARSEST_M = 0.001, 10.0  # of a cell
 _LEVEL_RAD = 1e-6  # a yaw that is rounding
 MODES = ("trinary", "scale")
 MAP_REMEDY = "give the .yaml file that nav2's map_saver wrote, beside its image"
@@ -101,7 +100,7 @@ def _number(
 
 def _origin(name: str, origin: Any) -> Point:
     is_list = isinstance(origin, list) and len(origin) in (2, 3)
-    if not (is_list and all(type(v) in (int, float) and abs(v) <= 1e6 for v in origin)):
+    if not (is_list and all(type(v) in (int, float) and abs(v) <= FARTHEST_M for v in origin)):
         raise ConfigError(f"{name}: origin={origin!r}: give [x, y, 0], m")
     if len(origin) == 3 and abs(origin[2]) > _LEVEL_RAD:
         raise ConfigError(

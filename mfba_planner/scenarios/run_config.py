@@ -23,6 +23,7 @@ from ..planning.stopping_distance import too_fast_for_lidar, too_fast_for_sector
 from ..simulation.fleet import robot_seed, scenarios_with_others
 from ..simulation.robot_model import DEFAULT_BEAMS
 from ..simulation.scenario import Scenario
+from ..simulation.scenario_map import scenario_grid
 from ..simulation.triggered_motion import may_be_absent
 from .scenario_json import scenario_to_json, segments_text
 
@@ -64,6 +65,8 @@ class RunConfig:
         fault = _too_fast(self.scenario, self.planner, self.sensor)
         if fault:
             raise ConfigError(fault)
+        if self.planner.known_map:
+            _check_known_map(self.scenario, self.planner)
         tick_s, timeout_s = self.planner.tick_ns * NANO, self.planner.input_timeout_s
         if self.real_time and timeout_s <= tick_s:
             raise ConfigError(
@@ -77,6 +80,15 @@ def _too_fast(scenario: Scenario, planner: PlannerParams, sensor: SensorParams) 
     if lidar.beams and params.reads_scan:
         return too_fast_for_lidar(params, lidar.range_max_m)
     return too_fast_for_sectors(params, sensor.sensing_range_m)
+
+
+def _check_known_map(scenario: Scenario, planner: PlannerParams) -> None:
+    if not planner.reads_known_map:
+        raise ConfigError(
+            "known_map=true: only predictive with a scan uses a map; leave it out, or give "
+            "method=predictive and perception=auto"
+        )
+    scenario_grid(scenario)
 
 
 def with_perception(scenario: Scenario, planner: PlannerParams) -> tuple[Scenario, PlannerParams]:
@@ -143,6 +155,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             "speed_factor": config.speed_factor,
             "tick_ns": config.planner.tick_ns,
             "goal_tolerance_m": config.planner.goal_tolerance_m,
+            "publish_map": config.planner.known_map,
             "start_paused": True,
             "seed": config.seed,
         },

@@ -15,6 +15,7 @@ from .episode import Episode, Outcome
 from .fleet import Fleet, run_fleet
 from .planner_observations import Observe, observe_scan, observe_sectors
 from .scenario import Scenario
+from .scenario_map import with_known_map
 from .triggers import before_triggers
 from .world import World
 
@@ -110,7 +111,7 @@ def simulate(
         sensor=sensor,
         seed=seed,
         go_on=go_on,
-        path_planner=make_planner(params, sensor, seed),
+        path_planner=with_known_map(make_planner(params, sensor, seed), params, scenario),
         observe=observe_scan if params.reads_scan else observe_sectors,
     )
 
@@ -131,6 +132,8 @@ def simulate_fleet(
         sensor=sensor,
         seed=seed,
         go_on=go_on,
-        path_planner=lambda child: make_planner(params, sensor, child),
+        path_planner=lambda child: with_known_map(
+            make_planner(params, sensor, child), params, scenario
+        ),
         observe=observe_scan if params.reads_scan else observe_sectors,
     )

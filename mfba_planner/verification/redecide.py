@@ -13,6 +13,7 @@ from typing import Any
 from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner_types import Decision, Ranges, RefusalReason, Scan, observe
+from ..perception.known_map import KnownMap
 from ..perception.no_return import NoReturn
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams
@@ -24,6 +25,7 @@ from ..recording.file_integrity import check_data
 from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.from_messages import (
     goal_point,
+    known_map_from,
     laser_scan,
     robot_pose,
     stamp_ns,
@@ -32,12 +34,13 @@ from ..recording.from_messages import (
 from ..simulation.decision_digest import digest
 from .lidar_extrinsics import StaticFrames
 
-ODOMETRY, SCAN, GOAL = (
+ODOMETRY, SCAN, GOAL, GRID = (
     "nav_msgs/msg/Odometry",
     "sensor_msgs/msg/LaserScan",
     "geometry_msgs/msg/PoseStamped",
+    "nav_msgs/msg/OccupancyGrid",
 )
-GOAL_TOPIC = "goal_pose"
+GOAL_TOPIC, MAP_TOPIC = "goal_pose", "map"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +88,7 @@ def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResu
 
     Same as virtual_sensor (source: scan) and planner on a replay of the bag, with the lidar
     extrinsics of /tf_static. Raises BagError for a bag that cannot be read or has no goal, if
-    topics must be named, and for unknown lidar extrinsics.
+    topics must be named, for unknown lidar extrinsics, and where known_map finds no map.
     """
     with BagReader(path) as reader:
         for file in reader.file_paths:
@@ -96,7 +99,10 @@ def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResu
         poses = _PoseLookup(reader, odom, faults)
         goals = _goals(reader, params)
         scan_yaw = _ScanYaw(reader, params, odom)
-        return _PlannerRun(params, poses, goals, faults, scan_yaw).decide_all(reader, scan)
+        run = _PlannerRun(params, poses, goals, faults, scan_yaw)
+        if params.planner.reads_known_map:
+            run.take_known_map(_known_map(reader, odom))
+        return run.decide_all(reader, scan)
 
 
 def _topic_name(reader: BagReader, type_name: str, wanted: str, option: str) -> str:
@@ -111,15 +117,32 @@ def _topic_name(reader: BagReader, type_name: str, wanted: str, option: str) -> 
     return found[0]
 
 
+def _topics_named(reader: BagReader, type_name: str, name: str) -> list[str]:
+    """The topics of a type and name, in any namespace."""
+    return [
+        topic
+        for topic, found in reader.topics.items()
+        if found.type_name == type_name and topic.rpartition("/")[2] == name
+    ]
+
+
+def _known_map(reader: BagReader, odom: str) -> KnownMap:
+    """The first map that the planner would take, in the frame of the odometry."""
+    frame = next((m.message.header.frame_id for m in reader.decoded([odom])), "")
+    names, refusal = _topics_named(reader, GRID, MAP_TOPIC), f"no {MAP_TOPIC} was recorded"
+    for message in reader.decoded(names) if names else ():
+        try:
+            return known_map_from(message.message, frame)
+        except InputError as error:  # the planner would refuse it as well
+            refusal = str(error)
+    raise BagError(f"{reader.path}: known_map=true: {refusal}")
+
+
 def _goals(reader: BagReader, params: RedecideParams) -> list[tuple[int, Point]]:
     """(log time in ns, goal), sorted by time."""
     if params.goal is not None:
         return [(-1, params.goal)]
-    names = [
-        name
-        for name, topic in reader.topics.items()
-        if topic.type_name == GOAL and name.rpartition("/")[2] == GOAL_TOPIC
-    ]
+    names = _topics_named(reader, GOAL, GOAL_TOPIC)
     goals = []
     for message in reader.decoded(names) if names else ():
         try:
@@ -213,6 +236,10 @@ class _PlannerRun:
         self._planner = make_planner(planner, params.sensor, params.seed)
         self._pose = Pose2D(0.0, 0.0)
         self._counts: Counter[str] = Counter()
+
+    def take_known_map(self, known_map: KnownMap) -> None:
+        """Give the planner the map before it decides."""
+        self._planner.set_known_map(known_map)
 
     def decide_all(self, reader: BagReader, topic: str) -> RedecideResult:
         decided = []

@@ -10,14 +10,15 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.geometry import Point
+from ..perception.known_map import KnownMap
 from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions_with_sectors import DECISION, SECTORS, ranges_of, require_decisions
 from ..recording.decisions_without_inputs import omission_text
 from ..recording.fleet_topics import messages_by_robot
-from ..recording.from_messages import goal_point, stamp_ns, waypoint_points
+from ..recording.from_messages import goal_point, known_map_from, stamp_ns, waypoint_points
 
 ODOM, OBSTACLES, VECTOR, SCAN = "/odom", "/obstacles", "/sensory_vector", "/scan"
-GOAL, WAYPOINTS = "/goal_pose", "/waypoints"
+GOAL, WAYPOINTS, MAP = "/goal_pose", "/waypoints", "/map"
 STEP, TWIST = "/goal_step", "/cmd_vel"
 STAMPED = (ODOM, OBSTACLES, SECTORS, STEP, DECISION)
 TICK_TOPICS = (*STAMPED, SCAN, VECTOR, TWIST)
@@ -37,6 +38,7 @@ class TickRecords:
 
     ticks: list[Tick]
     goals: list[Point]
+    known_map: KnownMap | None = None  # the first that the planner did not refuse
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     omitted_stamps: frozenset[int] = (
@@ -53,7 +55,7 @@ def read_tick_messages(
     """
     require_decisions(reader, robots)
     records: dict[str, list[DecodedMessage]] = {robot: [] for robot in robots}
-    for robot, message in messages_by_robot(reader, robots, (*TICK_TOPICS, GOAL, WAYPOINTS)):
+    for robot, message in messages_by_robot(reader, robots, (*TICK_TOPICS, GOAL, WAYPOINTS, MAP)):
         records[robot].append(message)
     return records
 
@@ -77,6 +79,8 @@ def join_ticks(
         last_index[message.topic] = index
         if message.topic in (GOAL, WAYPOINTS):
             records.goals += _goals(message.topic, message.message, frame)
+        elif message.topic == MAP:
+            records.known_map = records.known_map or _known_map(message.message, frame)
         else:
             by_topic[message.topic].append(message.message)
     ticks: dict[int, Tick] = {}
@@ -103,6 +107,13 @@ def _goals(topic: str, message: Any, frame: str) -> tuple[Point, ...]:
         return (goal_point(message, frame),) if topic == GOAL else waypoint_points(message, frame)
     except InputError:  # the planner refused it too
         return ()
+
+
+def _known_map(message: Any, frame: str) -> KnownMap | None:
+    try:
+        return known_map_from(message, frame)
+    except InputError:  # the planner refused it too
+        return None
 
 
 def _join_stamped(

@@ -36,6 +36,7 @@ from ..recording.from_messages import decision as read_decision
 from ..recording.run_parameters import Setup, read_setup, read_setups
 from ..simulation.decision_digest import digest
 from ..simulation.recorded_motion import is_present
+from ..simulation.scenario_map import with_known_map
 from .compare_decisions import Divergence, first_divergence
 from .tick_records import (
     DECISION,
@@ -112,6 +113,10 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
     read_odom = partial(robot_pose, frame=setup.odom_frame)
     read_sectors = partial(sector_ranges, frame=setup.odom_frame)
     planner = make_planner(setup.planner, setup.sensor, setup.seed)
+    if tick_records.known_map is None:  # a bag of the core driver: the scenario's walls
+        with_known_map(planner, setup.planner, setup.scenario)
+    elif setup.planner.known_map:
+        planner.set_known_map(tick_records.known_map)
     goals = deque(tick_records.goals)
     goal: Point | None = None
     pose = Pose2D(0.0, 0.0)

@@ -189,7 +189,7 @@ def test_the_xml_launch_file_declares_and_starts_the_same() -> None:
         )
         for name, argument in PLANNER_ARGUMENTS.items()
     }
-    names = ("scan", "odom", "cmd_vel", "goal_pose", "waypoints")
+    names = ("scan", "odom", "cmd_vel", "goal_pose", "waypoints", "map")
     starts = robot_nodes(by_default(PLANNER_ARGUMENTS) | {name: f"my_{name}" for name in names})
     for start, node in zip(starts, root.iter("node"), strict=True):
         assert (node.get("exec"), node.get("name")) == (start.name, start.name)

@@ -15,7 +15,7 @@ from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios.scenario_files import load_scenario
 
 # Not published in a simulation of the paper's robot, which has no lidar and no noise.
-NOT_PUBLISHED = {"ground_truth", "initialpose", "local_map", "scan", "waypoints"}
+NOT_PUBLISHED = {"ground_truth", "initialpose", "local_map", "map", "scan", "waypoints"}
 
 
 @pytest.fixture(scope="module")

@@ -45,7 +45,9 @@ TABLE = [
     ("/outcome", "diagnostic_msgs/msg/DiagnosticStatus", ["world_sim"], [], True),
     ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", [], ["world_sim"], False),
     ("/markers", "visualization_msgs/msg/MarkerArray", ["planner", "world_sim"], [], False),
-    # Only the recorder subscribes: the paper's robot has neither a lidar nor odometry noise.
+    # Only the recorder subscribes: the paper's robot has neither a lidar nor odometry noise, and
+    # its planner no map.
+    ("/map", "nav_msgs/msg/OccupancyGrid", [], [], True),
     ("/scan", "sensor_msgs/msg/LaserScan", [], [], False),
     ("/ground_truth", "nav_msgs/msg/Odometry", [], [], False),
 ]

@@ -54,11 +54,14 @@ def test_some_topics_others_not_and_another_name() -> None:
 def test_the_inputs_of_a_node_are_what_it_reads_and_none_of_them_writes() -> None:
     recorded = whole_graph()
     goals = {"/goal_pose", "/waypoints"}
-    assert set(names(recorded, "--inputs-of planner")) == {"/odom", "/sectors", *goals}
+    assert set(names(recorded, "--inputs-of planner")) == {
+        "/odom", "/sectors", "/map", *goals
+    }  # fmt: skip
     assert set(names(recorded, "--inputs-of virtual_sensor planner")) == {
         "/odom",
         "/obstacles",
         "/scan",
+        "/map",
         *goals,
     }
     for name in PLANNER_TOPICS:
@@ -167,7 +170,10 @@ def test_which_subscribers_are_awaited(line: str, wanted: dict[str, int] | None)
         "/odom": topic("/odom", "nav_msgs/msg/Odometry"),
         "/goal_pose": topic("/goal_pose", "geometry_msgs/msg/PoseStamped"),
     }
+    if settings.inputs_of:  # not every planner reads it
+        recorded["/map"] = topic("/map", "nav_msgs/msg/OccupancyGrid")
     played, _ = choose(recorded, settings, resolve)
+    assert len(played) == len(recorded)
     assert awaited(played, settings, resolve) == wanted
 
 

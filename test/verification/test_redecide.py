@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from edited_bags import record
 from geometry_msgs.msg import PoseStamped
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.serialization import serialize_message
 from recorded_bags import FOREIGN, SECOND
 from rosbags.typesys import Stores, get_typestore
@@ -19,6 +19,8 @@ from sensor_msgs.msg import LaserScan
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, MfbaError
 from mfba_planner.core.planner_types import Mode
+from mfba_planner.planning.planner_params import Method, PlannerParams
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.ros.interface.serialized_message import type_name
@@ -50,8 +52,22 @@ def goal(stamp_ns: int, x: float, y: float, topic: str = "/goal_pose") -> Messag
     return topic, message, stamp_ns
 
 
+def wall_map(stamp_ns: int, frame: str) -> Message:
+    """A wall along y from -3 to 8 m at x = 5 m."""
+    message = OccupancyGrid()
+    message.header.frame_id = frame
+    message.info.resolution, message.info.width, message.info.height = 0.05, 1, 220
+    message.info.origin.position.x, message.info.origin.position.y = 5.0, -3.0
+    message.data = [100] * 220
+    return "/robot/map", message, stamp_ns
+
+
 def bag(path: Path, *messages: Message) -> Path:
-    kinds = {Odometry: "nav_msgs/msg/Odometry", LaserScan: "sensor_msgs/msg/LaserScan"}
+    kinds = {
+        Odometry: "nav_msgs/msg/Odometry",
+        LaserScan: "sensor_msgs/msg/LaserScan",
+        OccupancyGrid: "nav_msgs/msg/OccupancyGrid",
+    }
     with BagWriter(path) as writer:
         for topic, message, time_ns in messages:
             writer.add_topic(topic, kinds.get(type(message), "geometry_msgs/msg/PoseStamped"))
@@ -91,6 +107,25 @@ def test_without_odometry_of_its_stamp_the_newest_before_is_used(tmp_path: Path)
         "1 scans before the first odometry: not decided",
         "2 scans without odometry of their stamp: the newest before them was taken",
     )
+
+
+def test_with_known_map_the_recorded_map_is_taken(tmp_path: Path) -> None:
+    planner = replace(preset(PlannerParams()), method=Method.PREDICTIVE, known_map=True)
+    params = replace(ROBOT, planner=planner)
+    inputs = (odom(TICK_NS), goal(0, 9.0, 0.0), scan(TICK_NS, beams=360))
+    inputs[0][1].header.frame_id = "odom"
+    recorded = bag(tmp_path / "map", wall_map(0, "map"), wall_map(1, "odom"), *inputs)
+    (decision,) = redecide_recording(recorded, params).decided
+    assert "the way through the map is 1" in decision.reason
+    without = replace(params, planner=replace(planner, known_map=False))
+    (decision,) = redecide_recording(recorded, without).decided
+    assert "map" not in decision.reason
+    none = bag(tmp_path / "none", *inputs)
+    with pytest.raises(BagError, match="known_map=true: no map was recorded"):
+        redecide_recording(none, params)
+    other = bag(tmp_path / "other", wall_map(0, "map"), *inputs)
+    with pytest.raises(BagError, match="known_map=true: map is in frame 'map'"):
+        redecide_recording(other, params)
 
 
 def test_a_goal_applies_from_its_log_time(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from ...simulation.episode import Episode, Outcome
 from ...simulation.lidar_perception import LIDAR_PERCEPTIONS
 from ...simulation.planner_observations import Observe, observe_sectors
 from ...simulation.run_episode import always_continue, episode_generator, run_to_end
+from ...simulation.scenario_map import with_known_map
 from .planner_sandbox import HungError, PlannerFault, PlannerSandbox
 from .sweep_spec import Run, Setting
 
@@ -92,7 +93,9 @@ def _decision_by_decision(
     scenario, fault = setting.scenario(run), ""
     setting = replace(setting, params=scenario.planner_params(setting.params))
     try:
-        path_planner = sandbox.make_planner(lambda: _as_on_a_robot(run, setting))
+        path_planner = sandbox.make_planner(
+            lambda: with_known_map(_as_on_a_robot(run, setting), setting.params, scenario)
+        )
         episode = yield from episode_generator(
             scenario,
             setting.params,

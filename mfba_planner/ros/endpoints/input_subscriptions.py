@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The planner's odom, sectors and scan: converted, then paired into the inputs of one decision."""
+"""The planner's odom, sectors, scan and map: converted, paired into the inputs of a decision."""
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -29,7 +30,10 @@ from ..runtime.lockstep_inputs import Inputs, LockstepInputs
 from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.stale_inputs import NewestInputs
 from ..runtime.stamp_pairing import StampPairs
+from .known_map_subscription import KnownMapSubscription
 from .planner_diagnostics import PlannerDiagnostics
+
+MOST_HELD = 1000
 
 
 class InputSubscriptions:
@@ -55,6 +59,9 @@ class InputSubscriptions:
         self._is_subscribed = self._is_subscribed_to_scan = False
         self._refused_inputs, self._diagnostics = refused_inputs, diagnostics
         self._on_inputs = on_inputs
+        self.map = KnownMapSubscription(
+            node, settings.odom_frame, refused_inputs, diagnostics, self._deliver_held
+        )
         self.range_max_m = 0.0  # of the newest sectors
         self.fields: dict[str, str] = {}  # of planner/decision: see scan_fields
         self.reset()
@@ -66,24 +73,27 @@ class InputSubscriptions:
             LockstepInputs() if lockstep else NewestInputs()
         )
         limit = None if lockstep else PAIRED
+        self._held: deque[Inputs] = deque(maxlen=MOST_HELD)  # lockstep: until there is a map
         self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True, limit=limit)
         self._monitor.reset()
 
     def subscribe(self) -> None:
-        """Subscribe to odom and sectors, and to scan where it is needed.
+        """Subscribe to odom and sectors, and to scan and map where they are needed.
 
         Scan comes first: a node that has discovered a later subscription has discovered it too,
         so that no first scan is lost.
         """
         self._is_subscribed, self._is_subscribed_to_scan = True, False
-        self.set_reads_scan(self._params)
+        self.set_params(self._params)
         frame = self._settings.odom_frame
         self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
         self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
 
-    def set_reads_scan(self, params: PlannerParams) -> None:
-        """Use scans, or not, from now on; params are the planner's."""
+    def set_params(self, params: PlannerParams) -> None:
+        """Use scans and a map, or not, from now on; params are the planner's."""
         self._params = params
+        if self._is_subscribed:
+            self.map.subscribe(params)
         if params.reads_scan and self._is_subscribed and not self._is_subscribed_to_scan:
             frame = self._settings.scan_frame
             self._monitor.subscribe(topics.SCAN, self._on_scan, depth=PAIRED, frame=frame)
@@ -92,6 +102,7 @@ class InputSubscriptions:
     def unsubscribed(self) -> None:
         """The node has destroyed all subscriptions."""
         self._is_subscribed = self._is_subscribed_to_scan = False
+        self.map.reset()
 
     def stale(self, timeout_s: float) -> Inputs | None:
         """In real time the newest inputs if one is older than timeout_s."""
@@ -99,8 +110,13 @@ class InputSubscriptions:
         return self._pairs.stale(time.monotonic(), timeout_s)
 
     def add_scan(self, observation: Observation, inputs: Inputs) -> Observation:
-        """Return the observation with the scan that its sectors were computed from."""
+        """Return the observation with the scan that its sectors were computed from.
+
+        It is refused while the map is missing.
+        """
         self.fields = {}
+        if self.map.missing and not observation.refused:
+            return replace(observation, refused=self.map.missing)
         if inputs.scan is None or observation.refused:
             return observation
         pose = inputs.sensed[1] if inputs.sensed else observation.pose
@@ -190,8 +206,16 @@ class InputSubscriptions:
                 self._refuse(name, fault)
             return
         self._diagnostics.input_received(name, stamp, now_s, fault)
-        if inputs is not None:
+        if inputs is None:
+            return
+        if self._settings.lockstep and self.map.missing:
+            self._held.append(inputs)  # a bag that is replayed does not repeat them
+        else:
             self._on_inputs(inputs)
+
+    def _deliver_held(self) -> None:
+        while self._held:
+            self._on_inputs(self._held.popleft())
 
     def _convert(self, name: str, message: Any, convert: Any, frame: str) -> tuple[Any, str]:
         """The value and "", or the error text twice: as the value and as the fault."""

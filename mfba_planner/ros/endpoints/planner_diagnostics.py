@@ -42,6 +42,10 @@ class PlannerDiagnostics:
         """Why the newest of an input is refused, "" if it is not."""
         self._health.set_fault(name, fault)
 
+    def set_awaited(self, name: str, text: str) -> None:
+        """That an input is awaited which comes once, "" if it is not."""
+        self._health.set_awaited(name, text)
+
     def decision_made(
         self,
         decision: Decision,

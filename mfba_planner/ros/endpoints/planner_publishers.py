@@ -42,7 +42,6 @@ class PlannerPublishers:
     def publish_decision(
         self,
         decision: Decision,
-        algorithm: str,
         refused: int,
         goal_fields: Mapping[str, str],
         ring_radius_m: float,
@@ -54,7 +53,9 @@ class PlannerPublishers:
         frame = self._settings.odom_frame
         self._plan.publish(to_messages.plan_msg(decision, frame))
         self._decision.publish(
-            to_messages.decision_msg(decision, algorithm, refused, self._node_name, goal_fields)
+            to_messages.decision_msg(
+                decision, self._path_planner().params.label, refused, self._node_name, goal_fields
+            )
         )
         if self._view.due(decision.stamp_ns):
             self._markers.publish(markers.decision_markers(decision, frame, ring_radius_m))

@@ -40,7 +40,7 @@ class RobotInterface:
                 base_frame=f"{name}/{settings.base_frame}",
                 scan_frame=f"{name}/{settings.scan_frame}",
             )
-        self.publishers = WorldPublishers(graph, settings, scenario.robot)
+        self.publishers = WorldPublishers(graph, settings, scenario)
         self.commands = CommandSubscriptions(
             graph, settings, lambda: self.world, refused_inputs, on_cmd_vel
         )

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from ...core.geometry import Point, towards
 from ...simulation.episode import Outcome
-from ...simulation.robot_model import Robot
+from ...simulation.scenario import Scenario
+from ...simulation.scenario_map import scenario_grid
 from ...simulation.world import World
 from ..interface import markers, to_messages, topics
 from ..node_settings import WorldSimSettings
@@ -22,9 +23,10 @@ class WorldPublishers:
     """The publishers of world_sim for one robot; /clock is FleetInterface's."""
 
     def __init__(
-        self, node: GraphNode | NamespacedNode, settings: WorldSimSettings, robot: Robot
+        self, node: GraphNode | NamespacedNode, settings: WorldSimSettings, scenario: Scenario
     ) -> None:
-        """Advertise all topics."""
+        """Advertise all topics. Raises ConfigError where publish_map needs too large a map."""
+        robot = scenario.robot
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
         self._odom = node.advertise(topics.ODOM)
         noisy = robot.noise.affects_odometry
@@ -35,6 +37,10 @@ class WorldPublishers:
         readers = () if self._scan else topics.OBSTACLES.readers
         self._obstacles = node.advertise(replace(topics.OBSTACLES, readers=readers))
         self._goal = node.advertise(topics.GOAL_POSE)
+        self._map, self._grid = None, None
+        if settings.publish_map:  # planner/ready waits for it
+            self._map = node.advertise(replace(topics.MAP, readers=()))
+            self._grid = scenario_grid(scenario)
         self._outcome = node.advertise(topics.OUTCOME)
         self._trail = node.advertise(topics.TRAIL)
         self._markers = node.advertise(topics.MARKERS)
@@ -48,8 +54,11 @@ class WorldPublishers:
         return bool(self._odom.get_subscription_count())
 
     def publish_start(self, goal: Point, stamp_ns: int) -> None:
-        """Publish a new run's goal, and that it is running."""
+        """Publish a new run's map and goal, and that it is running."""
         self._positions.clear()
+        if self._map and self._grid:
+            grid = self._grid._replace(stamp_ns=stamp_ns)
+            self._map.publish(to_messages.occupancy_grid_msg(grid, self._frame))
         self._goal.publish(to_messages.pose_stamped_msg(goal, stamp_ns, self._frame))
         self._outcome.publish(to_messages.outcome_msg(None, 0))
 

@@ -71,6 +71,7 @@ class InputHealth:
         """Start with nothing received on these inputs."""
         self.rates = {name: InputRate() for name in inputs}
         self._faults: dict[str, str] = {}
+        self._awaited: dict[str, str] = {}
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -90,6 +91,10 @@ class InputHealth:
         """Why the newest of an input is refused, "" if it is not."""
         self._faults[name] = fault
 
+    def set_awaited(self, name: str, text: str) -> None:
+        """That an input is awaited which comes once, "" if it is not."""
+        self._awaited[name] = text
+
     def status(
         self,
         now_s: float,
@@ -104,7 +109,7 @@ class InputHealth:
         """
         fault = next(filter(None, self.faults), "")
         values: dict[str, str] = {}
-        silent: dict[str, str] = {}
+        silent = {name: text for name, text in self._awaited.items() if text}
         for name, rate in self.rates.items():
             age_s = rate.age_s(now_s)
             if age_s is None:

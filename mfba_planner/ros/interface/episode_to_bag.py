@@ -43,6 +43,8 @@ def write_episode_bag(episode: Episode, directory: Path, facts: Mapping[str, Any
     planner = episode.planner
     if episode.planner_name == Method.PREDICTIVE.value:  # a sweep selects planners by name
         planner = replace(planner, method=Method.PREDICTIVE)
+    elif not planner.reads_known_map:  # as a planner of a sweep that takes no map
+        planner = replace(planner, known_map=False)
     config = RunConfig(
         scenario=episode.scenario,
         planner=planner,

@@ -140,6 +140,14 @@ DECISION = Topic(
     qos=TICK_QOS,
     every_tick=True,
 )
+MAP = Topic(
+    # known before the drive, as Nav2's map_server publishes it
+    name="map",
+    type=OccupancyGrid,
+    writers=(WORLD_SIM,),
+    readers=(PLANNER,),
+    qos=LATCHED_QOS,
+)
 LOCAL_MAP = Topic(
     # what stands, where the planner keeps a map; latched, as Nav2's map and costmaps
     name="local_map",
@@ -182,6 +190,7 @@ GRAPH: tuple[Topic, ...] = (
     TRAIL,
     CMD_VEL,
     DECISION,
+    MAP,
     LOCAL_MAP,
     OUTCOME,
     INITIALPOSE,

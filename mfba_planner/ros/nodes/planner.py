@@ -74,9 +74,10 @@ class PlannerNode(ManagedNode):
             self.deactivate()
 
     def missing(self) -> str:
-        """Besides the subscribers: the goal, when ~/ready waits for peers."""
-        needs_goal = self._peers and not self.goals.goal_queue.goal
-        return super().missing() or ("no goal_pose yet" if needs_goal else "")
+        """Besides the subscribers: the map and the goal, when ~/ready waits for peers."""
+        no_goal = "" if self.goals.goal_queue.goal else "no goal_pose yet"
+        own = self._inputs.map.missing or no_goal
+        return super().missing() or (own if self._peers else "")
 
     def _reset(self) -> None:
         self.path_planner.reset()
@@ -88,7 +89,7 @@ class PlannerNode(ManagedNode):
         if changed.method is not self.path_planner.params.method:
             self.path_planner = make_planner(changed, seed=self.settings.seed)
         self.path_planner.params = changed
-        self._inputs.set_reads_scan(changed)
+        self._inputs.set_params(changed)
         self._timer.timer_period_ns = round(self._watch_period_s() / NANO)
 
     def _watch_period_s(self) -> float:
@@ -130,18 +131,15 @@ class PlannerNode(ManagedNode):
         return self._inputs.add_scan(observation, inputs)
 
     def _plan(self, observation: Observation) -> Decision:
+        self.path_planner.set_known_map(self._inputs.map.known_map)
         self._last = self.path_planner.plan(observation)
         return self._last
 
     def _publish(self, decision: Decision) -> None:
         planner, goals = self.path_planner, self.goals.goal_queue
-        self._outputs.publish_decision(
-            decision,
-            planner.params.label,
-            self._refused_inputs.count,
-            {**goals.fields, **self._inputs.fields},
-            self._inputs.range_max_m,
-        )
+        fields = {**goals.fields, **self._inputs.fields}
+        ring_m, refused = self._inputs.range_max_m, self._refused_inputs.count
+        self._outputs.publish_decision(decision, refused, fields, ring_m)
         self._diagnostics.decision_made(decision, planner, goals, self.state)
 
 

@@ -125,7 +125,9 @@ def awaited(
         return dict.fromkeys(names, int(given[0]))
     if given:
         return dict.fromkeys(known(map(resolve, given), names, "--wait-for-subscribers"), 1)
-    return dict.fromkeys(names, 1) if settings.inputs_of else {}
+    # Not every planner reads a map, and one that does gets it whenever it subscribes.
+    needed = [name for name in names if name != resolve(topics.MAP.name)]
+    return dict.fromkeys(needed, 1) if settings.inputs_of else {}
 
 
 def _refuse_clashes(played: list[PlayedTopic]) -> None:
