@@ -114,7 +114,7 @@ def test_no_velocity_brings_contact_with_what_stands_before_the_robot_can_stop(
 
 
 @given(st.floats(0.1, 0.8), st.floats(-math.pi, math.pi), st.floats(-0.4, 0.4))
-def test_a_differential_base_in_the_open_keeps_off_by_the_way_on_which_it_brakes(
+def test_a_differential_base_in_the_open_keeps_off_by_its_stopping_path(
     v: float, yaw: float, aside_rad: float
 ) -> None:
     """Whatever is chosen: here full speed at what is as near as it may be to stop in time."""
