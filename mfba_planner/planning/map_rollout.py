@@ -244,6 +244,20 @@ class MapRollout:
         room = float(self._clearance.at(np.array([px]), np.array([py]))[0]) - self._radius_m
         return room < TIGHT_M
 
+    def slowed_m(self, paths: Paths) -> Array:
+        """How far (m,) a differential base stays behind on paths by slowing down near what stands.
+
+        Until the waypoint; the distance to go counts it after that.
+        """
+        if not self._base.turns:
+            return np.zeros(paths.x.shape[0])
+        room = self._clearance.at(paths.x[:, 1:], paths.y[:, 1:]) - self._radius_m
+        share = np.minimum(np.maximum(room / SLOW_ROOM_M, SLOWEST), 1.0)
+        step_m = self._full * np.diff(paths.driven_s, axis=1)
+        step_m[np.arange(step_m.shape[1]) >= paths.arrived[:, None]] = 0.0
+        slowed: Array = (step_m * (1.0 / share - 1.0)).sum(axis=1)
+        return slowed
+
     def standing_risk(self, paths: Paths, risk: RiskParams, margin_m: float) -> Array:
         """Risk (m,) of what stands; FORBIDDEN_M more for a contact before the waypoint."""
         d = self._clearance.at(paths.x, paths.y)

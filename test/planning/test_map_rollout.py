@@ -355,3 +355,18 @@ def test_with_little_room_a_differential_base_turns_before_it_drives() -> None:
         x = through(made, (1.5, 0.0)).x[0]
         begins.append(int((x > 0.005).argmax()))
     assert 0 < begins[1] < begins[0] - 1
+
+
+@pytest.mark.parametrize(("room_m", "share"), [(0.3, 1.0), (0.1, 0.1 / 0.15), (0.02, 0.4)])
+@pytest.mark.parametrize("circles", [(), (FAR,)])
+def test_a_differential_base_stays_behind_where_it_slows_down(
+    room_m: float, share: float, circles: tuple[Circle, ...]
+) -> None:
+    """Along a wall, until the waypoint; beyond it the distance to go counts."""
+    off = RADIUS_M + room_m
+    known = PointMap(polyline((-6.0, off), (6.0, off)))
+    for base in (OMNI, TURNS):
+        made, _ = rollout(known, (8.0, 0.0), *circles, base=base)
+        slowed_m = float(made.slowed_m(through(made, (2.0, 0.0)))[0])
+        expected = 2.0 * (1.0 / share - 1.0) if base is TURNS else 0.0
+        assert slowed_m == pytest.approx(expected, rel=0.15, abs=1e-9)
