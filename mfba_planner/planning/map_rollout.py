@@ -37,13 +37,18 @@ _ROUNDING = 1.0 - 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Paths:
-    """Positions (m, t + 1), duration of the steps (t,), driving time and steps to waypoints."""
+    """Positions (m, t + 1), duration of the steps (t,), driving time and steps to waypoints.
+
+    slowed_m: how far a differential base stays behind until the waypoint by slowing down near what
+    stands; the distance to go counts it after that.
+    """
 
     x: Array
     y: Array
     step_s: Array
     driven_s: Array  # (m, t + 1)
     arrived: Array  # (m,) number of the step that ends at the waypoint
+    slowed_m: Array  # (m,)
 
 
 class MapRollout:
@@ -132,7 +137,7 @@ class MapRollout:
                 arrived[reached] = k + 1
                 on_first &= ~reached
                 any_first, any_second = bool(on_first.any()), not on_first.all()
-        return Paths(xs, ys, np.full(steps, h), driven, arrived)
+        return Paths(xs, ys, np.full(steps, h), driven, arrived, np.zeros(m))
 
     def _straight(self, qx: Array, qy: Array, t1: Array) -> Paths:
         """The straight lines to the waypoints alone."""
@@ -143,7 +148,8 @@ class MapRollout:
         (px, py), driven = self._position, length[:, None] * share / self._full
         x, y = px + qx[:, None] * share, py + qy[:, None] * share
         step_s = np.full(steps, self._tick_s)
-        return Paths(x, y, step_s, driven, np.full(qx.size, steps))
+        m = qx.size
+        return Paths(x, y, step_s, driven, np.full(m, steps), np.zeros(m))
 
     def _turning(self, qx: Array, qy: Array, t1: Array, horizon_s: float) -> Paths:
         base, full, (px, py) = self._base, self._full, self._position
@@ -158,12 +164,12 @@ class MapRollout:
         step_s = np.array([held_s] * FINE_STEPS + coarse)
         steps, t = step_s.size, 0.0
         xs, ys = np.empty((m, steps + 1)), np.empty((m, steps + 1))
-        driven = np.zeros((m, steps + 1))
+        driven, slowed_m = np.zeros((m, steps + 1)), np.zeros(m)
         x, y, yaw = np.full(m, px), np.full(m, py), np.full(m, self._yaw)
         v, omega = np.full(m, self._speeds.v), np.full(m, self._speeds.omega)
-        share = np.sqrt(qx * qx + qy * qy) / (t1 * full)
+        first = np.sqrt(qx * qx + qy * qy) / (t1 * full)
         qx, qy = qx + px, qy + py
-        waits, waiting_mps = share < SLOW, full * share
+        waits, waiting_mps = first < SLOW, full * first
         any_waits = bool(waits.any())
         longest_wait_s = float(t1[waits].max()) if any_waits else 0.0
         gx, gy = self._to_go.goal
@@ -192,7 +198,8 @@ class MapRollout:
             off = np.abs(error)
             turn = np.copysign(np.minimum(_brake(off, alpha, held_s), fastest), error)
             room = self._clearance.at(x, y) - self._radius_m
-            wanted = full * np.minimum(np.maximum(room / SLOW_ROOM_M, SLOWEST), 1.0)
+            share = np.minimum(np.maximum(room / SLOW_ROOM_M, SLOWEST), 1.0)
+            wanted = full * share
             if any_waits and t < longest_wait_s:
                 wanted = np.where(waits & (t < t1), waiting_mps, wanted)
             if near_goal:
@@ -218,7 +225,9 @@ class MapRollout:
                 yaw + mean_turn * h,
             )
             xs[:, k + 1], ys[:, k + 1] = x, y
-            driven[:, k + 1] = driven[:, k] + np.abs(mean) * h / full
+            ahead_m = np.abs(mean) * h
+            driven[:, k + 1] = driven[:, k] + ahead_m / full
+            slowed_m += np.where(on_first, ahead_m * (1.0 / share - 1.0), 0.0)
             t += h
             if on_first.any():
                 reach = np.maximum(REACHED_M, np.abs(v) * h)
@@ -237,26 +246,12 @@ class MapRollout:
         if self.alone:  # beyond its waypoint a path does not count, however long the others are
             ends = np.minimum(np.arange(n), arrived[:, None])
             xs, ys, driven = (np.take_along_axis(a, ends, axis=1) for a in (xs, ys, driven))
-        return Paths(xs, ys, step_s[:steps], driven, arrived)
+        return Paths(xs, ys, step_s[:steps], driven, arrived, slowed_m)
 
     def _is_tight(self) -> bool:
         px, py = self._position
         room = float(self._clearance.at(np.array([px]), np.array([py]))[0]) - self._radius_m
         return room < TIGHT_M
-
-    def slowed_m(self, paths: Paths) -> Array:
-        """How far (m,) a differential base stays behind on paths by slowing down near what stands.
-
-        Until the waypoint; the distance to go counts it after that.
-        """
-        if not self._base.turns:
-            return np.zeros(paths.x.shape[0])
-        room = self._clearance.at(paths.x[:, 1:], paths.y[:, 1:]) - self._radius_m
-        share = np.minimum(np.maximum(room / SLOW_ROOM_M, SLOWEST), 1.0)
-        step_m = self._full * np.diff(paths.driven_s, axis=1)
-        step_m[np.arange(step_m.shape[1]) >= paths.arrived[:, None]] = 0.0
-        slowed: Array = (step_m * (1.0 / share - 1.0)).sum(axis=1)
-        return slowed
 
     def standing_risk(self, paths: Paths, risk: RiskParams, margin_m: float) -> Array:
         """Risk (m,) of what stands; FORBIDDEN_M more for a contact before the waypoint."""

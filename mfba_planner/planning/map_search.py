@@ -240,7 +240,7 @@ class _Evaluation:
         if self._turn_delay is not None:
             cost += risk.waiting * speed * self._turn_delay.towards_all(qx, qy)
         paths = self._rollout.paths(qx, qy, t1)
-        cost += self._rollout.slowed_m(paths)
+        cost += paths.slowed_m
         standing = self._rollout.standing_risk(paths, risk, MARGIN_M)
         harm = np.maximum(standing, self._rollout.moving_risk(paths, risk))
         cost += harm

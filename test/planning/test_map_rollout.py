@@ -367,6 +367,6 @@ def test_a_differential_base_stays_behind_where_it_slows_down(
     known = PointMap(polyline((-6.0, off), (6.0, off)))
     for base in (OMNI, TURNS):
         made, _ = rollout(known, (8.0, 0.0), *circles, base=base)
-        slowed_m = float(made.slowed_m(through(made, (2.0, 0.0)))[0])
+        slowed_m = float(through(made, (2.0, 0.0)).slowed_m[0])
         expected = 2.0 * (1.0 / share - 1.0) if base is TURNS else 0.0
         assert slowed_m == pytest.approx(expected, rel=0.15, abs=1e-9)
