@@ -10,6 +10,7 @@ free.
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,7 @@ _MOST_CELLS = 20_000  # about 8 ms
 _SAME_GOAL_M = 0.1  # noise of the odometry moves the goal in the map's frame
 _CLOSED_NS = 1_500_000_000
 _PASSAGE_NS = 30_000_000_000  # so long a passage counts as closed that the robot did not pass
+_NEAR_M = 2.0  # farther off such passages are left to the distance to go
 _FARTHEST_M = 20.0  # a goal farther away is replaced by a point on the line to it
 
 
@@ -111,6 +113,19 @@ class DistanceToGo:
         """Count the passage at a position as closed for a while: the robot does not pass it."""
         self._not_passed.append((stamp_ns, position))
         self._computed = None
+
+    def open(self, position: Point, headings_rad: Array) -> Array | None:
+        """Whether each heading (n,) leads past the passages that count as closed; None: all do."""
+        found = None
+        for _, (x, y) in self._not_passed:
+            dx, dy = x - position[0], y - position[1]
+            away = math.sqrt(dx * dx + dy * dy)
+            if not self._radius_m < away < _NEAR_M:
+                continue
+            wide = math.sqrt(1.0 - (self._radius_m / away) ** 2)
+            past = np.cos(headings_rad - math.atan2(dy, dx)) < wide
+            found = past if found is None else found & past
+        return found
 
     def _is_clear(self, start: Point, end: Point, room_m: float) -> bool:
         """is_clear() by the known map."""

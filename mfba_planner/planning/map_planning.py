@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.geometry import Point, Pose2D, distance, rotated
+from ..core.geometry import Point, Pose2D, distance, rotated, towards
 from ..core.planner_types import Circle, Observation
 from ..core.random_streams import stream
 from ..perception.known_map import KnownMap, UnclearedMap
@@ -18,7 +18,7 @@ from ..perception.static_map import StaticMap, StaticMapParams
 from ..swarm.bat_swarm import BatSwarm
 from ..swarm.search_region import Disc
 from .base_planner import Move
-from .blocked_headings import BlockedHeadings
+from .blocked_headings import BlockedHeadings, PlaceCheck
 from .differential_drive import Speeds
 from .distance_to_go import RouteParams, is_clear
 from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
@@ -36,7 +36,7 @@ NEAR_M = 3.5  # of a straight way: with so much room beside it the map is not ne
 ROOM_M = 0.25
 NEAR_POINTS_M = 1.0  # contact within a tick is ruled out with what stands so near
 _LEAST_M = 0.005  # kept from what stands, beyond the robot's radius
-_BESIDE_M = 0.15
+_BESIDE_M, _AHEAD_M = 0.15, 0.1
 _SLOW_MPS, _ESTABLISHED_M = 0.5, 0.05
 _DRIVES_MPS = 0.1  # a slower velocity is a wait
 ENCLOSED = "what stands leaves no way out"
@@ -69,7 +69,7 @@ class MapPlanning:
         self.search = MapSearch(route, params.robot_radius_m, headings, reach_m, self._known_map)
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
-        self._blocked = BlockedHeadings()
+        self._blocked, self._place = BlockedHeadings(), PlaceCheck()
         self._headings_rad = 2.0 * math.pi / headings * np.arange(1, headings + 1)
 
     def update(self, stamp_ns: int, pose: Pose2D, tracker: Tracker) -> None:
@@ -102,6 +102,7 @@ class MapPlanning:
         to_go = self.search.to_go
         to_go.update(obs.pose_ns, known, position, self._in_map(goal)[0])
         if to_go.closed_by:
+            self._place.reset()
             return Move(
                 velocity=(0.0, 0.0), reason=f"no way to the goal: closed by {to_go.closed_by}",
                 event=Event.NO_GAP,
@@ -116,7 +117,10 @@ class MapPlanning:
             )
             room_m = params.robot_radius_m + ROOM_M
             if is_clear(known, position, near, room_m) and not self._is_beside(position):
+                self._place.reset()
                 return None
+        if (heading_rad := self._place.stays(obs.pose_ns, position)) is not None:
+            self._close_ahead(obs.pose_ns, position, heading_rad)
         points = known.present_points()
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
         clearance = self.search.clearance(known, position, obs.pose_ns)
@@ -134,9 +138,13 @@ class MapPlanning:
         if params.turns:
             delay = TurnDelay(params, obs.pose.yaw + turn, speeds.omega)
         near_m = max(NEAR_POINTS_M, params.robot_radius_m + _LEAST_M + self._stopping_m(tick_s))
-        drivable = self._blocked.open(obs.pose_ns, position, self._headings_rad)
-        if unobserved is not None:
-            drivable = ~unobserved if drivable is None else drivable & ~unobserved
+        open_ = [
+            self._blocked.open(obs.pose_ns, position, self._headings_rad),
+            to_go.open(position, self._headings_rad),
+            None if unobserved is None else ~unobserved,
+        ]
+        masks = [mask for mask in open_ if mask is not None]
+        drivable = np.logical_and.reduce(masks) if masks else None
         found = self.search.search(
             rollout, position, self._risk, speed, tick_s, delay, drivable, last,
             lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
@@ -181,6 +189,11 @@ class MapPlanning:
             for c, cx, cy, keep in zip(circles, x.tolist(), y.tolist(), kept.tolist())
             if keep
         ]
+
+    def _close_ahead(self, stamp_ns: int, position: Point, heading_rad: float) -> None:
+        """Count the passage right ahead of the robot as closed for a while."""
+        place = towards(position, heading_rad, self._params.robot_radius_m + _AHEAD_M)
+        self.search.to_go.close(stamp_ns, place)
 
     def _is_beside(self, position: Point) -> bool:
         """Whether something stands so near that it may be touched by a turn away from it."""
@@ -271,7 +284,7 @@ class MapPlanning:
         if (ux, uy) != (0.0, 0.0) or speed < _DRIVES_MPS:
             self._blocked.drives()
         elif self._blocked.stands(obs.pose_ns, position, math.atan2(qy, qx)):
-            to_go.close(obs.pose_ns, position)
+            self._close_ahead(obs.pose_ns, position, math.atan2(qy, qx))
         percent = 1e2 * share * speed / params.speed_mps
         reason = _STRAIGHT
         if not found.free or not to_go.is_straight:

@@ -12,9 +12,12 @@ from mfba_planner.core.geometry import Point
 from mfba_planner.planning.blocked_headings import (
     HELD_NS,
     NEAR_M,
+    PLACE_M,
+    PLACE_NS,
     STANDS_NS,
     WIDE_RAD,
     BlockedHeadings,
+    PlaceCheck,
 )
 
 HEADINGS = np.linspace(-math.pi, math.pi, 73)[1:]
@@ -72,3 +75,48 @@ def test_two_headings_are_both_closed() -> None:
     found = made.open(NOW_NS + STANDS_NS, HERE, np.array([0.0, math.pi, 0.5 * math.pi]))
     assert found is not None
     assert found.tolist() == [False, False, True]
+
+
+def arrived_from(start: Point) -> PlaceCheck:
+    """At HERE since second 2, after start."""
+    check = PlaceCheck()
+    assert check.stays(SECOND_NS, start) is None
+    assert check.stays(2 * SECOND_NS, HERE) is None
+    return check
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(1.1 * PLACE_M, 3.0), st.floats(0.0, 0.9 * PLACE_M))
+def test_a_place_that_is_not_left_gives_the_heading_in_which_the_robot_came(
+    heading_rad: float, came_m: float, aside_m: float
+) -> None:
+    """Away from where the robot came from, wherever it turns meanwhile."""
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    check = arrived_from((HERE[0] - came_m * c, HERE[1] - came_m * s))
+    then_ns = 2 * SECOND_NS + PLACE_NS
+    near = (HERE[0] + aside_m * s, HERE[1] - aside_m * c)
+    assert check.stays(then_ns - 1, near) is None
+    found = check.stays(then_ns, HERE)
+    assert found is not None
+    assert math.remainder(found - heading_rad, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
+    assert check.stays(then_ns + PLACE_NS - 1, HERE) is None, "the time begins anew"
+    assert check.stays(then_ns + PLACE_NS, HERE) is not None
+
+
+def test_a_robot_that_drives_is_waited_for_anew() -> None:
+    check = arrived_from((0.0, 0.0))
+    position = HERE
+    for tick in range(200):
+        position = (position[0] + 0.01 * PLACE_M, position[1])
+        stamp_ns = 2 * SECOND_NS + tick * PLACE_NS // 150
+        assert check.stays(stamp_ns, position) is None
+
+
+@pytest.mark.parametrize("event", ["reset", "clock", "first place"])
+def test_nothing_is_ahead_without_a_place_before(event: str) -> None:
+    check = arrived_from((0.0, 0.0)) if event != "first place" else PlaceCheck()
+    if event == "reset":
+        check.reset()
+    begin_ns = 1 if event == "clock" else 3 * SECOND_NS
+    assert check.stays(begin_ns, HERE) is None
+    found = check.stays(begin_ns + PLACE_NS, HERE)
+    assert (found is None) == (event != "clock")

@@ -306,3 +306,26 @@ def test_a_passage_that_is_not_passed_is_gone_round_for_a_while() -> None:
     known.version += 1
     to_go.update(now_ns + 31 * SECOND_NS, known, start, goal)
     assert at(to_go, start) == pytest.approx(through_m, abs=1e-3)
+
+
+@given(st.floats(0.31, 1.9), st.floats(-3.1, 3.1))
+def test_headings_into_a_closed_passage_are_closed(away_m: float, angle: float) -> None:
+    """Those whose line passes within the robot's radius of its middle."""
+    to_go = made(PointMap(), (4.0, 0.0))
+    headings = np.linspace(-math.pi, math.pi, 73)[1:]
+    assert to_go.open(START, headings) is None
+    to_go.close(SECOND_NS, (away_m * math.cos(angle), away_m * math.sin(angle)))
+    found = to_go.open(START, headings)
+    assert found is not None
+    for heading, is_open in zip(headings.tolist(), found.tolist()):
+        off = abs(math.remainder(heading - angle, 2.0 * math.pi))
+        beside_m = away_m * math.sin(min(off, 0.5 * math.pi))
+        if abs(beside_m - RADIUS_M) > 1e-9:
+            assert is_open == (beside_m > RADIUS_M)
+
+
+@pytest.mark.parametrize("away_m", [0.2, 2.1])
+def test_a_passage_around_the_robot_or_far_off_closes_no_heading(away_m: float) -> None:
+    to_go = made(PointMap(), (4.0, 0.0))
+    to_go.close(SECOND_NS, (away_m, 0.0))
+    assert to_go.open(START, np.zeros(1)) is None

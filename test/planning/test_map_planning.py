@@ -19,7 +19,7 @@ from mfba_planner.evaluation.metrics import evaluate
 from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.perception.static_map import StaticMapParams
-from mfba_planner.planning.blocked_headings import STANDS_NS
+from mfba_planner.planning.blocked_headings import PLACE_NS, STANDS_NS
 from mfba_planner.planning.differential_drive import Speeds
 from mfba_planner.planning.distance_to_go import RouteParams, is_clear
 from mfba_planner.planning.map_planning import MapPlanning
@@ -259,7 +259,25 @@ def test_where_the_check_of_the_points_stops_it_it_chooses_another_heading(
     ticks = math.ceil(STANDS_NS / PARAMS.tick_ns)
     assert found[: ticks + 1] == [(0.0, 0.0)] * (ticks + 1)
     assert all(v != (0.0, 0.0) for v in found[ticks + 1 :])
-    assert closed == [(ticks * PARAMS.tick_ns + 1, START)]
+    ((stamp_ns, place),) = closed
+    assert stamp_ns == ticks * PARAMS.tick_ns + 1
+    assert place == pytest.approx((RADIUS_M + 0.1, 0.0), abs=0.1)
+
+
+def test_a_place_that_is_not_left_is_gone_round() -> None:
+    """Before a post; where the robot then goes is not towards the closed passage."""
+    made, goal = planning([(1.5, 0.05)]), (3.0, 0.0)
+    found = []
+    for tick in range(120):
+        pose = Pose2D(-0.5 if tick == 0 else 0.0, 0.0)
+        stamp_ns = tick * PARAMS.tick_ns + 1
+        obs = replace(at_start(goal), stamp_ns=stamp_ns, pose=pose)
+        move = made.move(obs, goal, [], Speeds(), None, None, 0.08)
+        assert move is not None
+        found.append(math.atan2(move.velocity[1], move.velocity[0]))
+    ticks = 1 + math.ceil(PLACE_NS / PARAMS.tick_ns)
+    assert all(abs(angle) < 0.5 for angle in found[:ticks])
+    assert all(abs(angle) > 0.8 for angle in found[ticks:])
 
 
 def reasons(decisions: tuple[Decision, ...]) -> set[str]:
