@@ -119,8 +119,6 @@ class MapPlanning:
             if is_clear(known, position, near, room_m) and not self._is_beside(position):
                 self._place.reset()
                 return None
-        if (heading_rad := self._place.stays(obs.pose_ns, position)) is not None:
-            self._close_ahead(obs.pose_ns, position, heading_rad)
         points = known.present_points()
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
         clearance = self.search.clearance(known, position, obs.pose_ns)
@@ -149,6 +147,11 @@ class MapPlanning:
             rollout, position, self._risk, speed, tick_s, delay, drivable, last,
             lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
         )  # fmt: skip
+        came_rad = self._place.stays(obs.pose_ns, position)
+        if came_rad is not None:
+            wanted_rad = math.atan2(found.waypoint[1], found.waypoint[0])
+            on = math.cos(wanted_rad - came_rad) > 0.0
+            self._close_ahead(obs.pose_ns, position, wanted_rad if on else came_rad)
         return self._as_move(
             obs, found, position, turn, speeds, points[away < near_m], circles, tick_s
         )
