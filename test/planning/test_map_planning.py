@@ -275,9 +275,9 @@ def test_a_place_that_is_not_left_is_gone_round() -> None:
         move = made.move(obs, goal, [], Speeds(), None, None, 0.08)
         assert move is not None
         found.append(math.atan2(move.velocity[1], move.velocity[0]))
-    ticks = 1 + math.ceil(PLACE_NS / PARAMS.tick_ns)
+    ticks = 2 + math.ceil(PLACE_NS / PARAMS.tick_ns)
     assert all(abs(angle) < 0.5 for angle in found[:ticks])
-    assert all(abs(angle) > 0.8 for angle in found[ticks:])
+    assert all(abs(angle - found[ticks - 1]) > 0.8 for angle in found[ticks:])
 
 
 def reasons(decisions: tuple[Decision, ...]) -> set[str]:
