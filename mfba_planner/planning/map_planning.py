@@ -12,16 +12,17 @@ import numpy as np
 from ..core.geometry import Point, Pose2D, distance, rotated
 from ..core.planner_types import Circle, Observation
 from ..core.random_streams import stream
+from ..optimizers.registry import NONE, optimize
 from ..perception.obstacle_tracker import Tracker
 from ..perception.static_map import StaticMap, StaticMapParams
-from ..swarm.bat_swarm import BatSwarm
+from ..swarm.optimizer import Evaluate, Found
 from ..swarm.search_region import Disc
 from .base_planner import Move
 from .blocked_headings import BlockedHeadings
 from .differential_drive import Speeds
 from .distance_to_go import RouteParams, is_clear
 from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
-from .map_search import Found, MapSearch
+from .map_search import FoundWaypoint, MapSearch
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
@@ -132,7 +133,7 @@ class MapPlanning:
             drivable = ~unobserved if drivable is None else drivable & ~unobserved
         found = self.search.search(
             rollout, position, self._risk, speed, tick_s, delay, drivable, last,
-            lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
+            lambda center, costs: self._refine(center, costs, obs.stamp_ns) if bats else None,
         )  # fmt: skip
         return self._as_move(
             obs, found, position, turn, speeds, points[away < near_m], circles, tick_s
@@ -144,11 +145,13 @@ class MapPlanning:
         ux, uy = self.search.to_go.direction(np.array([x]), np.array([y]))
         return math.atan2(float(uy[0]), float(ux[0])) - turn
 
-    def _swarm(self, center: Point, stamp_ns: int) -> BatSwarm:
-        bat = self._params.bat
-        return BatSwarm(
-            bat, Disc(self._search_m, center), stream(self._seed, stamp_ns), ahead=bat.iterations
-        )
+    def _refine(self, center: Point, evaluate: Evaluate, stamp_ns: int) -> Found | None:
+        """A search around a waypoint; None without an optimiser."""
+        params = self._params
+        if params.optimizer == NONE:
+            return None
+        disc, generator = Disc(self._search_m, center), stream(self._seed, stamp_ns)
+        return optimize(params.optimizer, params.bat, disc, generator, evaluate)
 
     def _in_map(self, point: Point) -> tuple[Point, float]:
         """A position in the map's frame, and the turn from odom to that frame (rad)."""
@@ -231,7 +234,7 @@ class MapPlanning:
     def _as_move(
         self,
         obs: Observation,
-        found: Found,
+        found: FoundWaypoint,
         position: Point,
         turn: float,
         speeds: Speeds,

@@ -12,13 +12,14 @@ import numpy as np
 from ..core.geometry import Point, Pose2D, bearing, distance
 from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
+from ..optimizers.registry import NONE, optimize, require_optimizer
 from ..perception.obstacle_memory import ObstacleMemory
 from ..perception.obstacle_tracker import Tracker
 from ..perception.scan_coverage import ScanCoverage
 from ..perception.sensory_vector import SensorParams, sense_circles
 from ..perception.static_map import StaticMap
-from ..swarm.bat_swarm import BatSwarm
-from ..swarm.search_region import Disc
+from ..swarm.optimizer import Found
+from ..swarm.search_region import Disc, Vector
 from .base_planner import BasePlanner, Move
 from .differential_drive import Speeds, apply_command, command
 from .drive_rollout import DriveRollout
@@ -86,7 +87,8 @@ class Predictive(BasePlanner):
         seed: int,
         options: PredictiveParams | None = None,
     ) -> None:
-        """Start idle; ConfigError for a negative seed."""
+        """Start idle; ConfigError for a negative seed or an unknown optimiser."""
+        require_optimizer(params.optimizer)
         self.options = options or PredictiveParams()
         n = self.options.headings
         angles = 2.0 * math.pi / n * np.arange(1, n + 1)
@@ -189,11 +191,11 @@ class Predictive(BasePlanner):
         found = costs.cheapest(candidates, to_goal, speed, least)
         if found is not None:
             waypoint, t1, least = found
-        swarm = self._refine(costs, waypoint, to_goal, least, obs.stamp_ns)
-        if not min(swarm.best_value, least) < math.inf:
+        refined = self._refine(costs, waypoint, to_goal, least, obs.stamp_ns)
+        if not min(refined.best_value, least) < math.inf:
             return _blocked(UNOBSERVED, vs)
-        if swarm.best_value < least:
-            (qx, qy), least = swarm.best_x, swarm.best_value
+        if refined.best_value < least:
+            (qx, qy), least = refined.best_x, refined.best_value
             waypoint = (qx, qy)
             t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
         if distance((0.0, 0.0), waypoint) > 0.999 * t1 * speed:
@@ -214,7 +216,7 @@ class Predictive(BasePlanner):
             vg=vs,  # here a heading is both sector and gap
             gap=gap,
             waypoint=(x + waypoint[0], y + waypoint[1]),
-            candidates=tuple((x + dx, y + dy) for dx, dy in swarm.candidates),
+            candidates=tuple((x + dx, y + dy) for dx, dy in refined.candidates),
         )
 
     def _closed_headings(self, costs: TrajectoryCost) -> Bits:
@@ -370,23 +372,27 @@ class Predictive(BasePlanner):
 
     def _refine(
         self, costs: TrajectoryCost, center: Point, to_goal: Point, bound: float, stamp_ns: int
-    ) -> BatSwarm:
-        """Search around the best waypoint by bats; costs not below the bound are cut short."""
-        bat, speed, tick_s = self.params.bat, self.params.speed_mps, self.tick_s
-        disc = Disc(self.options.search_m, center)
-        swarm = BatSwarm(bat, disc, stream(self.seed, stamp_ns), ahead=bat.iterations)
-        for _ in range(bat.iterations + 1):
+    ) -> Found:
+        """Search around the best waypoint; costs not below the bound are cut short."""
+        params, speed, tick_s = self.params, self.params.speed_mps, self.tick_s
+        if params.optimizer == NONE:
+            return Found()
+
+        def evaluate(points: list[Vector]) -> list[float]:
+            nonlocal bound
             values = []
-            for qx, qy in swarm.ask():
+            for qx, qy in points:
                 # At least one tick: the velocity is held that long and must not overshoot.
                 t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
                 if self._is_observed((qx, qy)):
                     values.append(costs.cost((qx, qy), t1, to_goal, speed, bound))
                 else:
                     values.append(math.inf)
-            swarm.tell(values)
-            bound = min(bound, swarm.best_value)
-        return swarm
+            bound = min(bound, *values)
+            return values
+
+        disc, generator = Disc(self.options.search_m, center), stream(self.seed, stamp_ns)
+        return optimize(params.optimizer, params.bat, disc, generator, evaluate)
 
 
 def _blocked(reason: str, vs: Bits = ()) -> Move:
