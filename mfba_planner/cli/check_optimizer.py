@@ -6,7 +6,7 @@ from __future__ import annotations
 from ..core.argument_parser import Parser
 from ..core.errors import ConfigError, MfbaError
 from ..evaluation.optimizer_check import BUDGET, PATIENCE_S, POPULATION, check
-from ..optimizers.registry import known_names
+from ..optimizers.registry import NAMES, NONE
 
 _DESCRIPTION = f"""Check optimisers, as planner.optimizer names them, in the disc of one goal step
 with {BUDGET} evaluations and a population of {POPULATION}: one line for each property."""
@@ -19,7 +19,7 @@ def main(args: list[str]) -> int:
         "names",
         nargs="+",
         metavar="NAME",
-        help=f"{', '.join(known_names())}; or MODULE:NAME",
+        help=f"{', '.join(name for name in NAMES if name != NONE)}; or MODULE:NAME",
     )
     parser.add_argument(
         "--patience",

@@ -19,7 +19,8 @@ def names() -> list[str]:
         f"{module_name}.{name}"
         for module_name, module in getmembers(mealpy, ismodule)
         for name, kind in getmembers(module, isclass)
-        if issubclass(kind, mealpy.Optimizer) and kind.__module__ == module.__name__
+        if issubclass(kind, mealpy.Optimizer) and kind is not mealpy.Optimizer
+        if kind.__module__ == module.__name__
     )
 
 

@@ -34,10 +34,13 @@ _LIBRARIES = {
 }
 
 
-def known_names() -> list[str]:
-    """Names without a library, those of installed packages, and an example of each library."""
-    examples = [f"{library}:{name}" for library, (_, name) in _LIBRARIES.items()]
-    return [*_BATS, *_BASELINES, NONE, *_installed(), *examples]
+# Names without a library, and an example of each library.
+NAMES = (
+    *_BATS,
+    *_BASELINES,
+    NONE,
+    *(f"{library}:{of}" for library, (_, of) in _LIBRARIES.items()),
+)
 
 
 def require_optimizer(name: str) -> None:
@@ -110,7 +113,7 @@ def _find(name: str) -> Factory:
         return _of_module(name, head, rest)
     if name in (installed := _installed()):
         return _of_module(name, *installed[name].split(":"))
-    raise ConfigError(f"optimizer {name!r}: unknown; {did_you_mean(name, known_names())}")
+    raise ConfigError(f"optimizer {name!r}: unknown; {did_you_mean(name, [*NAMES, *installed])}")
 
 
 def _installed() -> dict[str, str]:
@@ -138,7 +141,7 @@ def _of_module(name: str, module: str, attribute: str) -> Factory:
     try:
         factory: Factory = getattr(import_module(module), attribute)
     except Exception as error:
-        near = did_you_mean(name, known_names())
+        near = did_you_mean(name, list(NAMES))
         hint = f"; {near}" if near.startswith("did") else ""
         raise ConfigError(
             f"optimizer {name}: cannot be imported ({' '.join(str(error).split())}){hint}; give "

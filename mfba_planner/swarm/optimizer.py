@@ -29,8 +29,13 @@ class Optimizer(Protocol):
     failed. Points lie inside the region.
     """
 
-    best_x: Vector
-    best_value: float
+    @property
+    def best_x(self) -> Vector:
+        """The best point told so far; [] before the first."""
+
+    @property
+    def best_value(self) -> float:
+        """Its value; inf before the first."""
 
     def ask(self) -> Sequence[Sequence[float]]:
         """Return one or more points; not more than the population is usual."""
@@ -202,11 +207,10 @@ def _inside(points: Any, region: Region) -> list[Vector]:
             if len(x) != len(low):
                 raise OptimizerError(f"a point of {len(x)} numbers; give {len(low)}")
             # NaN is outside too.
-            clamped = region.clamp(x)
-            if not all(abs(a - b) <= e for a, b, e in zip(x, clamped, slack)):
+            if not all(abs(a - b) <= e for a, b, e in zip(x, region.clamp(x), slack)):
                 shown = ", ".join(f"{v:.4g}" for v in x)
                 raise OutsideError(f"the point ({shown}) is outside the region")
-            vectors.append(clamped)
+            vectors.append(x)
     except (TypeError, ValueError) as error:
         raise OptimizerError(
             f"{type(points).__name__} instead of points ({error}); give lists of numbers"
