@@ -143,8 +143,8 @@ class _Check:
             return Property("best", False, f"best_x, best_value: {error}")
         best = first.found.best_value
         # The points of the last ask() are not told if they were more than the budget.
-        told = zip(map(_distance, first.points[: -len(first.found.candidates)]), first.points)
-        right = (kept, x) in ((best, first.found.best_x), min(told, default=(math.inf, x)))
+        earlier = zip(map(_distance, first.points[: -len(first.found.candidates)]), first.points)
+        right = (kept, x) in ((best, first.found.best_x), min(earlier, default=(math.inf, x)))
         text = "best_x and best_value are the best told"
         if not right:
             text = f"best_value is {kept:.6g}, the best told {best:.6g}"

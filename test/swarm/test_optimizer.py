@@ -43,7 +43,7 @@ class AskedInTurn:
     """An optimiser behind the protocol alone: search() cannot know what it is."""
 
     def __init__(self, inner: Optimizer) -> None:
-        self.inner, self.told = inner, list[Sequence[float]]()
+        self.inner, self.received = inner, list[Sequence[float]]()
 
     @property
     def best_x(self) -> Vector:
@@ -57,7 +57,7 @@ class AskedInTurn:
         return self.inner.ask()
 
     def tell(self, values: Sequence[float]) -> None:
-        self.told.append(values)
+        self.received.append(values)
         self.inner.tell(values)
 
 
@@ -105,21 +105,21 @@ def test_the_budget_is_used_and_never_exceeded(budget: int, population: int, see
         assert found.best_value == min(values) == sphere(found.best_x)
 
 
-def test_points_beyond_the_budget_are_left_out_and_not_told() -> None:
+def test_points_beyond_the_budget_are_left_out_and_not_passed_on() -> None:
     asked = AskedInTurn(faulty.Sound(DISC, 8, rng(), 5))
     found = search(asked, DISC, 8, each(sphere))
-    assert [len(values) for values in asked.told] == [5]
+    assert [len(values) for values in asked.received] == [5]
     assert len(found.candidates) == 3
 
 
-def test_a_failed_value_is_told_as_inf_counted_and_never_the_best() -> None:
+def test_a_failed_value_is_passed_on_as_inf_counted_and_never_the_best() -> None:
     asked = AskedInTurn(faulty.Sound(DISC, 200, rng(), 5))
     found = search(asked, DISC, 200, each(partly))
-    told = [value for values in asked.told for value in values]
-    assert all(value == math.inf or math.isfinite(value) for value in told)
+    received = [value for values in asked.received for value in values]
+    assert all(value == math.inf or math.isfinite(value) for value in received)
     assert set(found.failures.counts) == {"NaN", "inf", "raised ValueError"}
-    assert sum(found.failures.counts.values()) == told.count(math.inf)
-    assert found.best_value == min(told) < math.inf
+    assert sum(found.failures.counts.values()) == received.count(math.inf)
+    assert found.best_value == min(received) < math.inf
     runs = search(faulty.Runs(DISC, 200, rng(), 5), DISC, 200, each(partly))
     assert runs.failures.counts.keys() == found.failures.counts.keys()
     assert runs.best_value < math.inf
