@@ -54,7 +54,8 @@ class Grid(_Points):
         """Choose the finest grid of at most budget points inside."""
         per_axis = math.floor(budget ** (1.0 / len(region.span()[0])) + 1e-9)
         points = grid_points(region, per_axis)
-        while len(finer := grid_points(region, per_axis + 1)) <= budget:
+        # Of a region without interior every grid is one point.
+        while per_axis < budget and len(finer := grid_points(region, per_axis + 1)) <= budget:
             points, per_axis = finer, per_axis + 1
         super().__init__(points, population)
 

@@ -13,11 +13,15 @@ from numpy.random import Generator
 
 from ..core.errors import InputError, MfbaError, OptimizerError, OutsideError
 from .bat_swarm import BatSwarm
-from .objective_failures import Failures
+from .objective_failures import Evaluate, Failures, each
 from .search_region import Region, Vector
 
 Objective = Callable[[Sequence[float]], float]
-Evaluate = Callable[[list[Vector]], Sequence[Any]]
+
+__all__ = [
+    "BudgetUsed", "Evaluate", "Factory", "Found", "Objective", "Optimizer", "RunOptimizer",
+    "each", "raised", "search",
+]  # fmt: skip
 
 _EDGE = 1e-9  # of the region's width: clamp() rounds
 
@@ -117,24 +121,6 @@ def search(
             break
         _call("tell", optimizer.tell, values)
     return found
-
-
-def each(objective: Callable[[Vector], float]) -> Evaluate:
-    """An objective of one point as one of many; a call that raises is a failure at its point."""
-
-    def value(x: Vector) -> Any:
-        try:
-            return objective(x)
-        except Exception as error:
-            return error
-
-    def evaluate(points: list[Vector]) -> list[Any]:
-        try:
-            return [objective(x) for x in points]
-        except Exception:
-            return [value(x) for x in points]
-
-    return evaluate
 
 
 def _bats(swarm: BatSwarm, budget: int, evaluate: Evaluate) -> Found:

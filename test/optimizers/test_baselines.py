@@ -21,6 +21,16 @@ BOXES = st.lists(SIDES, min_size=1, max_size=3).map(
 DISCS = st.builds(Disc, st.floats(0.0, 3.0), st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0)))
 
 
+class Narrow(Disc):
+    """Nothing is inside but what clamp() returns."""
+
+    def clamp(self, x: Vector) -> Vector:
+        return [0.5, 0.5 + 0.0 * x[1]]
+
+
+NARROW = Narrow(1e-30, (0.5, 0.5))
+
+
 def rng(seed: int = 0) -> Generator:
     return Generator(PCG64(seed))
 
@@ -45,6 +55,12 @@ def test_points_are_inside_and_as_many_as_the_budget(
         points = evaluated(made, region, budget)
         assert len(points) == budget
         assert all(region.clamp(x) == x for x in points)
+
+
+def test_a_region_without_interior_is_a_point() -> None:
+    for kind in (RandomSearch, Grid):
+        found = search(kind(NARROW, 9, rng(), 3), NARROW, 9, each(sum))
+        assert found.best_x == [0.5, 0.5]
 
 
 def test_random_points_are_uniform_in_the_disc() -> None:

@@ -125,6 +125,20 @@ def test_a_failed_value_is_passed_on_as_inf_counted_and_never_the_best() -> None
     assert runs.best_value < math.inf
 
 
+@pytest.mark.parametrize("kind", [faulty.Sound, faulty.Runs, BatSwarm])
+def test_a_failing_objective_is_not_called_more_often(kind: Any) -> None:
+    calls = []
+
+    def counted(x: Vector) -> Any:
+        calls.append(x)
+        return partly(x)
+
+    made = kind(DISC, 30, rng(), 5) if kind is not BatSwarm else BatSwarm(BatParams(), DISC, rng())
+    found = search(made, DISC, 30, each(counted))
+    assert found.failures
+    assert len(calls) == found.evaluations == 30
+
+
 def test_without_any_value_the_first_point_is_the_best() -> None:
     asked = AskedInTurn(faulty.Sound(DISC, 10, rng(), 5))
     found = search(asked, DISC, 10, lambda points: [None] * len(points))
