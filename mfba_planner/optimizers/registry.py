@@ -99,7 +99,7 @@ def make(
     except MfbaError:
         raise
     except Exception as error:
-        raise OptimizerError(raised("the factory", error).replace("()", "", 1)) from error
+        raise OptimizerError(raised("the factory", error)) from error
 
 
 @cache

@@ -119,7 +119,7 @@ def search(
         values = found.take(points[:left], evaluate(points[:left]))
         if len(points) > left:
             break
-        _call("tell", optimizer.tell, values)
+        _call("tell()", optimizer.tell, values)
     return found
 
 
@@ -152,7 +152,7 @@ def _run(optimizer: RunOptimizer, region: Region, budget: int, evaluate: Evaluat
             raise BudgetUsed from None
 
     with suppress(BudgetUsed):
-        _call("run", optimizer.run, objective)
+        _call("run()", optimizer.run, objective)
     if errors:
         raise errors[0]
     if not found.evaluations:
@@ -161,7 +161,7 @@ def _run(optimizer: RunOptimizer, region: Region, budget: int, evaluate: Evaluat
 
 
 def _asked(optimizer: Optimizer, region: Region) -> list[Vector]:
-    points = _inside(_call("ask", optimizer.ask), region)
+    points = _inside(_call("ask()", optimizer.ask), region)
     if not points:
         raise OptimizerError("ask() returned no points")
     return points
@@ -179,7 +179,7 @@ def _call(name: str, method: Callable[..., Any], *arguments: Any) -> Any:
 
 def raised(name: str, error: Exception) -> str:
     """One line on an exception of a method."""
-    return f"{name}() raised {type(error).__name__} ({' '.join(str(error).split())[:200]})"
+    return f"{name} raised {type(error).__name__} ({' '.join(str(error).split())[:200]})"
 
 
 def _inside(points: Any, region: Region) -> list[Vector]:

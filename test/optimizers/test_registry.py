@@ -2,6 +2,7 @@
 """Optimisers by name: built in, of libraries, of installed packages and MODULE:NAME."""
 
 import math
+import sys
 from pathlib import Path
 
 import faulty_optimizers
@@ -39,6 +40,9 @@ def test_a_bat_factory_takes_budget_and_population() -> None:
     made = find_optimizer("bats", BAT)(DISC, 40, stream(0, 1), 10)
     assert isinstance(made, BatSwarm)
     assert (made.params.population, made.params.iterations, made.horizon) == (10, 3, 3)
+    small = find_optimizer("ba", BAT)(DISC, 10, stream(0, 1), 10)
+    assert isinstance(small, BatSwarm)
+    assert small.params.iterations == 1, "as few as there are"
 
 
 @pytest.mark.parametrize(
@@ -84,10 +88,11 @@ def test_a_module_of_the_working_directory_is_found(
     (tmp_path / "of_mine.py").write_text("from faulty_optimizers import Sound as Mine\n")
     (tmp_path / "broken.py").write_text("def (\n")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "path", list(sys.path))
     assert find_optimizer("of_mine:Mine", BAT) is faulty_optimizers.Sound
     with pytest.raises(ConfigError, match=r"broken:X: cannot be imported \(invalid syntax"):
         require_optimizer("broken:X")
+    assert sys.path.count(str(tmp_path)) == 1
 
 
 def test_an_installed_package_adds_its_own(

@@ -189,6 +189,16 @@ def test_points_on_the_edge_are_inside_whatever_clamp_rounds() -> None:
     assert math.dist(found.best_x, DISC.center) == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize("beyond", [(1e-6, 0.0, 0.0), (0.0, 0.0, -1e-6), (0.0, math.nan, 0.0)])
+def test_a_point_beyond_one_edge_is_outside(beyond: tuple[float, ...]) -> None:
+    class Beyond(faulty.Sound):
+        def point(self) -> Any:
+            return [a + b for a, b in zip((1.0, 1.0, 2.0), beyond)]
+
+    with pytest.raises(OutsideError, match="is outside the region"):
+        search(Beyond(BOX, 30, rng(), 5), BOX, 30, each(sphere))
+
+
 def test_an_iteration_more_or_less_is_another_search() -> None:
     """The budget reaches the bats: the digest of case studies does not hide it."""
     bat = BatParams()
