@@ -70,8 +70,11 @@ setup(
         "orca": ["pyrvo>=0.4"],
         "parquet": ["pyarrow>=15"],
         "test": [
+            "cmaes>=0.11",
             "distributed>=2024.1",
             "hypothesis>=6.100",
+            "mealpy>=3.0.2,<4",
+            "niapy>=2.7,<3",
             "pyarrow>=15",
             "pybag-sdk>=0.13",
             "pyrvo>=0.4",
@@ -84,7 +87,8 @@ setup(
             "small-mcap>=0.10",
         ],
         "view": ["rerun-sdk>=0.29"],
-        "peers": [
+        "optimizers": [
+            "cmaes>=0.11",
             "mealpy>=3.0.2,<4",
             "niapy>=2.7,<3",
         ],

@@ -44,6 +44,9 @@ TESTS = {
     "swarm/search_region": ["swarm/test_bat_swarm", "planning/test_algorithm_1"],
     "swarm/objective_failures": ["swarm/test_bat_swarm"],
     "swarm/batched_swarms": ["swarm/test_batched_swarms"],
+    "swarm/optimizer": ["swarm/test_optimizer"],
+    "optimizers/baselines": ["optimizers/test_baselines"],
+    "optimizers/registry": ["optimizers/test_registry"],
     "perception/sensory_vector": [
         "perception/test_sensory_vector", "core/test_option_specs",
         "planning/test_algorithm_1", "simulation/test_episode",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Our swarm beside niapy's and mealpy's bat algorithms and random search, on F1-F6 of Table 2.
 
-    pip install -e .[peers]
+    pip install -e .[optimizers]
     python bench/peers.py                 # some ten minutes, nearly all of them the peers'
     python bench/peers.py --peer-runs 10  # fewer runs
 

@@ -38,6 +38,7 @@ OUTSIDE: dict[str, set[str]] = {
     "": set(),
     "core": {"numpy"},
     "swarm": {"numpy"},
+    "optimizers": {"cmaes", "mealpy", "niapy", "numpy", "scipy"},
     "perception": {"numpy", "scipy"},
     "planning": {"eikonalfm", "numpy", "pyrvo", "scipy"},
     "simulation": {"numpy"},
@@ -52,7 +53,7 @@ OUTSIDE: dict[str, set[str]] = {
     "cli": {"pyarrow", "rich", "yaml"},
 }
 # What decides is handed the time and its random generators, and lets others do the talking.
-DECIDING = ("core", "swarm", "perception", "planning", "simulation")
+DECIDING = ("core", "swarm", "optimizers", "perception", "planning", "simulation")
 NEVER = {"asyncio", "datetime", "logging", "multiprocessing", "random", "threading", "time"}
 TOP = {"__init__.py", "entry_points.py", "py.typed"}
 

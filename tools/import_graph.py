@@ -25,6 +25,7 @@ PICTURE = ROOT / "docs" / "images" / "rooms.svg"
 ROOMS: Mapping[str, tuple[str, str]] = {
     "core": ("errors, geometry, options,", "types, random streams"),
     "swarm": ("BA and MFBA", "(eq. 3-10)"),
+    "optimizers": ("others by name:", "adapters of libraries"),
     "perception": ("sensory vector (eq. 11),", "tracker, memory"),
     "planning": ("Algorithm 1 (eq. 12, 13),", "predictive planner, peers"),
     "simulation": ("obstacles, robot, sensors,", "contact, Episode"),

@@ -32,6 +32,7 @@ COMMANDS = {
     "import": "make scenario files of Gazebo worlds, recordings and other formats",
     "sweep": "run planners in many worlds, generated or your own: success, gap to the optimum",
     "show": "explain one run of a sweep: pictures, text, bag",
+    "check-optimizer": "check that an optimiser keeps budget, region and seed",
     "tables": "reproduce the paper's tables: our value, printed value, verdict",
 }
 
@@ -47,7 +48,7 @@ def main(args: list[str]) -> int:
         return 0
     if first not in COMMANDS:
         raise ConfigError(f"{first}: unknown command; {did_you_mean(first, list(COMMANDS))}")
-    module = f"{first}_" if iskeyword(first) else first
+    module = f"{first}_" if iskeyword(first) else first.replace("-", "_")
     code: int = import_module(f"{__name__}.{module}").main(args[1:])
     return code
 

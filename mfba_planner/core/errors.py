@@ -30,5 +30,13 @@ class OutputError(MfbaError):
     """A path that cannot be written to, or must not be overwritten."""
 
 
+class OptimizerError(MfbaError):
+    """An optimiser that raises, asks for no points or for points outside its region."""
+
+
+class OutsideError(OptimizerError):
+    """A point of an optimiser that is not in its region."""
+
+
 class GraphError(MfbaError):
     """The running ROS graph failed: a node ended, or a response did not arrive in time."""

@@ -10,6 +10,7 @@ from ..core.errors import ConfigError
 from ..core.geometry import Point, bearing, distance, towards
 from ..core.planner_types import NANO, Bits, Decision, Mode, Observation
 from ..core.random_streams import stream
+from ..optimizers.registry import BATS, require_optimizer
 from ..perception.sensory_vector import sensory_vector
 from ..swarm.bat_swarm import BatSwarm, Disc, Vector
 from .gap_vector import gap_heading, gap_vector, nearest_free_gap
@@ -93,9 +94,10 @@ class Algorithm1:
     """
 
     def __init__(self, params: PlannerParams, seed: int) -> None:
-        """Start idle; ConfigError for a negative seed."""
+        """Start idle; ConfigError for a negative seed or an unknown optimiser."""
         if seed < 0:
             raise ConfigError(f"seed={seed}: negative; give a whole number from 0 up")
+        require_optimizer(params.optimizer)
         self.params = params
         self.seed = seed
         self.mode = Mode.IDLE
@@ -130,11 +132,16 @@ class Algorithm1:
         precomputed, self._generated_step = self._generated_step, None
         if precomputed is not None and precomputed[0] == (step_input, params):
             return precomputed[1]
-        return generate_step(step_input, params.step_length_m, params.bat)
+        return generate_step(step_input, params.step_length_m, params.bat, params.optimizer)
 
     def step_input(self, obs: Observation) -> StepInput | None:
-        """The input plan() will pass to generate_step(), None if it will not call it."""
-        if self.params.swarm is not Swarm.FRESH or obs.goal is None or obs.refused:
+        """The input plan() will pass to generate_step(), None if it will not call it.
+
+        None too for another optimiser than the bats, of which there is no batched form.
+        """
+        if self.params.swarm is not Swarm.FRESH or self.params.optimizer != BATS:
+            return None
+        if obs.goal is None or obs.refused:
             return None
         if any(sensory_vector(obs.ranges_m)):
             return None

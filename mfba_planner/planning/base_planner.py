@@ -36,6 +36,11 @@ class Move:
     candidates: tuple[Point, ...] = ()
 
 
+def blocked(reason: str, vs: Bits = ()) -> Move:
+    """Stand still; the mode becomes BLOCKED."""
+    return Move(velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=vs, vg=vs)
+
+
 class BasePlanner:
     """A planner that calls move() unless a stop condition of the paper's planner holds.
 

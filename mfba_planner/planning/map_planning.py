@@ -12,17 +12,18 @@ import numpy as np
 from ..core.geometry import Point, Pose2D, distance, rotated, towards
 from ..core.planner_types import Circle, Observation
 from ..core.random_streams import stream
+from ..optimizers.registry import NONE, optimize
 from ..perception.known_map import KnownMap, UnclearedMap
 from ..perception.obstacle_tracker import Tracker
 from ..perception.static_map import StaticMap, StaticMapParams
-from ..swarm.bat_swarm import BatSwarm
+from ..swarm.optimizer import Evaluate, Found
 from ..swarm.search_region import Disc
-from .base_planner import Move
+from .base_planner import Move, blocked
 from .blocked_headings import BlockedHeadings, PlaceCheck
 from .differential_drive import Speeds
 from .distance_to_go import RouteParams, is_clear
 from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
-from .map_search import Found, MapSearch
+from .map_search import FoundWaypoint, MapSearch
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
 from .planner_params import PlannerParams
@@ -103,10 +104,7 @@ class MapPlanning:
         to_go.update(obs.pose_ns, known, position, self._in_map(goal)[0])
         if to_go.closed_by:
             self._place.reset()
-            return Move(
-                velocity=(0.0, 0.0), reason=f"no way to the goal: closed by {to_go.closed_by}",
-                event=Event.NO_GAP,
-            )  # fmt: skip
+            return blocked(f"no way to the goal: closed by {to_go.closed_by}")
         if to_go.is_straight:
             away_m = distance(position, to_go.goal)
             share = min(1.0, NEAR_M / max(away_m, NEAR_M))
@@ -145,7 +143,7 @@ class MapPlanning:
         drivable = np.logical_and.reduce(masks) if masks else None
         found = self.search.search(
             rollout, position, self._risk, speed, tick_s, delay, drivable, last,
-            lambda center: self._swarm(center, obs.stamp_ns) if bats else None,
+            lambda center, costs: self._refine(center, costs, obs.stamp_ns) if bats else None,
         )  # fmt: skip
         came_rad = self._place.stays(obs.pose_ns, position)
         if came_rad is not None:
@@ -162,11 +160,13 @@ class MapPlanning:
         ux, uy = self.search.to_go.direction(np.array([x]), np.array([y]))
         return math.atan2(float(uy[0]), float(ux[0])) - turn
 
-    def _swarm(self, center: Point, stamp_ns: int) -> BatSwarm:
-        bat = self._params.bat
-        return BatSwarm(
-            bat, Disc(self._search_m, center), stream(self._seed, stamp_ns), ahead=bat.iterations
-        )
+    def _refine(self, center: Point, evaluate: Evaluate, stamp_ns: int) -> Found | None:
+        """A search around a waypoint; None without an optimiser."""
+        params = self._params
+        if params.optimizer == NONE:
+            return None
+        disc, generator = Disc(self._search_m, center), stream(self._seed, stamp_ns)
+        return optimize(params.optimizer, params.bat, disc, generator, evaluate)
 
     def _in_map(self, point: Point) -> tuple[Point, float]:
         """A position in the map's frame, and the turn from odom to that frame (rad)."""
@@ -254,7 +254,7 @@ class MapPlanning:
     def _as_move(
         self,
         obs: Observation,
-        found: Found,
+        found: FoundWaypoint,
         position: Point,
         turn: float,
         speeds: Speeds,
@@ -264,10 +264,7 @@ class MapPlanning:
     ) -> Move:
         params = self._params
         if found.cost >= FORBIDDEN_M:
-            return Move(
-                velocity=(0.0, 0.0), reason=ENCLOSED, event=Event.NO_GAP, vs=found.closed,
-                vg=found.closed,
-            )  # fmt: skip
+            return blocked(ENCLOSED, found.closed)
         (qx, qy), to_go = found.waypoint, self.search.to_go
         length = math.sqrt(qx * qx + qy * qy)
         scale = 1.0 / max(found.t1, length / params.speed_mps)

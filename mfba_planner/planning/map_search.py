@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Waypoint among what stands: eq. 1 with the distance to go, searched by headings and bats."""
+"""Waypoint among what stands: eq. 1 with the distance to go, by headings, then by a swarm."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from ..core.planner_types import Bits
 from ..perception.distance_field import DistanceField
 from ..perception.known_map import UnclearedMap
 from ..perception.static_map import StaticMap
-from ..swarm.bat_swarm import BatSwarm
+from ..swarm.optimizer import Evaluate, Found
+from ..swarm.search_region import Vector
 from .distance_to_go import DistanceToGo, RouteParams
 from .map_rollout import FORBIDDEN_M, MapRollout
 from .trajectory_cost import RiskParams
@@ -34,7 +35,7 @@ _STEP_M = 0.1
 SIDE_ROOM_M = (0.12, 0.07, 0.025)  # room beside a line of sight
 
 
-class Found(NamedTuple):
+class FoundWaypoint(NamedTuple):
     """The chosen waypoint, relative to the robot in the map's frame, and how it was found."""
 
     waypoint: Point
@@ -85,12 +86,12 @@ class MapSearch:
         turn_delay: TurnDelay | None,
         observed: Array | None,
         last: Point | None,
-        swarm_at: Callable[[Point], BatSwarm | None],
-    ) -> Found:
+        refine: Callable[[Point, Evaluate], Found | None],
+    ) -> FoundWaypoint:
         """The cheapest waypoint.
 
         observed (n,): headings that may be driven; None: all. last: the last waypoint.
-        swarm_at: a swarm around a waypoint; None: no search by bats.
+        refine: a search around a waypoint; it returns None if there is none.
         """
         evaluate = _Evaluation(rollout, position, risk, speed_mps, self.to_go, turn_delay)
         (px, py), to_go = position, self.to_go
@@ -107,7 +108,7 @@ class MapSearch:
             k = int(cost.argmin())
             best, best_cost = (ahead[k], float(at[k])), float(cost[k])
             if harm[k] <= 0.0:
-                return Found(*best, best_cost, here, (), (), True)
+                return FoundWaypoint(*best, best_cost, here, (), (), True)
         qx, qy, t = self._candidates(best[0], speed_mps, tick_s, last, waits=not rollout.alone)
         if observed is not None:
             kept = observed[self._headings(qx, qy)]
@@ -128,36 +129,24 @@ class MapSearch:
                 i = int(batch[k])
                 best = ((float(qx[i]), float(qy[i])), float(t[i]))
         closed = self._closed(evaluate, speed_mps, observed)
-        swarm = swarm_at(best[0])
-        asked: tuple[Point, ...] = ()
-        if swarm is not None:
-            best, best_cost = self._refine(swarm, evaluate, observed, best, best_cost, tick_s)
-            asked = tuple((x, y) for x, y in swarm.candidates)
-        return Found(*best, best_cost, here, closed, asked, False)
 
-    def _refine(
-        self,
-        swarm: BatSwarm,
-        evaluate: _Evaluation,
-        observed: Array | None,
-        best: tuple[Point, float],
-        best_cost: float,
-        tick_s: float,
-    ) -> tuple[tuple[Point, float], float]:
-        """Waypoint, t1 and cost after a search by bats."""
-        for _ in range(swarm.horizon + 1):
-            asked = np.array(swarm.ask())
-            x, y = asked[:, 0], asked[:, 1]
-            t = np.maximum(np.sqrt(x * x + y * y) / evaluate.speed_mps, tick_s)
+        def costs(points: list[Vector]) -> list[float]:
+            x, y = np.array(points).T
+            t = np.maximum(np.sqrt(x * x + y * y) / speed_mps, tick_s)
             cost, _ = evaluate(x, y, t)
             if observed is not None:
                 cost[~observed[self._headings(x, y)]] = math.inf
-            swarm.tell(cost.tolist())
-        if swarm.best_value >= best_cost:
-            return best, best_cost
-        qx, qy = swarm.best_x
-        t1 = max(math.hypot(qx, qy) / evaluate.speed_mps, tick_s)
-        return ((qx, qy), t1), swarm.best_value
+            values: list[float] = cost.tolist()
+            return values
+
+        refined = refine(best[0], costs)
+        asked: tuple[Point, ...] = ()
+        if refined is not None:
+            asked = tuple((x, y) for x, y in refined.candidates)
+            if refined.best_value < best_cost:
+                (x, y), best_cost = refined.best_x, refined.best_value
+                best = ((x, y), max(math.hypot(x, y) / speed_mps, tick_s))
+        return FoundWaypoint(*best, best_cost, here, closed, asked, False)
 
     def _headings(self, x: Array, y: Array) -> Array:
         """Index (k,) of the heading nearest to each direction."""

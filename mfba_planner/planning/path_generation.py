@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Path generation: a fresh swarm in the disc of one goal step, for one robot or many."""
+"""Path generation: a fresh search in the disc of one goal step, for one robot or many."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.geometry import Point, distance
+from ..core.geometry import Point, bearing, distance, towards
 from ..core.random_streams import stream
-from ..swarm.bat_swarm import BatParams, Bounds, Disc, Vector, minimize
+from ..optimizers.registry import BATS, NONE, optimize
+from ..swarm.bat_swarm import BatParams, Bounds, Disc, Vector
 from ..swarm.batched_swarms import Array, Swarms
+from ..swarm.optimizer import each
 
 GoalStep = tuple[Point, tuple[Point, ...]]  # the next point, and the last candidates
 
@@ -26,14 +28,19 @@ class StepInput(NamedTuple):
     stamp_ns: int
 
 
-def generate_step(step_input: StepInput, step_length_m: float, bat: BatParams) -> GoalStep:
-    """Next point by a fresh swarm in the disc of one goal step; the last step ends at the goal.
+def generate_step(
+    step_input: StepInput, step_length_m: float, bat: BatParams, optimizer: str = BATS
+) -> GoalStep:
+    """Next point by a fresh search in the disc of one goal step; the last step ends at the goal.
 
-    Objective: distance of the candidate to GP (eq. 1; eq. 2 is its reciprocal).
+    Objective: distance of the candidate to GP (eq. 1; eq. 2 is its reciprocal). Without an
+    optimiser (none) the step goes straight to the goal.
     """
     position, goal = step_input.position, step_input.goal
     if distance(position, goal) <= step_length_m:
         return goal, ()
+    if optimizer == NONE:
+        return towards(position, bearing(position, goal), step_length_m), ()
     px, py = position
     gx, gy = goal[0] - px, goal[1] - py
 
@@ -42,12 +49,13 @@ def generate_step(step_input: StepInput, step_length_m: float, bat: BatParams) -
         return math.sqrt(dx * dx + dy * dy)
 
     reach = Disc(step_length_m)
-    swarm = minimize(cost, reach, bat, stream(step_input.seed, step_input.stamp_ns))
-    best = swarm.best_x
+    generator = stream(step_input.seed, step_input.stamp_ns)
+    found = optimize(optimizer, bat, reach, generator, each(cost))
+    best = found.best_x
     if bat.bounds is Bounds.NONE:
         best = reach.clamp(best)  # the bats may leave the disc, the robot must not
     bx, by = best
-    return (px + bx, py + by), tuple([(px + x, py + y) for x, y in swarm.candidates])
+    return (px + bx, py + by), tuple([(px + x, py + y) for x, y in found.candidates])
 
 
 def generate_steps(

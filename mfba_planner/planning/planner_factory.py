@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..optimizers.registry import require_optimizer
 from ..perception.sensory_vector import SensorParams
 from .planner_params import Method, PlannerParams
 from .supervised_planner import SupervisedPlanner, supervised_algorithm_1
@@ -25,6 +26,11 @@ def params_for_method(
     from .predictive_planner import preset
 
     return preset(replace(params, method=Method.PREDICTIVE))
+
+
+def check_usable(params: PlannerParams) -> None:
+    """Raise ConfigError for an optimiser that is unknown or not installed."""
+    require_optimizer(params.optimizer)
 
 
 def make_planner(

@@ -10,6 +10,7 @@ from ..core.errors import ConfigError
 from ..core.option_specs import check, option
 from ..core.planner_types import NANO, ROBOT_RADIUS_M
 from ..core.robot_base import Base
+from ..optimizers.registry import BATS
 from ..swarm.bat_swarm import BatParams
 from .gap_vector import GapHeading
 from .progress_checker import ProgressParams
@@ -89,22 +90,37 @@ class PlannerParams(Base):
     swarm: Swarm = option(
         Swarm.FRESH, "fresh swarm per goal step, or one persistent swarm (Fig. 1)"
     )
+    optimizer: str = option(
+        BATS,
+        "what searches for waypoints: bats (as bat.* says), random, grid, none (no search), a "
+        "library's such as niapy:ParticleSwarmAlgorithm, or MODULE:NAME; with as many evaluations",
+    )
     bat: BatParams = field(default_factory=BatParams)
     speed_limit: SpeedLimitParams = field(default_factory=SpeedLimitParams)
     recovery: RecoveryParams = field(default_factory=RecoveryParams)
     progress: ProgressParams = field(default_factory=ProgressParams)
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a value out of range, or a perception the method does not use."""
+        """Raise ConfigError for a value out of range, or options that contradict each other."""
         check(self)
         if self.perception is PerceptionInput.SCAN and self.method is Method.PAPER:
             raise ConfigError(
                 "perception=scan: method=paper reads sectors only; give auto, or method=predictive"
             )
+        if self.swarm is Swarm.PERSISTENT and self.optimizer != BATS:
+            raise ConfigError(
+                f"swarm=persistent: optimizer={self.optimizer} starts anew at each goal step; "
+                f"give swarm=fresh, or optimizer={BATS}"
+            )
 
     @property
     def label(self) -> str:
-        """Name of the planner for output: ba or mfba for Algorithm 1, else the method."""
+        """Name of the planner for output: ba or mfba for Algorithm 1, else the method.
+
+        With another optimiser than the bats: the method and the optimiser.
+        """
+        if self.optimizer != BATS:
+            return f"{self.method.value} with {self.optimizer}"
         paper = self.method is Method.PAPER
         return self.bat.algorithm.value if paper else self.method.value
 

@@ -12,15 +12,16 @@ import numpy as np
 from ..core.geometry import Point, Pose2D, bearing, distance
 from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
+from ..optimizers.registry import NONE, optimize, require_optimizer
 from ..perception.known_map import KnownMap
 from ..perception.obstacle_memory import ObstacleMemory
 from ..perception.obstacle_tracker import Tracker
 from ..perception.scan_coverage import ScanCoverage
 from ..perception.sensory_vector import SensorParams, sense_circles
 from ..perception.static_map import StaticMap
-from ..swarm.bat_swarm import BatSwarm
-from ..swarm.search_region import Disc
-from .base_planner import BasePlanner, Move
+from ..swarm.optimizer import Found
+from ..swarm.search_region import Disc, Vector
+from .base_planner import BasePlanner, Move, blocked
 from .differential_drive import Speeds, apply_command, command
 from .drive_rollout import DriveRollout
 from .map_planning import ENCLOSED, MapPlanning
@@ -88,7 +89,8 @@ class Predictive(BasePlanner):
         seed: int,
         options: PredictiveParams | None = None,
     ) -> None:
-        """Start idle; ConfigError for a negative seed."""
+        """Start idle; ConfigError for a negative seed or an unknown optimiser."""
+        require_optimizer(params.optimizer)
         self.options = options or PredictiveParams()
         n = self.options.headings
         angles = 2.0 * math.pi / n * np.arange(1, n + 1)
@@ -136,7 +138,7 @@ class Predictive(BasePlanner):
             return Move(velocity=straight, reason="no obstacle in range")
         at_rest = ObstaclesAtRest(position, circles)
         if misplaced := at_rest.misplaced():
-            return _blocked(misplaced)
+            return blocked(misplaced)
         chosen = self._choose(obs, goal, last_waypoint, at_rest)
         move = self._kept_off(chosen, at_rest, obs.pose, distance(position, goal))
         if not all(move.vs or (0,)):
@@ -168,9 +170,9 @@ class Predictive(BasePlanner):
         vs = self._closed_headings(costs)
         enclosure = "" if 0 in vs else self._enclosure(position, at_rest)
         if enclosure and self._changes.at_rest(obs):
-            return _blocked(enclosure, vs)
+            return blocked(enclosure, vs)
         if self._unobserved is not None and not self._is_towards(to_goal):
-            return _blocked(UNOBSERVED, vs)
+            return blocked(UNOBSERVED, vs)
         gaps = self._nearest_free(vs, to_goal)
         if drive is not None:  # where the bits, which know the turn but not the arc, are wrong
             gaps = sorted({*gaps, *range(0, len(vs), len(vs) // HEADINGS_IF_CLOSED)})
@@ -185,11 +187,11 @@ class Predictive(BasePlanner):
         found = costs.cheapest(candidates, to_goal, speed, least)
         if found is not None:
             waypoint, t1, least = found
-        swarm = self._refine(costs, waypoint, to_goal, least, obs.stamp_ns)
-        if not min(swarm.best_value, least) < math.inf:
-            return _blocked(UNOBSERVED, vs)
-        if swarm.best_value < least:
-            (qx, qy), least = swarm.best_x, swarm.best_value
+        refined = self._refine(costs, waypoint, to_goal, least, obs.stamp_ns)
+        if not min(refined.best_value, least) < math.inf:
+            return blocked(UNOBSERVED, vs)
+        if refined.best_value < least:
+            (qx, qy), least = refined.best_x, refined.best_value
             waypoint = (qx, qy)
             t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
         if distance((0.0, 0.0), waypoint) > 0.999 * t1 * speed:
@@ -210,7 +212,7 @@ class Predictive(BasePlanner):
             vg=vs,  # here a heading is both sector and gap
             gap=gap,
             waypoint=(x + waypoint[0], y + waypoint[1]),
-            candidates=tuple((x + dx, y + dy) for dx, dy in swarm.candidates),
+            candidates=tuple((x + dx, y + dy) for dx, dy in refined.candidates),
         )
 
     def _closed_headings(self, costs: TrajectoryCost) -> Bits:
@@ -373,25 +375,24 @@ class Predictive(BasePlanner):
 
     def _refine(
         self, costs: TrajectoryCost, center: Point, to_goal: Point, bound: float, stamp_ns: int
-    ) -> BatSwarm:
-        """Search around the best waypoint by bats; costs not below the bound are cut short."""
-        bat, speed, tick_s = self.params.bat, self.params.speed_mps, self.tick_s
-        disc = Disc(self.options.search_m, center)
-        swarm = BatSwarm(bat, disc, stream(self.seed, stamp_ns), ahead=bat.iterations)
-        for _ in range(bat.iterations + 1):
+    ) -> Found:
+        """Search around the best waypoint; costs not below the bound are cut short."""
+        params, speed, tick_s = self.params, self.params.speed_mps, self.tick_s
+        if params.optimizer == NONE:
+            return Found()
+
+        def evaluate(points: list[Vector]) -> list[float]:
+            nonlocal bound
             values = []
-            for qx, qy in swarm.ask():
+            for qx, qy in points:
                 # At least one tick: the velocity is held that long and must not overshoot.
                 t1 = max(math.sqrt(qx * qx + qy * qy) / speed, tick_s)
                 if self._is_observed((qx, qy)):
                     values.append(costs.cost((qx, qy), t1, to_goal, speed, bound))
                 else:
                     values.append(math.inf)
-            swarm.tell(values)
-            bound = min(bound, swarm.best_value)
-        return swarm
+            bound = min(bound, *values)
+            return values
 
-
-def _blocked(reason: str, vs: Bits = ()) -> Move:
-    """Stand still; the mode becomes BLOCKED."""
-    return Move(velocity=(0.0, 0.0), reason=reason, event=Event.NO_GAP, vs=vs, vg=vs)
+        disc, generator = Disc(self.options.search_m, center), stream(self.seed, stamp_ns)
+        return optimize(params.optimizer, params.bat, disc, generator, evaluate)

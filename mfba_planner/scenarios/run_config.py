@@ -17,6 +17,7 @@ from ..core.errors import ConfigError
 from ..core.geometry import Pose2D
 from ..core.option_specs import Scalar, check, flatten, option
 from ..core.planner_types import NANO
+from ..optimizers.registry import require_optimizer
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PerceptionInput, PlannerParams
 from ..planning.stopping_distance import too_fast_for_lidar, too_fast_for_sectors
@@ -59,9 +60,11 @@ class RunConfig:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range, or options that contradict each other.
 
-        An input timeout shorter than a tick; a robot that cannot stop within what it sees.
+        An input timeout shorter than a tick; a robot that cannot stop within what it sees. Also
+        for an optimiser that is unknown or not installed.
         """
         check(self)
+        require_optimizer(self.planner.optimizer)
         fault = _too_fast(self.scenario, self.planner, self.sensor)
         if fault:
             raise ConfigError(fault)

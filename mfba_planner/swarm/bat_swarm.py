@@ -23,7 +23,7 @@ from .bat_params import (
     Velocity,
     Walk,
 )
-from .objective_failures import Failures
+from .objective_failures import Failures, each
 from .search_region import Box, Disc, Region, Vector
 from .swarm_iteration import BatMotion, Pair
 
@@ -281,14 +281,6 @@ class BatSwarm:
         return [self.region.clamp(x) for x in points]
 
 
-def _value(objective: Callable[[Vector], float], x: Vector) -> Any:
-    """The value at x, or the exception raised there."""
-    try:
-        return objective(x)
-    except Exception as error:
-        return error
-
-
 def minimize(
     objective: Callable[[Vector], float], region: Region, params: BatParams, rng: Generator
 ) -> BatSwarm:
@@ -298,17 +290,9 @@ def minimize(
     every call raised or returned no number.
     """
     swarm = BatSwarm(params, region, rng, ahead=params.iterations)
-    ask, tell = swarm.ask, swarm.tell
+    ask, tell, evaluate = swarm.ask, swarm.tell, each(objective)
     for _ in range(params.iterations + 1):
-        values: list[Any] = []
-        points = ask()
-        try:
-            for x in points:
-                values.append(objective(x))  # keeps the values before an exception
-        except Exception as error:
-            values.append(error)  # named and counted by tell
-            values += [_value(objective, x) for x in points[len(values) :]]
-        tell(values)
+        tell(evaluate(ask()))
     if swarm.failures.broken == params.population * (params.iterations + 1):
         raise InputError(
             f"objective failed at all {swarm.failures.broken} points ({swarm.failures}); "

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Objective values that are not finite numbers: classified and counted."""
+"""Objective values that are not finite numbers, and calls that raise: classified and counted."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+from .search_region import Vector
+
+Evaluate = Callable[[list[Vector]], Sequence[Any]]
 
 
 @dataclass(slots=True)
@@ -39,6 +44,28 @@ class Failures:
             return "no failures"
         counts = ", ".join(f"{count} x {name}" for name, count in self.counts.items())
         return " ".join(f"{counts}; first: {self.first}".split())
+
+
+def each(objective: Callable[[Vector], float]) -> Evaluate:
+    """An objective of one point as one of many; for a call that raises the value is its error."""
+
+    def value(x: Vector) -> Any:
+        try:
+            return objective(x)
+        except Exception as error:
+            return error
+
+    def evaluate(points: list[Vector]) -> list[Any]:
+        values: list[Any] = []
+        try:
+            for x in points:
+                values.append(objective(x))  # keeps the values before an exception
+        except Exception as error:
+            values.append(error)
+            values += [value(x) for x in points[len(values) :]]
+        return values
+
+    return evaluate
 
 
 def _classify(value: Any) -> tuple[str, float]:

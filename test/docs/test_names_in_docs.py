@@ -20,7 +20,7 @@ TEXTS = {
 DOTTED = re.compile(r"\bmfba_planner(?:\.\w+)+")
 # A Python file or a folder in backticks: `planning/recovery.py`, `data.py`, `swarm/`.
 IN_BACKTICKS = re.compile(r"`(?:[^`\s]* )?([\w./-]+\.py|[\w-]+(?:/[\w-]+)*/)`")
-OF_THE_READER = {"skirt.py"}  # a file that the reader writes
+OF_THE_READER = {"skirt.py", "my_swarm.py"}  # files that the reader writes
 # A class, a constant or a protocol in backticks: `BasePlanner`, `ROUNDS`.
 SYMBOL = re.compile(r"`([A-Z]\w{2,})`")
 FOLDERS = ("mfba_planner", "bench", "docs", "launch", "test", "tools", "config", "layout")

@@ -27,6 +27,15 @@ REDUCED = {
     "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 100": (
         "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 4 --workers 1"
     ),
+    "mfba sweep random-10 --planner paper --planner predictive --worlds 100 "
+    "--set planner.optimizer=my_swarm:ParticleSwarm --out runs/mine": (
+        "mfba sweep random-10 --planner paper --planner predictive --worlds 2 --workers 1 "
+        "--set planner.optimizer=my_swarm:ParticleSwarm --out runs/mine"
+    ),
+    "mfba sweep random-10 --planner paper --planner predictive --worlds 100 --out runs/bats": (
+        "mfba sweep random-10 --planner paper --planner predictive --worlds 2 --workers 1 "
+        "--out runs/bats"
+    ),
     "python bench/robots.py": "python bench/robots.py --worlds 1 --only sectors",
     "python bench/kidnapped.py --graph 5": "python bench/kidnapped.py --graph 1 --count 1",
     "python bench/tracking.py --seeds 30": (

@@ -111,6 +111,29 @@ def test_the_predictive_planner(scenario: str, tmp_path: Path, domain_id: int) -
     assert report.is_identical, report.faults
 
 
+@pytest.mark.parametrize(
+    "optimizer",
+    [
+        "random",
+        "grid",
+        "none",
+        "scipy:differential_evolution",
+        "cmaes:CMA",
+        "niapy:ParticleSwarmAlgorithm",
+        "mealpy:PSO.OriginalPSO",
+    ],
+)
+def test_other_optimizers(optimizer: str, tmp_path: Path, domain_id: int) -> None:
+    library, colon, _ = optimizer.partition(":")
+    if colon:
+        pytest.importorskip(library)
+    planner = PlannerParams(optimizer=optimizer)
+    recorded = run_and_compare(config("case1", planner, 1), tmp_path / "bag", domain_id)
+    assert evaluate(recorded).success
+    report = verify(tmp_path / "bag")
+    assert report.is_identical, report.faults
+
+
 def test_another_number_of_sectors(tmp_path: Path, domain_id: int) -> None:
     sensor = SensorParams(sectors=36, sensing_range_m=1.5)
     run_config = config("case2", PlannerParams(), 4, sensor)

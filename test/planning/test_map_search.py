@@ -13,12 +13,14 @@ from mfba_planner.core.geometry import Point
 from mfba_planner.core.planner_types import Circle
 from mfba_planner.core.random_streams import stream
 from mfba_planner.core.robot_base import Base, Drive
+from mfba_planner.optimizers.registry import optimize
 from mfba_planner.planning.differential_drive import Speeds
 from mfba_planner.planning.distance_to_go import RouteParams
 from mfba_planner.planning.map_rollout import FORBIDDEN_M, MapRollout
-from mfba_planner.planning.map_search import LENGTHS, MARGIN_M, Found, MapSearch
+from mfba_planner.planning.map_search import LENGTHS, MARGIN_M, FoundWaypoint, MapSearch
 from mfba_planner.planning.trajectory_cost import RiskParams
-from mfba_planner.swarm.bat_swarm import BatParams, BatSwarm
+from mfba_planner.swarm.bat_swarm import BatParams
+from mfba_planner.swarm.optimizer import Evaluate, Found
 from mfba_planner.swarm.search_region import Disc
 
 RADIUS_M, SPEED, TICK_S, HEADINGS, REACH_M = 0.3, 1.0, 0.1, 72, 2.5
@@ -42,13 +44,15 @@ class Setting:
         )  # fmt: skip
         self.centers: list[Point] = []
 
-    def swarm(self, center: Point) -> BatSwarm:
+    def refine(self, center: Point, evaluate: Evaluate) -> Found:
         self.centers.append(center)
-        return BatSwarm(BAT, Disc(0.3, center), stream(0, 1), ahead=BAT.iterations)
+        return optimize("bats", BAT, Disc(0.3, center), stream(0, 1), evaluate)
 
-    def found(self, observed: np.ndarray | None = None, last: Point | None = None) -> Found:
+    def found(
+        self, observed: np.ndarray | None = None, last: Point | None = None
+    ) -> FoundWaypoint:
         return self.search.search(
-            self.rollout, HERE, RISK, SPEED, TICK_S, None, observed, last, self.swarm
+            self.rollout, HERE, RISK, SPEED, TICK_S, None, observed, last, self.refine
         )
 
     def cost(self, waypoint: Point, t1: float) -> float:

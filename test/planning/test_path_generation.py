@@ -96,9 +96,11 @@ def single(monkeypatch: pytest.MonkeyPatch) -> list[StepInput]:
     """The inputs of the steps that were computed one by one."""
     made: list[StepInput] = []
 
-    def recorded(start: StepInput, step_length_m: float, bat: BatParams) -> GoalStep:
+    def recorded(
+        start: StepInput, step_length_m: float, bat: BatParams, optimizer: str
+    ) -> GoalStep:
         made.append(start)
-        return generate_step(start, step_length_m, bat)
+        return generate_step(start, step_length_m, bat, optimizer)
 
     monkeypatch.setattr(module, "generate_step", recorded)
     return made

@@ -395,9 +395,21 @@ def test_speed_and_algorithm_can_be_set_while_it_runs(graph: Graph) -> None:
     assert math.hypot(*harness.velocity) == pytest.approx(2.0 * slow, rel=0.1)
 
 
+def test_the_optimizer_can_be_set_while_it_runs(graph: Graph) -> None:
+    harness = PlannerHarness(graph, LOCKSTEP)
+    assert graph.set_parameter("planner", "optimizer", "none") == ""
+    decision = harness.decide(odom(1), sectors(1))
+    assert fields(decision)["algorithm"] == "paper with none"
+    vx, vy = harness.velocity
+    assert math.atan2(vy, vx) == pytest.approx(math.atan2(GOAL[1], GOAL[0])), (
+        "straight to the goal"
+    )
+
+
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
+        ("optimizer", "randon", "optimizer 'randon': unknown; did you mean 'random'?"),
         ("speed_mps", 0.0, "Parameter speed_mps out of range Min: 0.01, Max: 100.0, value: 0.0"),
         ("speed_mps", NAN, "out of range"),
         ("speed_mps", 1, "Wrong parameter type, expected 'Type.DOUBLE' got 'Type.INTEGER'"),

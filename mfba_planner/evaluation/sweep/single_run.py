@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from ...core.planner_types import NANO, Observation, PathPlanner
+from ...optimizers.registry import BATS
 from ...planning.algorithm_1 import Algorithm1, generate_paths_together
 from ...planning.planner_params import Swarm
 from ...planning.planner_registry import find_factory
@@ -81,7 +82,8 @@ def _tick_by_tick(runs: Sequence[Run], setting: Setting) -> list[CompletedRun]:
 
 def generates_paths_together(planner: str, setting: Setting) -> bool:
     """Whether it is Algorithm 1 with a fresh swarm per tick, which is faster in one batch."""
-    if ":" in planner or setting.params.swarm is not Swarm.FRESH:
+    params = setting.params
+    if ":" in planner or params.swarm is not Swarm.FRESH or params.optimizer != BATS:
         return False
     return type(find_factory(planner)(setting.params, setting.sensor, 0)) is Algorithm1
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from ...perception.obstacle_memory import ObstacleMemoryParams
 from ...perception.obstacle_tracker import Tracker
 from ...perception.sensory_vector import SensorParams
 from ...perception.static_map import StaticMap
+from ...swarm.optimizer import Found
 from ..base_planner import Move
 from ..distance_to_go import DistanceToGo
 from ..mode_transitions import Event
@@ -69,8 +69,8 @@ class NoBats(Predictive):
 
     has_bats = False
 
-    def _refine(self, *_: Any) -> Any:
-        return SimpleNamespace(best_value=math.inf, best_x=(0.0, 0.0), candidates=())
+    def _refine(self, *_: Any) -> Found:
+        return Found()
 
 
 class NoWaiting(Predictive):

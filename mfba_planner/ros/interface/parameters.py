@@ -75,16 +75,24 @@ def _descriptor(spec: Spec, default: Any, read_only: bool) -> ParameterDescripto
     return descriptor
 
 
-def follow(node: Node, current: Callable[[], Any], apply: Callable[[Any], None]) -> None:
-    """Let parameters be set at run time: checked as a whole, refused with the reason."""
+def follow(
+    node: Node,
+    current: Callable[[], T],
+    apply: Callable[[T], None],
+    check: Callable[[T], None] = lambda _: None,
+) -> None:
+    """Let parameters be set at run time: checked as a whole, refused with the reason.
 
-    def changed(parameters: list[Parameter]) -> Any:
+    check raises ConfigError for values that the dataclass itself accepts.
+    """
+
+    def changed(parameters: list[Parameter]) -> T:
         known = {name for name, _, _ in walk(current())}
         return override(current(), {p.name: p.value for p in parameters if p.name in known})
 
     def validate(parameters: list[Parameter]) -> SetParametersResult:
         try:
-            changed(parameters)
+            check(changed(parameters))
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

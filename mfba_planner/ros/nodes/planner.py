@@ -7,7 +7,7 @@ from typing import Any
 
 from ...core.geometry import Pose2D
 from ...core.planner_types import NANO, Decision, Mode, Observation, observe
-from ...planning.planner_factory import make_planner
+from ...planning.planner_factory import check_usable, make_planner
 from ...planning.planner_params import PlannerParams
 from ...planning.recovery import Phase
 from ..endpoints.goal_subscriptions import GoalSubscriptions
@@ -32,7 +32,7 @@ class PlannerNode(ManagedNode):
         super().__init__(topics.PLANNER, **kwargs)
         self.settings = s = parameters.declare(self, PlannerSettings(), read_only=True)
         self.path_planner = make_planner(parameters.declare(self, PlannerParams()), seed=s.seed)
-        parameters.follow(self, lambda: self.path_planner.params, self._set_params)
+        parameters.follow(self, lambda: self.path_planner.params, self._set_params, check_usable)
         params = self.path_planner.params
         self._refused_inputs = refused = RefusedInputs(self)
         self.goals = GoalSubscriptions(
