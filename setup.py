@@ -70,7 +70,7 @@ setup(
         "orca": ["pyrvo>=0.4"],
         "parquet": ["pyarrow>=15"],
         "test": [
-            "cmaes>=0.11",
+            "cmaes>=0.11,<1",
             "distributed>=2024.1",
             "hypothesis>=6.100",
             "mealpy>=3.0.2,<4",
@@ -88,7 +88,7 @@ setup(
         ],
         "view": ["rerun-sdk>=0.29"],
         "optimizers": [
-            "cmaes>=0.11",
+            "cmaes>=0.11,<1",
             "mealpy>=3.0.2,<4",
             "niapy>=2.7,<3",
         ],
