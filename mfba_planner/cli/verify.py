@@ -34,6 +34,10 @@ def main(args: list[str]) -> int:
     parser.add_bag()
     parser.add_robots()
     parser.add_argument("--closed-loop", action="store_true", help="also simulate the world again")
+    parser.add_argument(
+        "--allow-modules", action="store_true",
+        help="import an optimizer MODULE:NAME that the bag names",
+    )  # fmt: skip
     add_set_argument(parser)
     parser.add_argument(
         "--picture", type=Path, metavar="PNG", help="with --set: file to create, with both trails"
@@ -47,7 +51,7 @@ def main(args: list[str]) -> int:
     verify_foreign_bag.refuse_arguments(bag, parsed)
     if parsed.picture and not parsed.settings:
         raise ConfigError("--picture: there is one trail only; give --set NAME=VALUE as well")
-    reports = verify_each(bag, parsed.robots)
+    reports = verify_each(bag, parsed.robots, allow_modules=parsed.allow_modules)
     for robot, report in reports.items():
         _print_report(robot, report)
     failures = [

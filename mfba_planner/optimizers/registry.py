@@ -49,6 +49,12 @@ def require_optimizer(name: str) -> None:
         _find(name)
 
 
+def names_module(name: str) -> bool:
+    """Whether the name is MODULE:NAME, and that module would be imported."""
+    head, colon, _ = name.partition(":")
+    return bool(colon) and head not in _LIBRARIES
+
+
 def find_optimizer(name: str, bat: BatParams) -> Factory:
     """The factory of an optimiser. Raises ConfigError as require_optimizer(), and for NONE."""
     if name == NONE:

@@ -11,9 +11,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import InputError
+from ..core.errors import BagError, InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner_types import NANO, Decision, Mode, Observation, observe
+from ..optimizers.registry import names_module
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sense_segments import sense_circles_and_segments
 from ..perception.sensory_vector import sensory_vector
@@ -79,23 +80,33 @@ class Report:
         return digest(self.recorded)
 
 
-def verify(path: str | Path) -> Report:
-    """Verify a bag of one robot. Raises BagError for a bag that cannot be checked."""
+def verify(path: str | Path, *, allow_modules: bool = False) -> Report:
+    """Verify a bag of one robot. Raises BagError as verify_each()."""
     with BagReader(path) as reader:
         read_setup(reader)
-    return verify_each(path)[NO_NAMESPACE]
+    return verify_each(path, allow_modules=allow_modules)[NO_NAMESPACE]
 
 
-def verify_each(path: str | Path, robots: Sequence[str] = ()) -> dict[str, Report]:
+def verify_each(
+    path: str | Path, robots: Sequence[str] = (), *, allow_modules: bool = False
+) -> dict[str, Report]:
     """Verify a bag of mfba: the decisions of every robot, or of the robots named.
 
-    Raises BagError for a bag that cannot be checked, and for an unknown robot.
+    Raises BagError for a bag that cannot be checked, for an unknown robot, and for an optimiser
+    MODULE:NAME unless allow_modules: a bag must not choose what is imported.
     """
     with BagReader(path) as reader:
         for file in reader.file_paths:
             check_data(file)
         setups = read_setups(reader).by_robot
         names = select_robots(reader.path, list(setups), robots)
+        for name in names:
+            optimizer = setups[name].planner.optimizer
+            if names_module(optimizer) and not allow_modules:
+                raise BagError(
+                    f"{reader.path}: its optimizer {optimizer} is a module that would be "
+                    "imported; if you trust the bag, give --allow-modules"
+                )
         messages = read_tick_messages(reader, names)
     found = {}
     for name in names:

@@ -77,3 +77,17 @@ def test_a_sweep_with_another_optimizer_is_the_same_for_any_number_of_workers(
         tables.append((out / "table.csv").read_bytes())
     assert tables[0] == tables[1]
     assert b"planner.optimizer=random" in (tmp_path / "1/report.md").read_bytes()
+
+
+def test_verify_imports_no_module_because_a_bag_names_it(tmp_path: Path, capsys: Capture) -> None:
+    run, name = tmp_path / "run", "mfba_planner.optimizers.baselines:RandomSearch"
+    settings = ["--planner=paper", "--set", f"planner.optimizer={name}"]
+    assert mfba("run", "case1", "--driver=in-process", "--out", str(run), *settings) == 0
+    capsys.readouterr()
+    assert mfba("verify", str(run)) == 1
+    assert capsys.readouterr().err == (
+        f"mfba: {run / 'bag'}: its optimizer {name} is a module that would be imported; if you "
+        "trust the bag, give --allow-modules\n"
+    )
+    assert mfba("verify", str(run), "--allow-modules", "--closed-loop") == 0
+    assert capsys.readouterr().out.startswith("identical, ")
