@@ -38,6 +38,7 @@ ROOM_M = 0.25
 NEAR_POINTS_M = 1.0  # contact within a tick is ruled out with what stands so near
 _LEAST_M = 0.005  # kept from what stands, beyond the robot's radius
 _BESIDE_M, _AHEAD_M = 0.15, 0.1
+_MOVING_M = 1.0  # edge to edge: the robot may be waiting for what moves so near
 _SLOW_MPS, _ESTABLISHED_M = 0.5, 0.05
 _DRIVES_MPS = 0.1  # a slower velocity is a wait
 ENCLOSED = "what stands leaves no way out"
@@ -145,13 +146,15 @@ class MapPlanning:
             rollout, position, self._risk, speed, tick_s, delay, drivable, last,
             lambda center, costs: self._refine(center, costs, obs.stamp_ns) if bats else None,
         )  # fmt: skip
-        came_rad = self._place.stays(obs.pose_ns, position)
+        # Who moves in a passage leaves it again: the robot waits.
+        waits = any(distance(c.center_m, position) < c.radius_m + _MOVING_M for c in circles)
+        came_rad = None if waits else self._place.stays(obs.pose_ns, position)
         if came_rad is not None:
             wanted_rad = math.atan2(found.waypoint[1], found.waypoint[0])
             on = math.cos(wanted_rad - came_rad) > 0.0
             self._close_ahead(obs.pose_ns, position, wanted_rad if on else came_rad)
         return self._as_move(
-            obs, found, position, turn, speeds, points[away < near_m], circles, tick_s
+            obs, found, position, turn, speeds, points[away < near_m], circles, tick_s, waits
         )
 
     def path_heading_rad(self, pose: Pose2D) -> float:
@@ -261,6 +264,7 @@ class MapPlanning:
         near: np.ndarray,
         circles: Sequence[Circle],
         tick_s: float,
+        waits: bool,
     ) -> Move:
         params = self._params
         if found.cost >= FORBIDDEN_M:
@@ -281,7 +285,7 @@ class MapPlanning:
         (ux, uy), share = self._kept_off(
             (ux, uy), goal_m, obs.pose.yaw + turn, speeds, position, near, circles, tick_s
         )
-        if (ux, uy) != (0.0, 0.0) or speed < _DRIVES_MPS:
+        if waits or (ux, uy) != (0.0, 0.0) or speed < _DRIVES_MPS:
             self._blocked.drives()
         elif self._blocked.stands(obs.pose_ns, position, math.atan2(qy, qx)):
             self._close_ahead(obs.pose_ns, position, math.atan2(qy, qx))

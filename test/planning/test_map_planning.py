@@ -264,6 +264,24 @@ def test_where_the_check_of_the_points_stops_it_it_chooses_another_heading(
     assert place == pytest.approx((RADIUS_M + 0.1, 0.0), abs=0.1)
 
 
+@pytest.mark.parametrize(("away_m", "waits"), [(0.9, True), (1.1, False)])
+def test_for_somebody_who_moves_in_a_passage_it_waits(
+    monkeypatch: pytest.MonkeyPatch, away_m: float, waits: bool
+) -> None:
+    """So near that the robot may stand still because of him: no passage counts as closed."""
+    monkeypatch.setattr(MapPlanning, "_kept_off", lambda *_: ((0.0, 0.0), 0.0))
+    made, goal = planning([(1.5, 0.05)]), (3.0, 0.0)
+    closed = []
+    monkeypatch.setattr(made.search.to_go, "close", lambda *at: closed.append(at))
+    person = Circle(center_m=(0.0, 0.5 + away_m), velocity_mps=(0.0, 0.3), radius_m=0.5)
+    for tick in range(math.ceil(1.5 * PLACE_NS / PARAMS.tick_ns)):
+        pose = Pose2D(-0.5 if tick == 0 else 0.0, 0.0)
+        stamp_ns = tick * PARAMS.tick_ns + 1
+        obs = replace(at_start(goal), stamp_ns=stamp_ns, pose=pose)
+        made.move(obs, goal, [person], Speeds(), None, None, 0.08)
+    assert (not closed) == waits
+
+
 def test_a_place_that_is_not_left_is_gone_round() -> None:
     """Before a post; where the robot then goes is not towards the closed passage."""
     made, goal = planning([(1.5, 0.05)]), (3.0, 0.0)
