@@ -10,6 +10,7 @@ import pytest
 from edited_bags import record as record_run
 from geometry_msgs.msg import TwistStamped
 from rclpy.context import Context
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import qos_profile_sensor_data
 from ros_graph import Graph
 from sensor_msgs.msg import LaserScan
@@ -40,6 +41,7 @@ from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.recorder import Recorder
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
+from mfba_planner.ros.runtime import parameter_client
 from mfba_planner.scenarios.run_config import NODES
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation import episode, run_episode
@@ -152,6 +154,27 @@ def test_parameters_are_read_across_contexts(graph: Graph, domain_id: int, tmp_p
         others.close()
         context.try_shutdown()
         context.destroy()
+
+
+def test_a_parameter_client_that_gets_no_response_is_replaced(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As when the server has never discovered it."""
+    monkeypatch.setattr(parameter_client, "RENEW_S", 0.3)
+    made: list[AsyncParameterClient] = []
+
+    class FirstIsDeaf(AsyncParameterClient):
+        def list_parameters(self, *args: Any, **kwargs: Any) -> Any:
+            if self not in made:
+                made.append(self)
+            return None if self is made[0] else super().list_parameters(*args, **kwargs)
+
+    monkeypatch.setattr(parameter_client, "AsyncParameterClient", FirstIsDeaf)
+    graph.start(VirtualSensor, {})
+    recorder = record(graph, tmp_path / "bag", nodes="virtual_sensor")
+    graph.until(lambda: not recorder.missing())
+    assert len(made) > 1
+    graph.until(lambda: not list(recorder.clients))
 
 
 def record(graph: Graph, path: Path, **parameters: Any) -> Recorder:

@@ -16,6 +16,7 @@ from .base_node import GraphNode
 
 PERIOD_S = 0.05
 RETRY_S = 1.0  # a response can get lost while a server has not discovered its client yet
+RENEW_S = 4.0  # a client that gets none for so long is replaced: a server may never discover it
 
 NodeParameters = dict[str, dict[str, Any]]  # by node, by parameter
 
@@ -31,6 +32,8 @@ class ParameterClient:
         self._on_done = on_done
         self._clients: dict[str, AsyncParameterClient] = {}
         self._requested_s: dict[str, float] = {}
+        self._created_s: dict[str, float] = {}
+        self._own: dict[str, list[Any]] = {}  # service clients, by node
         self._nodes = nodes
         self.values: NodeParameters = {}
         if nodes:
@@ -44,8 +47,9 @@ class ParameterClient:
     def _request(self) -> None:
         now = time.monotonic()
         for name in self.pending:
-            client = self._clients.get(name) or AsyncParameterClient(self._node, name)
-            self._clients[name] = client
+            if now - self._created_s.get(name, float("-inf")) >= RENEW_S:
+                self._create(name, now)
+            client = self._clients[name]
             waited = now - self._requested_s.get(name, float("-inf"))
             if waited >= RETRY_S and client.services_are_ready():
                 self._requested_s[name] = now
@@ -55,6 +59,16 @@ class ParameterClient:
             self._destroy_clients()
             self._on_done(self.values)
 
+    def _create(self, name: str, now: float) -> None:
+        """Create the client of a node, or replace it."""
+        for client in self._own.get(name, []):
+            self._node.destroy_client(client)
+        before = set(self._node.clients)
+        self._clients[name] = AsyncParameterClient(self._node, name)
+        self._own[name] = [client for client in self._node.clients if client not in before]
+        self._created_s[name] = now
+        self._requested_s.pop(name, None)
+
     def _destroy_clients(self) -> None:
         """There are six per node, and an executor waits for each of them at every spin."""
         for client in list(self._node.clients):
@@ -63,6 +77,8 @@ class ParameterClient:
 
     def _on_names(self, node: str, future: Any) -> None:
         names = list(future.result().result.names)
+        if node not in self._clients:
+            return  # a late response: the values are read
         self._clients[node].get_parameters(names, callback=partial(self._on_values, node, names))
 
     def _on_values(self, node: str, names: list[str], future: Any) -> None:
