@@ -265,7 +265,7 @@ def test_where_the_check_of_the_points_stops_it_it_chooses_another_heading(
 
 
 @pytest.mark.parametrize(("away_m", "waits"), [(0.9, True), (1.1, False)])
-def test_for_somebody_who_moves_in_a_passage_it_waits(
+def test_for_an_obstacle_that_moves_in_a_passage_it_waits(
     monkeypatch: pytest.MonkeyPatch, away_m: float, waits: bool
 ) -> None:
     """So near that the robot may stand still because of him: no passage counts as closed."""
