@@ -56,6 +56,7 @@ _NOISE_SD = 2.5
 _FEWEST_WEAK = 3.0
 _LIMIT_M = 0.15  # returns so near to the longest range are not used
 _PRESENT_M = 4.0  # returns of the last scan count for distances up to here
+_FARTHEST_END_M = 0.03
 _FIELD_M = 10.0  # side of the window in which distance() knows
 
 
@@ -81,6 +82,7 @@ class StaticMap:
         self._origin: Point = (0.0, 0.0)
         self._field: tuple[int, DistanceField] | None = None
         self._present: Array = np.empty((0, 2))
+        self._ends: Array = np.empty((0, 2))
         self.version = 0
 
     def forget(self) -> None:
@@ -137,12 +139,13 @@ class StaticMap:
         moving, surely = moving[kept_out], moving[fast & surely]
         found = surfaces(beams)
         changed = False
-        self._present = np.empty((0, 2))
+        self._present = self._ends = np.empty((0, 2))
         if found is not None:
             changed = self._mark(found, beams, moving, pose_error)
             stands = (found.range_m > 0.0) & (found.range_m < _PRESENT_M)
             stands &= ~self._moving.near_any(found.x, found.y, surely)
             self._present = np.stack(self.to_map(found.x[stands], found.y[stands]), axis=1)
+            self._ends = np.stack(self.to_map(*_ends(found, stands)), axis=1)
         changed |= self._clear(beams, surely)
         x, y = self._robot
         changed |= self._points.roll(x, y)
@@ -318,6 +321,10 @@ class StaticMap:
         """
         return np.concatenate((self.map_points(), self._present))
 
+    def contact_points(self) -> Array:
+        """present_points(), and how far surfaces may reach beyond their last returns."""
+        return np.concatenate((self.present_points(), self._ends))
+
     def established_points(self) -> Array:
         """Those of the points that have been met for a while, without moving: no ghosts."""
         data = self._points.data
@@ -373,3 +380,16 @@ class StaticMap:
         x, y = self._matching.measured(np.array([left]), np.array([low]), self._origin)
         origin = Pose2D(float(x[0]), float(y[0]), float(self._matching.error[2]))
         return OccupancyGrid(self._stamp_ns, origin, self.params.cell_m, cells)
+
+
+def _ends(found: Surfaces, stands: Array) -> tuple[Array, Array]:
+    """Where the surfaces that stand may end: as far beyond an end as its neighbour is before it.
+
+    A surface seen at a grazing angle ends up to one spacing of the beams after its last return.
+    """
+    wide = (found.last > found.first) & stands[found.first] & stands[found.last]
+    first, last = found.first[wide], found.last[wide]
+    end, inner = np.append(first, last), np.append(first + 1, last - 1)
+    dx, dy = found.x[end] - found.x[inner], found.y[end] - found.y[inner]
+    share = np.minimum(1.0, _FARTHEST_END_M / np.maximum(np.sqrt(dx * dx + dy * dy), 1e-9))
+    return found.x[end] + share * dx, found.y[end] + share * dy

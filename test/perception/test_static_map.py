@@ -12,8 +12,12 @@ from mapped_scenes import Disc, Scene, near, off_surface, room, wall
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.planner_types import Scan
+from mfba_planner.core.segments import Segments
 from mfba_planner.perception.obstacle_tracker import Tracker
+from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.perception.static_map import StaticMap, StaticMapParams
+from mfba_planner.simulation.robot_model import Lidar
+from mfba_planner.simulation.simulated_lidar import scan_at
 
 NOISES = [
     pytest.param((0.0, 0.0, 0.0), id="exact"),
@@ -279,3 +283,26 @@ def test_parameters_are_checked() -> None:
     with pytest.raises(ConfigError, match="size_m"):
         StaticMapParams(size_m=1e9)
     assert StaticMap().params == StaticMapParams()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(-0.32, 0.32), st.floats(-0.1, 0.3), st.floats(-3.1, 3.1))
+def test_the_end_of_a_wall_is_no_farther_than_what_may_be_touched(
+    x: float, before_m: float, yaw: float
+) -> None:
+    """Seen at a grazing angle, its last return is up to a spacing of the beams too early."""
+    segments = Segments.of([(0.0, 0.0, 0.0, 2.0)])
+    pose = Pose2D(x if abs(x) > 0.04 else 0.3, -before_m if before_m > 0.0 else before_m, yaw)
+    lidar = Lidar(beams=360, range_max_m=3.5)
+    scan = aligned(scan_at(pose, lidar, [], None, segments), yaw)
+    tracker, local_map = Tracker(), StaticMap()
+    for k in (1, 2):
+        tracker.update(k * 100_000_000, pose, scan)
+        beams = tracker.beams
+        assert beams is not None
+        local_map.update(k * 100_000_000, pose, beams, *tracker.moving(), tracker.pose_error)
+    lowest_m = float(local_map.contact_points()[:, 1].min())
+    seen_m = float(local_map.present_points()[:, 1].min())
+    assert lowest_m <= seen_m
+    assert lowest_m <= max(0.002, seen_m - 0.029), "it reaches the end, or 3 cm on"
+    assert lowest_m >= -0.031
