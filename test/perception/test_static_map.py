@@ -302,7 +302,7 @@ def test_the_end_of_a_wall_is_no_farther_than_what_may_be_touched(
         assert beams is not None
         local_map.update(k * 100_000_000, pose, beams, *tracker.moving(), tracker.pose_error)
     lowest_m = float(local_map.contact_points()[:, 1].min())
-    seen_m = float(local_map.present_points()[:, 1].min())
-    assert lowest_m <= seen_m
-    assert lowest_m <= max(0.002, seen_m - 0.029), "it reaches the end, or 3 cm on"
+    present_m = float(local_map.present_points()[:, 1].min())
+    assert lowest_m <= present_m
+    assert lowest_m <= max(0.002, present_m - 0.029), "it reaches the end, or 3 cm on"
     assert lowest_m >= -0.031
