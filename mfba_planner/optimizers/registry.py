@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -13,6 +11,7 @@ from importlib.util import find_spec
 from numpy.random import Generator
 
 from ..core.errors import ConfigError, MfbaError, OptimizerError
+from ..core.named_import import import_named
 from ..core.option_specs import did_you_mean
 from ..swarm.bat_swarm import Algorithm, BatParams, BatSwarm
 from ..swarm.optimizer import Evaluate, Factory, Found, Optimizer, RunOptimizer, raised, search
@@ -116,9 +115,9 @@ def _find(name: str) -> Factory:
     if head in _LIBRARIES and colon:
         return _of_library(head, rest)
     if colon:
-        return _of_module(name, head, rest)
+        return _of_module(name, name)
     if name in (installed := _installed()):
-        return _of_module(name, *installed[name].split(":"))
+        return _of_module(name, installed[name])
     raise ConfigError(f"optimizer {name!r}: unknown; {did_you_mean(name, [*NAMES, *installed])}")
 
 
@@ -140,17 +139,10 @@ def _of_library(library: str, name: str) -> Factory:
     return factory
 
 
-def _of_module(name: str, module: str, attribute: str) -> Factory:
-    """The factory MODULE:NAME; modules are also searched in the working directory."""
-    if os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())
-    try:
-        factory: Factory = getattr(import_module(module), attribute)
-    except Exception as error:
-        near = did_you_mean(name, list(NAMES))
-        hint = f"; {near}" if near.startswith("did") else ""
-        raise ConfigError(
-            f"optimizer {name}: cannot be imported ({' '.join(str(error).split())}){hint}; give "
-            "MODULE:NAME of something that is called with region, budget, generator and population"
-        ) from None
+def _of_module(name: str, target: str) -> Factory:
+    """The factory at MODULE:NAME of the optimiser of that name."""
+    near = did_you_mean(name, list(NAMES))
+    hint = f"; {near}" if near.startswith("did") else ""
+    called_with = "region, budget, generator and population"
+    factory: Factory = import_named("optimizer", name, target, called_with, hint)
     return factory

@@ -19,8 +19,8 @@ Array = np.ndarray
 STANDS_NS = 1_000_000_000  # so long the robot stands before the heading counts as blocked
 HELD_NS = 10_000_000_000
 NEAR_M = 0.15  # a heading is blocked from places so near to where the robot stood
-PLACE_M, PLACE_NS = 0.3, 8_000_000_000
 WIDE_RAD = math.radians(25.0)  # to each side of it
+PLACE_M, PLACE_NS = 0.3, 8_000_000_000  # a place, and how long the robot may stay there
 
 
 class BlockedHeadings:

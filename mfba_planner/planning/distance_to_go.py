@@ -21,7 +21,7 @@ from ..core.planner_types import NANO
 from ..perception.distance_field import DistanceField, bilinear, distance_field
 from ..perception.known_map import UnclearedMap
 from ..perception.static_map import StaticMap
-from .eikonal import CLOSED, downhill, march, speed_share
+from .eikonal import CLOSED, cell_of, downhill, march, speed_share
 from .known_route import KnownRoute
 
 Array = np.ndarray
@@ -181,15 +181,14 @@ class DistanceToGo:
             dx = self._origin[0] + (np.arange(width) + 0.5) * self._cell_m - x
             dy = self._origin[1] + (np.arange(height)[:, None] + 0.5) * self._cell_m - y
             speed[dx * dx + dy * dy < self._radius_m**2] = CLOSED
-        i = min(max(int((target[0] - self._origin[0]) / self._cell_m), 0), width - 1)
-        j = min(max(int((target[1] - self._origin[1]) / self._cell_m), 0), height - 1)
-        self._to_go = march(speed, (j, i), self._cell_m)
+        end = cell_of(target, self._origin, self._cell_m, speed.shape)
+        self._to_go = march(speed, end, self._cell_m)
         self._step = downhill(self._to_go)
         if self._beyond_m:
             return ""  # the map does not reach so far
         cell = (position[0] - self._origin[0]) / self._cell_m
         row = (position[1] - self._origin[1]) / self._cell_m
-        closing, leads_out = self._closed(field, widest_m, (int(row), int(cell)), (j, i), goal)
+        closing, leads_out = self._closed(field, widest_m, (int(row), int(cell)), end, goal)
         all_m = 0.5 * known.params.size_m + _LEAST_MARGIN_M
         if leads_out and self._margin_m < all_m:
             # Beyond what the map holds, all is free: a way round is known or assumed there.

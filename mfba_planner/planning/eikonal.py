@@ -5,11 +5,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.geometry import Point
+
 Array = np.ndarray
 
 TOUCH_M = 0.01  # nearer than so much beyond the radius counts as closed
 CLOSED = 0.02  # F there; not 0, so that the distance to go stays finite
 _SLOWEST, _ROOM_M = 0.5, 0.3  # F beside what stands, and from where it is 1
+
+
+def cell_of(
+    point: Point, origin_m: Point, cell_m: float, shape: tuple[int, ...]
+) -> tuple[int, int]:
+    """Row and column of the cell of a point; of one outside the grid the nearest."""
+    (height, width), (x, y) = shape, origin_m
+    row = min(max(int((point[1] - y) / cell_m), 0), height - 1)
+    return row, min(max(int((point[0] - x) / cell_m), 0), width - 1)
 
 
 def march(speed: Array, end: tuple[int, int], cell_m: float) -> Array:

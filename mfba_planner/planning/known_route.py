@@ -10,7 +10,7 @@ import numpy as np
 from ..core.geometry import Point, distance
 from ..perception.distance_field import DistanceField, distance_field
 from ..perception.known_map import UnclearedMap
-from .eikonal import downhill, march, speed_share
+from .eikonal import cell_of, downhill, march, speed_share
 
 Array = np.ndarray
 
@@ -61,12 +61,10 @@ class KnownRoute:
     def _walk(self, position: Point, goal: Point) -> tuple[Point, float, Point, Point]:
         (x, y), field = position, self._to_go
         low = high = position
-        height, width = field.distance_m.shape
         for _ in range(math.ceil(4.0 * _LOCAL_M / _STEP_M)):
             if distance((x, y), goal) < 2.0 * _STEP_M:
                 return goal, 0.0, _least(low, goal), _most(high, goal)
-            i = min(max(int((x - field.origin_m[0]) / field.cell_m), 0), width - 1)
-            j = min(max(int((y - field.origin_m[1]) / field.cell_m), 0), height - 1)
+            j, i = cell_of((x, y), field.origin_m, field.cell_m, field.distance_m.shape)
             ux, uy = self._down[:, j, i].tolist()
             ahead = (x + _STEP_M * ux, y + _STEP_M * uy)
             wide = (_least(low, ahead), _most(high, ahead))
@@ -81,10 +79,7 @@ class KnownRoute:
         x, y = points.T
         field = distance_field(x, y, low, high, cell, _CAP_M)
         speed = speed_share(field.distance_m, max(self._radius_m, _CLOSED_SHARE * cell))
-        height, width = speed.shape
-        i = min(max(int((goal[0] - field.origin_m[0]) / cell), 0), width - 1)
-        j = min(max(int((goal[1] - field.origin_m[1]) / cell), 0), height - 1)
-        to_go = march(speed, (j, i), cell)
+        to_go = march(speed, cell_of(goal, field.origin_m, cell, speed.shape), cell)
         down = downhill(to_go)
         self._down = np.stack((down.real, down.imag))
         self._to_go = DistanceField(field.origin_m, cell, to_go, math.inf)

@@ -72,7 +72,6 @@ class MapPlanning:
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
         self._blocked, self._place = BlockedHeadings(), PlaceCheck()
-        self._headings_rad = 2.0 * math.pi / headings * np.arange(1, headings + 1)
 
     def update(self, stamp_ns: int, pose: Pose2D, tracker: Tracker) -> None:
         """Take the scan that the tracker has just taken, from the pose."""
@@ -136,8 +135,8 @@ class MapPlanning:
             delay = TurnDelay(params, obs.pose.yaw + turn, speeds.omega)
         near_m = max(NEAR_POINTS_M, params.robot_radius_m + _LEAST_M + self._stopping_m(tick_s))
         open_ = [
-            self._blocked.open(obs.pose_ns, position, self._headings_rad),
-            to_go.open(position, self._headings_rad),
+            self._blocked.open(obs.pose_ns, position, self.search.headings_rad),
+            to_go.open(position, self.search.headings_rad),
             None if unobserved is None else ~unobserved,
         ]
         masks = [mask for mask in open_ if mask is not None]

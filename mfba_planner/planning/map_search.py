@@ -61,8 +61,8 @@ class MapSearch:
         """radius_m is the robot's; headings is the number of bits."""
         self._radius_m, self._n, self._reach_m = radius_m, headings, reach_m
         self.to_go = DistanceToGo(route, radius_m, known_map)
-        angles = 2.0 * math.pi / headings * np.arange(1, headings + 1)
-        self._cos, self._sin = np.cos(angles), np.sin(angles)
+        self.headings_rad = 2.0 * math.pi / headings * np.arange(1, headings + 1)
+        self._cos, self._sin = np.cos(self.headings_rad), np.sin(self.headings_rad)
         lengths = np.array(LENGTHS) * reach_m
         self._qx = (self._cos[:, None] * lengths).ravel()
         self._qy = (self._sin[:, None] * lengths).ravel()

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import importlib
-import os
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 from ...core.errors import ConfigError
+from ...core.named_import import import_named
 from ...core.option_specs import Scalar, did_you_mean, flatten
 from ...core.planner_types import PathPlanner
 from ...perception.sensory_vector import SensorParams
@@ -238,19 +236,11 @@ def own_preset(name: str, params: PlannerParams) -> PlannerParams:
 
 
 def _factory(name: str) -> Factory:
-    """The factory of a planner; modules are also searched in the working directory."""
+    """The factory of a planner: a registered name, or MODULE:NAME."""
     if ":" not in name:
         return find_factory(name)
-    module_name, _, attribute = name.partition(":")
-    if os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())
-    try:
-        factory: Factory = getattr(importlib.import_module(module_name), attribute)
-    except (ImportError, ValueError, AttributeError) as error:
-        raise ConfigError(
-            f"planner {name}: cannot be imported ({error}); give MODULE:NAME of something that "
-            "is called with PlannerParams, SensorParams and a seed"
-        ) from None
+    called_with = "PlannerParams, SensorParams and a seed"
+    factory: Factory = import_named("planner", name, name, called_with)
     return factory
 
 

@@ -17,7 +17,7 @@ from ...perception.obstacle_tracker import Tracker
 from ...perception.sensory_vector import SensorParams
 from ...perception.static_map import StaticMap
 from ...swarm.optimizer import Found
-from ..base_planner import Move
+from ..base_planner import Move, blocked
 from ..distance_to_go import DistanceToGo
 from ..mode_transitions import Event
 from ..planner_params import PlannerParams
@@ -41,13 +41,7 @@ class BitsOnly(Predictive):
             return Move(velocity=straight, reason="the straight way is free")
         vs = tuple(costs.closed(self._cos * speed, self._sin * speed).tolist())
         if all(vs):
-            return Move(
-                velocity=(0.0, 0.0),
-                reason="every heading closes",
-                event=Event.NO_GAP,
-                vs=vs,
-                vg=vs,
-            )
+            return blocked("every heading closes", vs)
         goal_heading = math.atan2(goal[1] - y, goal[0] - x)
         free = [k for k, closed in enumerate(vs) if not closed]
         k = min(free, key=lambda k: abs(wrap_angle(self._heading(k) - goal_heading)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.geometry import Point
 from ...core.planner_types import Observation
-from ..base_planner import Move
+from ..base_planner import Move, blocked
 from ..mode_transitions import Event
 from .circle_planner import CirclePlanner
 
@@ -43,7 +43,7 @@ class PotentialField(CirclePlanner):
         force = math.hypot(fx, fy)
         reason = f"{len(rows)} repelling"
         if force < 1e-9:
-            return Move(velocity=(0.0, 0.0), reason=f"{reason}: forces cancel", event=Event.NO_GAP)
+            return blocked(f"{reason}: forces cancel")
         speed = self.params.speed_mps
         return Move(
             velocity=(speed * fx / force, speed * fy / force),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.geometry import Point, bearing
 from ...core.planner_types import Observation
-from ..base_planner import Move
+from ..base_planner import Move, blocked
 from ..mode_transitions import Event
 from .circle_planner import CirclePlanner
 
@@ -47,7 +47,7 @@ class VectorFieldHistogram(CirclePlanner):
         off = np.abs(_turn(headings[:, None], directions))
         masked = (off < half).any(axis=1)
         if masked.all():
-            return Move(velocity=(0.0, 0.0), reason="every heading is masked", event=Event.NO_GAP)
+            return blocked("every heading is masked")
         last = target if self._last is None else self._last
         cost = TO_GOAL * np.abs(_turn(headings, target)) + TO_LAST * np.abs(_turn(headings, last))
         cost[masked] = np.inf

@@ -56,24 +56,24 @@ class ParameterClient:
                 client.list_parameters(callback=partial(self._on_names, name))
         if not self.pending:
             self._node.destroy_timer(self._timer)
-            self._destroy_clients()
+            for name in list(self._own):
+                self._destroy(name)
             self._on_done(self.values)
 
     def _create(self, name: str, now: float) -> None:
         """Create the client of a node, or replace it."""
-        for client in self._own.get(name, []):
-            self._node.destroy_client(client)
+        self._destroy(name)
         before = set(self._node.clients)
         self._clients[name] = AsyncParameterClient(self._node, name)
         self._own[name] = [client for client in self._node.clients if client not in before]
         self._created_s[name] = now
         self._requested_s.pop(name, None)
 
-    def _destroy_clients(self) -> None:
+    def _destroy(self, name: str) -> None:
         """There are six per node, and an executor waits for each of them at every spin."""
-        for client in list(self._node.clients):
+        self._clients.pop(name, None)
+        for client in self._own.pop(name, []):
             self._node.destroy_client(client)
-        self._clients.clear()
 
     def _on_names(self, node: str, future: Any) -> None:
         names = list(future.result().result.names)
