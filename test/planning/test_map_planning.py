@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mapped_scenes import wall
-from point_maps import PointMap
+from point_maps import PointMap, polyline
 
 from mfba_planner.core.geometry import Point, Pose2D
 from mfba_planner.core.planner_types import Circle, Decision, Mode, Observation
@@ -262,6 +262,17 @@ def test_where_the_check_of_the_points_stops_it_it_chooses_another_heading(
     ((stamp_ns, place),) = closed
     assert stamp_ns == ticks * PARAMS.tick_ns + 1
     assert place == pytest.approx((RADIUS_M + 0.1, 0.0), abs=0.1)
+
+
+@pytest.mark.parametrize("room_m", [0.05, 0.08, 0.11])
+def test_a_differential_base_leads_off_a_wall_beside_which_it_is_slow(room_m: float) -> None:
+    """The goal lies along the wall; straight on it would be slow all along."""
+    off = RADIUS_M + room_m
+    made, goal = planning(polyline((-1.0, off), (8.0, off)), Drive.DIFFERENTIAL), (6.0, 0.0)
+    move = made.move(at_start(goal), goal, [], Speeds(), None, None, 0.08)
+    assert move is not None
+    assert move.waypoint is not None
+    assert room_m - move.waypoint[1] > 0.15
 
 
 @pytest.mark.parametrize(("away_m", "waits"), [(0.9, True), (1.1, False)])
