@@ -32,6 +32,7 @@ NEWER_OPTIONS = (
     "jump_m",
     "perception",
     "known_map",
+    "optimizer",
     "robot_radius_m",
     "speed_limit.",
     "recovery.",
