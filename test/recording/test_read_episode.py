@@ -92,44 +92,14 @@ def test_a_malformed_decision_is_refused(bag: Path, tmp_path: Path, key: str, va
 
 
 # What the first bags held. An option that is added later is not in them: NEWER_OPTIONS.
-FIRST_OPTIONS = set(
-    [
-        "drive",
-        "max_speed_mps",
-        "max_turn_radps",
-        "max_accel_mps2",
-        "max_turn_accel_radps2",
-        "turn_first_rad",
-        "reverse",
-        "speed_mps",
-        "step_length_m",
-        "goal_tolerance_m",
-        "input_timeout_s",
-        "gap_heading",
-        "swarm",
-        "bat.algorithm",
-        "bat.population",
-        "bat.iterations",
-        "bat.a0",
-        "bat.r0",
-        "bat.alpha",
-        "bat.gamma",
-        "bat.f_min",
-        "bat.f_max",
-        "bat.sigma",
-        "bat.rho",
-        "bat.velocity",
-        "bat.schedule",
-        "bat.bounds",
-        "bat.epsilon",
-        "bat.initial",
-        "bat.walk",
-        "bat.step",
-        "bat.acceptance",
-        "bat.update",
-        "bat.inertia",
-    ]
-)
+FIRST_OPTIONS = {
+    "drive", "max_speed_mps", "max_turn_radps", "max_accel_mps2", "max_turn_accel_radps2",
+    "turn_first_rad", "reverse", "speed_mps", "step_length_m", "goal_tolerance_m",
+    "input_timeout_s", "gap_heading", "swarm", "bat.algorithm", "bat.population",
+    "bat.iterations", "bat.a0", "bat.r0", "bat.alpha", "bat.gamma", "bat.f_min", "bat.f_max",
+    "bat.sigma", "bat.rho", "bat.velocity", "bat.schedule", "bat.bounds", "bat.epsilon",
+    "bat.initial", "bat.walk", "bat.step", "bat.acceptance", "bat.update", "bat.inertia",
+}  # fmt: skip
 
 
 def test_a_bag_older_than_all_newer_options_was_made_with_their_defaults(
