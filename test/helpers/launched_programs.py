@@ -2,6 +2,7 @@
 """Helper: runs the package's programs as real processes and lists those still running."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -55,6 +56,17 @@ class Program:
             with suppress(ProcessLookupError):  # it has ended in the meantime
                 os.kill(pid, signal.SIGKILL)
         self.process.communicate()
+
+    def wait_for_signal_handlers(self) -> None:
+        """Wait until SIGTERM has a handler, which Python itself never gives it: the program's."""
+
+        def handled() -> bool:
+            status = _read(self.process.pid, "status")
+            caught = re.search(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)
+            is_set = caught and int(caught[1], 16) >> (signal.SIGTERM - 1) & 1
+            return bool(is_set) or self.process.poll() is not None
+
+        wait_until(handled, timeout_s=60.0)
 
     def send_group(self, sent: signal.Signals) -> None:
         """Signal the whole process group, as a terminal does at Ctrl-C."""

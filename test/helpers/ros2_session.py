@@ -156,6 +156,8 @@ class Session:
         """End all programs, the last one first; each must exit without an error."""
         while self.running:
             name, program = self.running.popitem()
+            # A node of this name in the graph can be one that ended before.
+            program.wait_for_signal_handlers()
             program.process.send_signal(signal.SIGINT)
             with program:
                 code = program.end()

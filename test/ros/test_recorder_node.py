@@ -3,13 +3,15 @@
 
 import time
 from collections import Counter
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 from edited_bags import record as record_run
 from geometry_msgs.msg import TwistStamped
-from rclpy.context import Context
+from launched_programs import Program
+from rcl_interfaces.srv import ListParameters
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import qos_profile_sensor_data
 from ros_graph import Graph
@@ -119,41 +121,46 @@ def test_the_bag_holds_all_parameters_and_the_facts(bag: Path) -> None:
     assert {"python", "numpy", "mfba_planner"} <= set(facts)
 
 
-def test_parameters_are_read_across_contexts(graph: Graph, domain_id: int, tmp_path: Path) -> None:
-    """As across processes: recorder and nodes share only DDS."""
-    context = Context()
-    context.init(domain_id=domain_id)
-    others = Graph(context)
-    try:
-        others.start(WorldSim, {"scenario": "walled", "start_paused": True, "speed_factor": 2.5})
-        others.start(VirtualSensor, {"sectors": 24, "obstacle_radii_m": [0.5, 0.3, 0.2, 0.4]})
-        others.start(PlannerNode, {"seed": 5, "bat.algorithm": "ba"})
+def test_parameters_are_read_across_processes(
+    graph: Graph, domain_id: int, tmp_path: Path
+) -> None:
+    given: dict[str, dict[str, Any]] = {
+        "world_sim": {"scenario": "walled", "start_paused": True, "speed_factor": 2.5},
+        "virtual_sensor": {"sectors": 24, "obstacle_radii_m": [0.5, 0.3, 0.2, 0.4]},
+        "planner": {"seed": 5, "bat.algorithm": "ba"},
+    }
+    with ExitStack() as programs:
+        for name, values in given.items():
+            words = [word for key, value in values.items() for word in ("-p", f"{key}:={value}")]
+            programs.enter_context(
+                Program(
+                    name,
+                    "--ros-args",
+                    *words,
+                    cwd=tmp_path,
+                    more_env={"ROS_DOMAIN_ID": str(domain_id)},
+                )
+            )
         recorder = graph.start(
             Recorder,
             {"output": str(tmp_path / "bag"), "nodes": ",".join(NODES), "run": '{"a": 1}'},
         )
         assert recorder.missing().startswith("parameters of planner, virtual_sensor, world_sim")
-
-        def parameters_read() -> bool:
-            others.settle()
-            return not recorder.missing()
-
-        graph.until(parameters_read)
+        graph.until(lambda: not recorder.missing(), 60.0)
+        listed = {
+            name: graph.call(ListParameters, f"{name}/list_parameters").result.names
+            for name in given
+        }
         graph.stop(recorder)
-        with BagReader(tmp_path / "bag") as reader:
-            configuration = read_configuration(reader)
-        for node in others.nodes:
-            names = node.get_parameters_by_prefix("")
-            assert set(configuration["nodes"][node.get_name()]) == set(names)
-        nodes = configuration["nodes"]
-        assert (nodes["planner"]["seed"], nodes["planner"]["bat.algorithm"]) == (5, "ba")
-        assert nodes["virtual_sensor"]["obstacle_radii_m"] == [0.5, 0.3, 0.2, 0.4]
-        assert nodes["world_sim"]["speed_factor"] == 2.5
-        assert configuration["run"] == {"a": 1}
-    finally:
-        others.close()
-        context.try_shutdown()
-        context.destroy()
+    with BagReader(tmp_path / "bag") as reader:
+        configuration = read_configuration(reader)
+    nodes = configuration["nodes"]
+    assert {name: set(values) for name, values in nodes.items()} == {
+        name: set(names) for name, names in listed.items()
+    }
+    for name, values in given.items():
+        assert {key: nodes[name][key] for key in values} == values
+    assert configuration["run"] == {"a": 1}
 
 
 def test_a_parameter_client_that_gets_no_response_is_replaced(
