@@ -61,22 +61,35 @@ def distance_field(
     """
     width, height = (max(math.ceil((b - a) / cell_m), 2) for a, b in zip(low, high))
     pad = math.ceil(cap_m / cell_m) + 1  # points outside the rectangle count as well
-    i0 = math.floor(low[0] / cell_m) - pad
-    j0 = math.floor(low[1] / cell_m) - pad
-    rows, columns = height + 2 * pad, width + 2 * pad
-    i = np.floor(x / cell_m).astype(np.int64) - i0
-    j = np.floor(y / cell_m).astype(np.int64) - j0
-    inside = (i >= 0) & (j >= 0) & (i < columns) & (j < rows)
-    origin = ((i0 + pad) * cell_m, (j0 + pad) * cell_m)
-    if not inside.any():
-        return DistanceField(origin, cell_m, np.full((height, width), cap_m), cap_m)
+    left, bottom = math.floor(low[0] / cell_m), math.floor(low[1] / cell_m)
+    i = np.floor(x / cell_m).astype(np.int64) - left
+    j = np.floor(y / cell_m).astype(np.int64) - bottom
+    inside = (i >= -pad) & (j >= -pad) & (i < width + pad) & (j < height + pad)
+    origin, distance_m = (left * cell_m, bottom * cell_m), np.full((height, width), cap_m)
+    i, j = i[inside], j[inside]
+    if i.size:  # farther from all points than the cap, nothing is to be computed
+        first_i, end_i = max(int(i.min()) - pad, 0), min(int(i.max()) + pad + 1, width)
+        first_j, end_j = max(int(j.min()) - pad, 0), min(int(j.max()) + pad + 1, height)
+        part = distance_m[first_j:end_j, first_i:end_i]
+        corner = (origin[0] + first_i * cell_m, origin[1] + first_j * cell_m)
+        at = (x[inside] - corner[0], y[inside] - corner[1])
+        _fill(part, at, (i - first_i, j - first_j), pad, cell_m)
+    return DistanceField(origin, cell_m, distance_m, cap_m)
+
+
+def _fill(
+    distance_m: Array, at: tuple[Array, Array], cells: tuple[Array, Array], pad: int, cell_m: float
+) -> None:
+    """Lower distances (h, w) to those to points, given from its corner with their cells."""
     from scipy.ndimage import distance_transform_edt  # loads in 0.1 s, and only here
 
-    cells = j[inside] * columns + i[inside]
-    px, py = np.zeros((2, rows * columns), dtype=np.float32)  # relative to the origin: to 1 um
-    px[cells], py[cells] = x[inside] - origin[0], y[inside] - origin[1]
+    height, width = distance_m.shape
+    rows, columns = height + 2 * pad, width + 2 * pad
+    cell = (cells[1] + pad) * columns + cells[0] + pad
+    px, py = np.zeros((2, rows * columns), dtype=np.float32)  # relative to the corner: to 1 um
+    px[cell], py[cell] = at
     empty = np.ones(rows * columns, dtype=bool)
-    empty[cells] = False
+    empty[cell] = False
     near = distance_transform_edt(
         empty.reshape(rows, columns), return_distances=False, return_indices=True
     )
@@ -84,7 +97,7 @@ def distance_field(
     qx, qy = px.take(index), py.take(index)
     at_x = ((np.arange(width) + 0.5) * cell_m).astype(np.float32)
     at_y = ((np.arange(height) + 0.5) * cell_m).astype(np.float32)
-    best = np.full((height, width), cap_m * cap_m, dtype=np.float32)
+    best = np.full((height, width), np.inf, dtype=np.float32)
     for dj, di in ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)):
         part = (slice(pad + dj, pad + dj + height), slice(pad + di, pad + di + width))
         dx = qx[part] - at_x
@@ -93,5 +106,4 @@ def distance_field(
         dy *= dy
         dx += dy
         np.minimum(best, dx, out=best)
-    distance = np.minimum(np.sqrt(best).astype(np.float64), cap_m)
-    return DistanceField(origin, cell_m, distance, cap_m)
+    np.minimum(distance_m, np.sqrt(best), out=distance_m)

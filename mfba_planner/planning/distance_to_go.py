@@ -18,6 +18,7 @@ import numpy as np
 from ..core.geometry import Point, distance
 from ..core.option_specs import check, option
 from ..core.planner_types import NANO
+from ..perception.bilinear_grid import BilinearGrid
 from ..perception.distance_field import DistanceField, bilinear, distance_field
 from ..perception.known_map import UnclearedMap
 from ..perception.static_map import StaticMap
@@ -76,7 +77,7 @@ class DistanceToGo:
         self._computed: tuple[int, tuple[int, int], Point] | None = None
         self._to_go: Array | None = None
         self._beyond_m = 0.0
-        self._step: Array | None = None  # unit vectors of the shortest way, complex
+        self._down: BilinearGrid | None = None  # unit vectors of the shortest way, complex
         self._origin: Point = (0.0, 0.0)
         self._cell_m = 1.0
 
@@ -183,7 +184,7 @@ class DistanceToGo:
             speed[dx * dx + dy * dy < self._radius_m**2] = CLOSED
         end = cell_of(target, self._origin, self._cell_m, speed.shape)
         self._to_go = march(speed, end, self._cell_m)
-        self._step = downhill(self._to_go)
+        self._down = BilinearGrid(downhill(self._to_go), self._origin, self._cell_m)
         if self._beyond_m:
             return ""  # the map does not reach so far
         cell = (position[0] - self._origin[0]) / self._cell_m
@@ -250,15 +251,33 @@ class DistanceToGo:
             return straight
         return bilinear(self._to_go, *self._cells(x, y)) + self._beyond_m
 
-    def direction(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Unit vector of the shortest way at positions of any shape."""
-        if self.is_straight or self._to_go is None:
-            step = (self.goal[0] - x) + 1j * (self.goal[1] - y)
+    def direction(self, xy: Array) -> Array:
+        """Unit vectors (2, m) of the shortest way at positions (2, m)."""
+        if self.is_straight or self._down is None:
+            step: Array = np.array(self.goal)[:, None] - xy
+            step /= np.sqrt(step[0] * step[0] + step[1] * step[1]) + 1e-12
+            return step
+        down = self._down.at(xy)
+        down /= np.abs(down) + 1e-12
+        return down.view(np.float64).reshape(-1, 2).T
+
+    def line(self, position: Point, step_m: float, steps: int) -> list[Point]:
+        """Points along the shortest way, one per step, relative to its begin."""
+        x, y, found = *position, []
+        for _ in range(steps):
+            ux, uy = self.direction_at(x, y)
+            x, y = x + step_m * ux, y + step_m * uy
+            found.append((x - position[0], y - position[1]))
+        return found
+
+    def direction_at(self, x: float, y: float) -> Point:
+        """direction() at one position."""
+        if self.is_straight or self._down is None:
+            step = complex(self.goal[0] - x, self.goal[1] - y)
         else:
-            assert self._step is not None
-            step = bilinear(self._step, *self._cells(x, y))
-        step = step / (np.abs(step) + 1e-12)
-        return step.real, step.imag
+            step = self._down.at_one(x, y)
+        length = math.sqrt(step.real * step.real + step.imag * step.imag) + 1e-12
+        return step.real / length, step.imag / length
 
     def _cells(self, x: Array, y: Array) -> tuple[Array, Array]:
         assert self._to_go is not None

@@ -22,7 +22,7 @@ from .base_planner import Move, blocked
 from .blocked_headings import BlockedHeadings, PlaceCheck
 from .differential_drive import Speeds
 from .distance_to_go import RouteParams, is_clear
-from .map_rollout import FORBIDDEN_M, SLOW_ROOM_M, SLOWEST, MapRollout
+from .map_rollout import FORBIDDEN_M, MapRollout
 from .map_search import FoundWaypoint, MapSearch
 from .mode_transitions import Event
 from .obstacles_at_rest import STOPPING_TICKS, ObstaclesAtRest
@@ -30,6 +30,7 @@ from .planner_params import PlannerParams
 from .stopping_path import clear_velocity
 from .trajectory_cost import RiskParams
 from .turn_delay import TurnDelay
+from .turning_rollout import SLOW_ROOM_M, SLOWEST
 
 Array = np.ndarray
 
@@ -159,8 +160,8 @@ class MapPlanning:
     def path_heading_rad(self, pose: Pose2D) -> float:
         """Direction of the shortest way in odom, after move() has not returned None."""
         (x, y), turn = self._in_map(pose.position)
-        ux, uy = self.search.to_go.direction(np.array([x]), np.array([y]))
-        return math.atan2(float(uy[0]), float(ux[0])) - turn
+        ux, uy = self.search.to_go.direction_at(x, y)
+        return math.atan2(uy, ux) - turn
 
     def _refine(self, center: Point, evaluate: Evaluate, stamp_ns: int) -> Found | None:
         """A search around a waypoint; None without an optimiser."""

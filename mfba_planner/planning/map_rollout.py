@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,35 +20,16 @@ from ..core.robot_base import Base
 from ..perception.distance_field import DistanceField
 from .differential_drive import Speeds
 from .distance_to_go import DistanceToGo
-from .drive_rollout import COARSE_TICKS, LONGEST, REACHED_M
-from .trajectory_cost import SLOW, RiskParams
+from .drive_rollout import LONGEST
+from .trajectory_cost import RiskParams
+from .turning_rollout import TIGHT_M, Paths, TurningRollout, speed_share
 
 Array = np.ndarray
 
 CONTACT_M = 0.02  # beyond the robot's radius: the end of a wall is seen a beam too short
 CLOSE_M = 1.0  # cost of a pass beside what stands without clearance
 FORBIDDEN_M = 1000.0  # cost of a contact before the waypoint with what stands
-CARROT_M = 0.4  # a differential base aims so far ahead along the shortest way
-SLOW_ROOM_M, SLOWEST = 0.15, 0.4  # room below which a differential base slows down, and to what
-TIGHT_M, PIVOT_RAD = 0.04, 0.15  # with so little room it turns in place, to within so much
-FINE_STEPS = 12  # of a differential base, of one tick; then come those of COARSE_TICKS
 _ROUNDING = 1.0 - 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class Paths:
-    """Positions (m, t + 1), duration of the steps (t,), driving time and steps to waypoints.
-
-    slowed_m: how far a differential base stays behind until the waypoint by slowing down near what
-    stands; the distance to go counts it after that.
-    """
-
-    x: Array
-    y: Array
-    step_s: Array
-    driven_s: Array  # (m, t + 1)
-    arrived: Array  # (m,) number of the step that ends at the waypoint
-    slowed_m: Array  # (m,)
 
 
 class MapRollout:
@@ -82,6 +63,7 @@ class MapRollout:
             away = (rows[:, 0] - position[0]) ** 2 + (rows[:, 1] - position[1]) ** 2
             rows = rows[away < reach * reach]
         self._circles = rows
+        self._turning: TurningRollout | None = None
 
     @property
     def alone(self) -> bool:
@@ -95,158 +77,70 @@ class MapRollout:
         """
         horizon_s = horizon_s or self._horizon_s
         if self._base.turns:
-            return self._turning(qx, qy, t1, horizon_s)
+            return self._of_the_base().paths(qx, qy, t1, horizon_s)
         if self.alone:
-            return self._straight(qx, qy, t1)
-        (px, py), h, full = self._position, self._tick_s, self._full
-        m = qx.size
+            return self._straight(qx, qy)
+        h, full, m = self._tick_s, self._full, qx.size
         steps = math.ceil(horizon_s / h)
-        longest = math.ceil(
-            (horizon_s + float((t1 - np.sqrt(qx * qx + qy * qy) / full).max())) / h
-        )
+        length_m = np.sqrt(qx * qx + qy * qy)
+        longest = math.ceil((horizon_s + float((t1 - length_m / full).max())) / h)
         steps = min(max(steps, longest), math.ceil(LONGEST * horizon_s / h))
-        xs, ys = np.empty((m, steps + 1)), np.empty((m, steps + 1))
-        driven = np.zeros((m, steps + 1))
-        x, y = np.full(m, px), np.full(m, py)
-        qx, qy = qx + px, qy + py
-        first_m = np.sqrt((qx - px) ** 2 + (qy - py) ** 2) / t1 * h
-        arrived = np.full(m, steps)
-        on_first = np.ones(m, dtype=bool)
-        gx, gy = self._to_go.goal
-        xs[:, 0], ys[:, 0] = x, y
+        here = np.array(self._position)[:, None]
+        at, waypoint = np.repeat(here, m, axis=1), np.stack((qx, qy)) + here
+        xy, driven_m = np.empty((steps + 1, 2, m)), np.empty((steps, m))
+        first_m = length_m / t1 * h
+        reached_m = first_m * (1.0 + 1e-9)
+        arrived, on_first = np.full(m, steps), np.ones(m, dtype=bool)
+        goal = np.array(self._to_go.goal)[:, None]
+        xy[0] = at
         any_first, any_second = True, False
         for k in range(steps):
             if any_first:
-                dx, dy = qx - x, qy - y
-                left = np.sqrt(dx * dx + dy * dy)
-                scale = 1.0 / np.maximum(left, 1e-12)
-                dx, dy, length = dx * scale, dy * scale, np.minimum(first_m, left)
+                step = waypoint - at
+                left_m = np.sqrt(step[0] * step[0] + step[1] * step[1])
+                step /= np.maximum(left_m, 1e-12)
+                step_m = np.minimum(first_m, left_m)
             if any_second:
-                ax, ay = self._to_go.direction(x, y)
-                goal_x, goal_y = gx - x, gy - y
-                on_m = np.minimum(full * h, np.sqrt(goal_x * goal_x + goal_y * goal_y))
+                on, to_goal = self._to_go.direction(at), goal - at
+                on_m = np.sqrt(to_goal[0] * to_goal[0] + to_goal[1] * to_goal[1])
+                np.minimum(on_m, full * h, out=on_m)
                 if any_first:
-                    ax, ay = np.where(on_first, dx, ax), np.where(on_first, dy, ay)
-                    on_m = np.where(on_first, length, on_m)
-                dx, dy, length = ax, ay, on_m
-            x, y = x + length * dx, y + length * dy
-            xs[:, k + 1], ys[:, k + 1] = x, y
-            driven[:, k + 1] = driven[:, k] + length / full
+                    on, on_m = np.where(on_first, step, on), np.where(on_first, step_m, on_m)
+                step, step_m = on, on_m
+            at = at + step_m * step
+            xy[k + 1], driven_m[k] = at, step_m
             if any_first:
-                reached = on_first & (left <= first_m * (1.0 + 1e-9))
-                arrived[reached] = k + 1
-                on_first &= ~reached
-                any_first, any_second = bool(on_first.any()), not on_first.all()
-        return Paths(xs, ys, np.full(steps, h), driven, arrived, np.zeros(m))
+                reached = on_first & (left_m <= reached_m)
+                if reached.any():
+                    arrived[reached] = k + 1
+                    on_first &= ~reached
+                    any_first, any_second = bool(on_first.any()), True
+        driven_s = np.zeros((steps + 1, m))
+        np.cumsum(driven_m / full, axis=0, out=driven_s[1:])
+        return Paths(xy[:, 0].T, xy[:, 1].T, np.full(steps, h), driven_s.T, arrived, np.zeros(m))
 
-    def _straight(self, qx: Array, qy: Array, t1: Array) -> Paths:
+    def _straight(self, qx: Array, qy: Array) -> Paths:
         """The straight lines to the waypoints alone."""
         length = np.sqrt(qx * qx + qy * qy)
         step_m = self._full * self._tick_s
         steps = max(math.ceil(float(length.max()) / step_m), 1)
-        share = np.linspace(0.0, 1.0, steps + 1)
-        (px, py), driven = self._position, length[:, None] * share / self._full
+        # By steps of a tick, so that no other waypoint has a say in where a path is looked at.
+        on_m = np.minimum(np.arange(steps + 1) * step_m, length[:, None])
+        share = on_m / np.maximum(length, 1e-12)[:, None]
+        (px, py), arrived = self._position, np.ceil(length / step_m).astype(int)
         x, y = px + qx[:, None] * share, py + qy[:, None] * share
         step_s = np.full(steps, self._tick_s)
-        m = qx.size
-        return Paths(x, y, step_s, driven, np.full(m, steps), np.zeros(m))
+        return Paths(x, y, step_s, on_m / self._full, arrived, np.zeros(qx.size))
 
-    def _turning(self, qx: Array, qy: Array, t1: Array, horizon_s: float) -> Paths:
-        base, full, (px, py) = self._base, self._full, self._position
-        accel, alpha = base.max_accel_mps2, base.max_turn_accel_radps2
-        fastest, first_rad = base.max_turn_radps, base.turn_first_rad
-        if self._is_tight():  # as stopping_path.clear_velocity will
-            first_rad = min(first_rad, PIVOT_RAD)
-        held_s = self._tick_s  # a command's
-        m = qx.size
-        left = max(math.ceil(LONGEST * horizon_s / held_s) - FINE_STEPS, 0)
-        coarse = [COARSE_TICKS * held_s] * math.ceil(left / COARSE_TICKS)
-        step_s = np.array([held_s] * FINE_STEPS + coarse)
-        steps, t = step_s.size, 0.0
-        xs, ys = np.empty((m, steps + 1)), np.empty((m, steps + 1))
-        driven, slowed_m = np.zeros((m, steps + 1)), np.zeros(m)
-        x, y, yaw = np.full(m, px), np.full(m, py), np.full(m, self._yaw)
-        v, omega = np.full(m, self._speeds.v), np.full(m, self._speeds.omega)
-        first = np.sqrt(qx * qx + qy * qy) / (t1 * full)
-        qx, qy = qx + px, qy + py
-        waits, waiting_mps = first < SLOW, full * first
-        any_waits = bool(waits.any())
-        longest_wait_s = float(t1[waits].max()) if any_waits else 0.0
-        gx, gy = self._to_go.goal
-        arrived = np.full(m, steps)
-        on_first = np.ones(m, dtype=bool)
-        fastest_mps = max(full, abs(self._speeds.v))
-        braking_m = fastest_mps * (held_s + 0.5 * fastest_mps / accel)
-        farthest_m = fastest_mps * float(step_s.sum()) + braking_m
-        near_goal = (gx - px) ** 2 + (gy - py) ** 2 < farthest_m * farthest_m
-        xs[:, 0], ys[:, 0] = x, y
-        for k, h in enumerate(step_s.tolist()):
-            most, most_turn = accel * h, alpha * h
-            dx, dy = qx - x, qy - y
-            if not self.alone and not on_first.all():
-                ax, ay = self._to_go.direction(x, y)
-                dx = np.where(on_first, dx, CARROT_M * ax)
-                dy = np.where(on_first, dy, CARROT_M * ay)
-            error = np.arctan2(dy, dx) - yaw
-            error = np.remainder(error + math.pi, 2.0 * math.pi) - math.pi
-            back = np.abs(error) > 0.5 * math.pi if base.reverse else None
-            if back is not None and back.any():
-                error = np.where(back, np.remainder(error, 2.0 * math.pi) - math.pi, error)
-                error = np.where(error > math.pi, error - 2.0 * math.pi, error)
-            else:
-                back = None
-            off = np.abs(error)
-            turn = np.copysign(np.minimum(_brake(off, alpha, held_s), fastest), error)
-            room = self._clearance.at(x, y) - self._radius_m
-            share = np.minimum(np.maximum(room / SLOW_ROOM_M, SLOWEST), 1.0)
-            wanted = full * share
-            if any_waits and t < longest_wait_s:
-                wanted = np.where(waits & (t < t1), waiting_mps, wanted)
-            if near_goal:
-                goal_x, goal_y = gx - x, gy - y
-                goal_m = np.sqrt(goal_x * goal_x + goal_y * goal_y)
-                wanted = np.minimum(wanted, _brake(goal_m, accel, held_s))
-            wanted = wanted * np.maximum(1.0 - off / first_rad, 0.0)
-            if back is not None:
-                wanted = np.where(back, -wanted, wanted)
-            before, v = v, v + np.minimum(np.maximum(wanted - v, -most), most)
-            change = v - before
-            mean = v - 0.5 * change * np.abs(change) / most
-            before, omega = (
-                omega,
-                omega + np.minimum(np.maximum(turn - omega, -most_turn), most_turn),
-            )
-            change = omega - before
-            mean_turn = omega - 0.5 * change * np.abs(change) / most_turn
-            middle = yaw + 0.5 * mean_turn * h
-            x, y, yaw = (
-                x + mean * np.cos(middle) * h,
-                y + mean * np.sin(middle) * h,
-                yaw + mean_turn * h,
-            )
-            xs[:, k + 1], ys[:, k + 1] = x, y
-            ahead_m = np.abs(mean) * h
-            driven[:, k + 1] = driven[:, k] + ahead_m / full
-            slowed_m += np.where(on_first, ahead_m * (1.0 / share - 1.0), 0.0)
-            t += h
-            if on_first.any():
-                reach = np.maximum(REACHED_M, np.abs(v) * h)
-                dx, dy = qx - x, qy - y
-                ended = dx * dx + dy * dy < reach * reach
-                if any_waits:
-                    ended = np.where(waits, t >= t1, ended)
-                reached = on_first & ended
-                arrived[reached] = k + 1
-                on_first &= ~reached
-            if not on_first.any() if self.alone else float(driven[:, k + 1].min()) >= horizon_s:
-                steps = k + 1
-                break
-        arrived, n = np.minimum(arrived, steps), steps + 1
-        xs, ys, driven = xs[:, :n], ys[:, :n], driven[:, :n]
-        if self.alone:  # beyond its waypoint a path does not count, however long the others are
-            ends = np.minimum(np.arange(n), arrived[:, None])
-            xs, ys, driven = (np.take_along_axis(a, ends, axis=1) for a in (xs, ys, driven))
-        return Paths(xs, ys, step_s[:steps], driven, arrived, slowed_m)
+    def _of_the_base(self) -> TurningRollout:
+        """The rollout of a differential base."""
+        if self._turning is None:
+            share = speed_share(self._clearance, self._radius_m)
+            self._turning = TurningRollout(
+                self._base, self._position, self._yaw, self._speeds, self._full, self._tick_s,
+                self._to_go, share, self._is_tight(), self.alone,
+            )  # fmt: skip
+        return self._turning
 
     def _is_tight(self) -> bool:
         px, py = self._position
@@ -315,8 +209,11 @@ class MapRollout:
         worst: Array = found.max(axis=(0, 2))
         return worst
 
-
-def _brake(remaining: Array, deceleration: float, held_s: float) -> Array:
-    """differential_drive.brake() of many distances."""
-    root: Array = np.sqrt(held_s * held_s + 2.0 * remaining / deceleration)
-    return deceleration * (root - held_s)
+    def touches(self, qx: Array, qy: Array, risk: RiskParams) -> Array:
+        """Whether something is touched on the straight lines (m,), at full speed: bits (m,)."""
+        paths = self._straight(qx, qy)
+        horizon_s = max(float(paths.driven_s[:, -1].max()), 0.1)
+        brief = replace(risk, horizon_s=horizon_s, close_m=0.0, fast_close_s=0.0)
+        standing = self.standing_risk(paths, brief, CONTACT_M) >= FORBIDDEN_M
+        found: Array = standing | (self.moving_risk(paths, brief) > 0.0)
+        return found

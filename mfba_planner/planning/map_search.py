@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,12 +22,13 @@ from .trajectory_cost import RiskParams
 from .turn_delay import TurnDelay
 
 Array = np.ndarray
+Candidates = tuple[Array, Array, Array]  # (m,) x, y (m, relative to the robot), t1 (s)
 
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of waypoints, in reach_m
 WAITS_S = (0.4, 1.0, 2.0)
 SPEEDS = (1e-6, 0.5)
 LEAST_SHARE = 0.5  # of the speed, where nothing moves
-BATCH, GROWTH = 40, 3  # candidates evaluated at once; more if the first do not suffice
+BATCH, GROWTH = 40, 10
 MARGIN_M = 0.1  # beside what stands, in which a path costs more
 WINDOW_M = 6.5  # side of the square in which clearances are known
 _STEP_M = 0.1
@@ -68,6 +68,7 @@ class MapSearch:
         self._qy = (self._sin[:, None] * lengths).ravel()
         self._length = np.tile(lengths, headings)
         self._clearance: tuple[int, DistanceField] | None = None
+        self._was_free = True  # the last decision's way: of no influence but on time
 
     def clearance(self, known: StaticMap, position: Point, stamp_ns: int) -> DistanceField:
         """Distances to what stands around the robot."""
@@ -94,41 +95,28 @@ class MapSearch:
         refine: a search around a waypoint; it returns None if there is none.
         """
         evaluate = _Evaluation(rollout, position, risk, speed_mps, self.to_go, turn_delay)
-        (px, py), to_go = position, self.to_go
-        here = float(to_go.at(np.array([px]), np.array([py]))[0])
+        to_go = self.to_go
+        here = float(to_go.at(np.array([position[0]]), np.array([position[1]]))[0])
         ahead = self._ahead(position)
         if observed is not None:
-            drivable = observed[self._headings(*np.array(ahead).T)]
-            ahead = [q for q, ok in zip(ahead, drivable.tolist()) if ok] or ahead
-        ax, ay = np.array(ahead).T
-        at = np.maximum(np.sqrt(ax * ax + ay * ay) / speed_mps, tick_s)
-        best, best_cost = (ahead[0], float(at[0])), math.inf
-        if observed is None or drivable.any():
-            cost, harm = evaluate(ax, ay, at)
-            k = int(cost.argmin())
-            best, best_cost = (ahead[k], float(at[k])), float(cost[k])
-            if harm[k] <= 0.0:
-                return FoundWaypoint(*best, best_cost, here, (), (), True)
-        qx, qy, t = self._candidates(best[0], speed_mps, tick_s, last, waits=not rollout.alone)
+            ahead = [q for q in ahead if observed[self._headings(*np.array([q]).T)[0]]]
+        ax, ay = np.array(ahead).reshape(-1, 2).T
+        on = (ax, ay, np.maximum(np.sqrt(ax * ax + ay * ay) / speed_mps, tick_s))
+        best = _Best(evaluate, on)
+        if self._was_free and best.take_ahead():
+            return FoundWaypoint(*best.waypoint, best.cost, here, (), (), True)
+        qx, qy, t = self._candidates(ahead, speed_mps, tick_s, last, waits=not rollout.alone)
         if observed is not None:
             kept = observed[self._headings(qx, qy)]
             qx, qy, t = qx[kept], qy[kept], t[kept]
-        lower = np.sqrt(qx * qx + qy * qy) + to_go.at(qx + px, qy + py)
-        lower += risk.waiting * (speed_mps * t - np.sqrt(qx * qx + qy * qy))
+        length = np.sqrt(qx * qx + qy * qy)
+        lower = length + to_go.at(qx + position[0], qy + position[1])
+        lower += risk.waiting * (speed_mps * t - length)
         order = np.argsort(lower, kind="stable")
-        start, size = 0, BATCH
-        while start < order.size:
-            batch = order[start : start + size]
-            start, size = start + size, GROWTH * size
-            if lower[batch[0]] >= best_cost:
-                break
-            cost, _ = evaluate(qx[batch], qy[batch], t[batch])
-            k = int(cost.argmin())
-            if cost[k] < best_cost:
-                best_cost = float(cost[k])
-                i = int(batch[k])
-                best = ((float(qx[i]), float(qy[i])), float(t[i]))
-        closed = self._closed(evaluate, speed_mps, observed)
+        self._was_free = best.take(order, lower, (qx, qy, t))
+        if self._was_free:
+            return FoundWaypoint(*best.waypoint, best.cost, here, (), (), True)
+        closed = self._closed(rollout, risk, observed)
 
         def costs(points: list[Vector]) -> list[float]:
             x, y = np.array(points).T
@@ -139,14 +127,14 @@ class MapSearch:
             values: list[float] = cost.tolist()
             return values
 
-        refined = refine(best[0], costs)
+        refined = refine(best.waypoint[0], costs)
         asked: tuple[Point, ...] = ()
         if refined is not None:
             asked = tuple((x, y) for x, y in refined.candidates)
-            if refined.best_value < best_cost:
-                (x, y), best_cost = refined.best_x, refined.best_value
-                best = ((x, y), max(math.hypot(x, y) / speed_mps, tick_s))
-        return FoundWaypoint(*best, best_cost, here, closed, asked, False)
+            if refined.best_value < best.cost:
+                (x, y), best.cost = refined.best_x, refined.best_value
+                best.waypoint = ((x, y), max(math.hypot(x, y) / speed_mps, tick_s))
+        return FoundWaypoint(*best.waypoint, best.cost, here, closed, asked, False)
 
     def _headings(self, x: Array, y: Array) -> Array:
         """Index (k,) of the heading nearest to each direction."""
@@ -164,12 +152,7 @@ class MapSearch:
             away = math.sqrt(dx * dx + dy * dy)
             part = min(1.0, self._reach_m / max(away, 1e-9))
             return [(dx * part, dy * part)]
-        x, y = np.array([position[0]]), np.array([position[1]])
-        path = []
-        for _ in range(round(self._reach_m / _STEP_M)):
-            ux, uy = to_go.direction(x, y)
-            x, y = x + _STEP_M * ux, y + _STEP_M * uy
-            path.append((float(x[0]) - position[0], float(y[0]) - position[1]))
+        path = to_go.line(position, _STEP_M, round(self._reach_m / _STEP_M))
         ends = np.array(path)
         share = np.linspace(0.0, 1.0, 26)[1:]
         xs = position[0] + ends[:, :1] * share
@@ -183,25 +166,76 @@ class MapSearch:
         return [path[k] for k in sorted(found)]
 
     def _candidates(
-        self, ahead: Point, speed_mps: float, tick_s: float, last: Point | None, waits: bool
-    ) -> tuple[Array, Array, Array]:
+        self,
+        ahead: list[Point],
+        speed_mps: float,
+        tick_s: float,
+        last: Point | None,
+        waits: bool,
+    ) -> Candidates:
         qx, qy, t = self._qx, self._qy, self._length / speed_mps
-        length = math.hypot(*ahead) or 1.0
-        ux, uy = ahead[0] / length * speed_mps, ahead[1] / length * speed_mps
-        extra = [(ux * s * w, uy * s * w, w) for s in SPEEDS for w in WAITS_S if waits]
+        extra = []
+        for x, y in ahead if waits else ():
+            length = math.hypot(x, y) or 1.0
+            ux, uy = x / length * speed_mps, y / length * speed_mps
+            extra += [(ux * s * w, uy * s * w, w) for s in SPEEDS for w in WAITS_S]
         if last is not None:
             extra.append((*last, max(math.hypot(*last) / speed_mps, tick_s)))
         ex, ey, et = np.array(extra).reshape(-1, 3).T
         return np.concatenate((ex, qx)), np.concatenate((ey, qy)), np.concatenate((et, t))
 
-    def _closed(self, evaluate: _Evaluation, speed_mps: float, observed: Array | None) -> Bits:
+    def _closed(self, rollout: MapRollout, risk: RiskParams, observed: Array | None) -> Bits:
         """Bits: 1 for a heading whose shortest waypoint is not reached without contact."""
-        length = LENGTHS[0] * self._reach_m
-        t = np.full(self._n, length / speed_mps)
-        closed = evaluate.contact(length * self._cos, length * self._sin, t)
+        length_m = LENGTHS[0] * self._reach_m
+        closed = rollout.touches(length_m * self._cos, length_m * self._sin, risk)
         if observed is not None:
             closed |= ~observed
         return tuple(closed.astype(int).tolist())
+
+
+class _Best:
+    """The cheapest of many waypoints, in few calls: one costs more than all its waypoints.
+
+    The points ahead, along the shortest way, come first: if the cheapest of them is without risk,
+    it is taken. Where the last decision took none of them, they are evaluated with others.
+    """
+
+    def __init__(self, evaluate: _Evaluation, ahead: Candidates) -> None:
+        """ahead: the points ahead."""
+        self._evaluate, self._ahead = evaluate, ahead
+        self.waypoint, self.cost = ((0.0, 0.0), 0.0), math.inf
+
+    def take_ahead(self) -> bool:
+        """Whether a point ahead is free; it is the best then."""
+        ahead, self._ahead = self._ahead, (np.empty(0),) * 3
+        return bool(ahead[0].size) and self._take(ahead, ahead[0].size)
+
+    def take(self, order: Array, lower: Array, others: Candidates) -> bool:
+        """take_ahead(), unless it was, and the others, in order of their least possible costs."""
+        done, size = 0, BATCH
+        while done < order.size or self._ahead[0].size:
+            batch = order[done : done + size]
+            done, size = done + size, order.size
+            first = self._ahead[0].size
+            if not first and lower[batch[0]] >= self.cost:
+                break
+            both = [np.concatenate((a, b[batch])) for a, b in zip(self._ahead, others)]
+            self._ahead = (np.empty(0),) * 3
+            if self._take((both[0], both[1], both[2]), first):
+                return True
+        return False
+
+    def _take(self, found: Candidates, first: int) -> bool:
+        """Evaluate; whether the cheapest of the first few is without risk."""
+        x, y, t1 = found
+        cost, risk = self._evaluate(x, y, t1)
+        k = int(cost[:first].argmin()) if first else 0
+        free = first > 0 and bool(risk[k] <= 0.0)
+        if not free:
+            k = int(cost.argmin())
+        if free or cost[k] < self.cost:
+            self.waypoint, self.cost = ((float(x[k]), float(y[k])), float(t1[k])), float(cost[k])
+        return free
 
 
 class _Evaluation:
@@ -238,13 +272,3 @@ class _Evaluation:
             slow = length < LEAST_SHARE * np.minimum(speed * t1, math.hypot(gx - px, gy - py))
             cost[slow] += FORBIDDEN_M
         return cost, harm
-
-    def contact(self, qx: Array, qy: Array, t1: Array) -> Array:
-        """Whether the way to each waypoint touches something."""
-        paths = self._rollout.paths(qx, qy, t1, float(t1.max()))
-        horizon_s = max(float(t1.max()), 0.1)
-        brief = replace(self._risk, horizon_s=horizon_s, close_m=0.0, fast_close_s=0.0)
-        standing = self._rollout.standing_risk(paths, brief, MARGIN_M) >= FORBIDDEN_M
-        moving = self._rollout.moving_risk(paths, brief) > 0.0
-        touches: Array = standing | moving
-        return touches

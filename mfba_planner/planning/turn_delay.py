@@ -9,6 +9,8 @@ import numpy as np
 
 from ..core.robot_base import Base
 
+Array = np.ndarray
+
 
 class TurnDelay:
     """The time lost by turning first, against a base that drives in any direction at once.
@@ -35,9 +37,21 @@ class TurnDelay:
         rate = self._turn if error >= 0.0 else -self._turn
         return self._lost_s(abs(error), rate)
 
-    def towards_all(self, ux: np.ndarray, uy: np.ndarray) -> np.ndarray:
+    def towards_all(self, ux: Array, uy: Array) -> Array:
         """towards() of many directions, each (m,)."""
-        return np.array([self.towards(x, y) for x, y in zip(ux.tolist(), uy.tolist())])
+        error = np.remainder(np.arctan2(uy, ux) - self._yaw + math.pi, 2.0 * math.pi) - math.pi
+        if self._reverse:
+            turned = np.remainder(error, 2.0 * math.pi) - math.pi
+            error = np.where(np.abs(error) > 0.5 * math.pi, turned, error)
+        rate = np.where(error >= 0.0, self._turn, -self._turn)
+        error, alpha, fastest = np.abs(error), self._alpha, self._fastest
+        peak = np.sqrt(alpha * error + 0.5 * rate * rate)
+        held = np.maximum(peak * peak - fastest * fastest, 0.0) / (alpha * fastest)
+        took = np.maximum((2.0 * np.minimum(peak, fastest) - rate) / alpha + held, 0.0)
+        small = took * 0.5 * error / self._first
+        lost: Array = np.maximum(took - self._last_s, 0.0) + self._last_s / 3.0
+        lost[took == 0.0] = 0.0
+        return np.where(error <= self._first, small, lost)
 
     def between(self, ux: float, uy: float, vx: float, vy: float) -> float:
         """Seconds lost between driving in the direction (ux, uy) and in (vx, vy)."""

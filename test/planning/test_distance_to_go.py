@@ -36,8 +36,10 @@ def followed(to_go: DistanceToGo, start: Point, length_m: float) -> np.ndarray:
     x, y = np.array([start[0]]), np.array([start[1]])
     path = [(start[0], start[1])]
     for _ in range(round(length_m / 0.02)):
-        ux, uy = to_go.direction(x, y)
+        ux, uy = to_go.direction(np.stack((x, y)))
         assert math.hypot(float(ux[0]), float(uy[0])) == pytest.approx(1.0)
+        one = to_go.direction_at(float(x[0]), float(y[0]))
+        assert one == pytest.approx((float(ux[0]), float(uy[0])))
         x, y = x + 0.02 * ux, y + 0.02 * uy
         path.append((float(x[0]), float(y[0])))
         if math.dist(path[-1], to_go.goal) < 0.3:
@@ -73,7 +75,7 @@ def test_in_view_of_the_goal_it_is_the_straight_line(x: float, y: float, gy: flo
     assert not to_go.is_straight
     expected = math.dist((x, y), goal)
     assert at(to_go, (x, y)) == pytest.approx(expected, rel=ROUND, abs=CELL_M)
-    ux, uy = to_go.direction(np.array([x]), np.array([y]))
+    ux, uy = to_go.direction(np.array([[x], [y]]))
     cosine = (float(ux[0]) * (6.0 - x) + float(uy[0]) * (gy - y)) / expected
     assert cosine > math.cos(math.radians(15.0))
 
@@ -166,7 +168,7 @@ def test_where_the_robot_does_not_fit_it_stays_finite() -> None:
         assert math.isfinite(found)
         x, y = np.meshgrid(np.linspace(-20.0, 20.0, 41), np.linspace(-20.0, 20.0, 41))
         assert np.isfinite(to_go.at(x, y)).all()
-        assert np.hypot(*to_go.direction(x, y)).max() < 1.0 + 1e-9
+        assert np.hypot(*to_go.direction(np.stack((x.ravel(), y.ravel())))).max() < 1.0 + 1e-9
     for to_go in (inside, outside):
         assert at(to_go, START) > 4.0 + 5.0, "a closed ring is no way"
 
@@ -215,7 +217,7 @@ def test_once_the_line_is_clear_it_is_straight_again() -> None:
     to_go.update(SECOND_NS + 1, known, (2.6, 0.0), (4.0, 0.0))
     assert to_go.is_straight
     assert at(to_go, START) == 4.0
-    ux, uy = to_go.direction(np.array([4.0, 0.0]), np.array([-2.0, 0.0]))
+    ux, uy = to_go.direction(np.array([[4.0, 0.0], [-2.0, 0.0]]))
     assert [*ux.tolist(), *uy.tolist()] == pytest.approx([0.0, 1.0, 1.0, 0.0])
 
 
