@@ -45,6 +45,7 @@ _COARSE_M = 0.05  # where beams are farther apart, tracks that may move are not 
 _FEWEST_HITS, _BRIEF_S = 3.0, 2.0  # points seen less often are dropped so long after
 _STANDING_HITS = 6.0  # points seen so often stand, whatever a track seems to do
 _YOUNG_S = 4.0  # a moving circle takes younger points with it
+_BEGIN_S = 0.3  # after the first scan
 _ESTABLISHED_S = 1.0  # scans are matched to points that are older
 _STILL_M = 5e-4  # points are not moved by less
 _ALIKE = 0.3  # cosine between normals of the same surface
@@ -78,7 +79,8 @@ class StaticMap:
         self._free = FreeSpace(_LAGS_S, _MARGIN_M)
         self._observed = ObservedCells(p.size_m)
         self._stamp_ns: int | None = None
-        self._time_s = 0.0
+        self._time_s = self._begin_s = 0.0
+        self._surely_moves = False  # something, by the last scan
         self._origin: Point = (0.0, 0.0)
         self._field: tuple[int, DistanceField] | None = None
         self._present: Array = np.empty((0, 2))
@@ -90,7 +92,7 @@ class StaticMap:
         for part in (self._points, self._moving, self._free, self._observed):
             part.clear()
         self._matching.reset()
-        self._stamp_ns, self._field = None, None
+        self._stamp_ns, self._field, self._begin_s = None, None, self._time_s
         self.version += 1
 
     @property
@@ -137,6 +139,7 @@ class StaticMap:
         coarse_m = _COARSE_M / beams.spacing_rad
         kept_out = fast & (surely | (dx * dx + dy * dy > coarse_m * coarse_m))
         moving, surely = moving[kept_out], moving[fast & surely]
+        self._surely_moves = surely.shape[0] > 0
         found = surfaces(beams)
         changed = False
         self._present = self._ends = np.empty((0, 2))
@@ -333,8 +336,10 @@ class StaticMap:
 
     def _established(self) -> Array:
         data = self._points.data
-        old: Array = data[FIRST] <= self._time_s - self.params.establish_s
-        return old
+        until_s = self._time_s - self.params.establish_s
+        if not self._surely_moves and self._time_s >= self._begin_s + _BEGIN_S:
+            until_s = max(until_s, self._begin_s)  # the first scan's: who moves is known so soon
+        return np.asarray(data[FIRST] <= until_s)
 
     def distance_field(self, center: Point, window_m: float, cell_m: float) -> DistanceField:
         """Distances to the nearest present point in a square, in the map's frame.

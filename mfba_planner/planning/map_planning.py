@@ -118,7 +118,7 @@ class MapPlanning:
             if is_clear(known, position, near, room_m) and not self._is_beside(position):
                 self._place.reset()
                 return None
-        points = known.present_points() if params.turns else known.contact_points()
+        points = known.contact_points()
         away = np.sqrt(((points - position) ** 2).sum(axis=1))
         clearance = self.search.clearance(known, position, obs.pose_ns)
         circles = self._not_in_map(circles, position)
