@@ -216,8 +216,9 @@ class _Best:
         while done < order.size or self._ahead[0].size:
             batch = order[done : done + size]
             done, size = done + size, order.size
+            batch = batch[lower[batch] < self.cost]
             first = self._ahead[0].size
-            if not first and lower[batch[0]] >= self.cost:
+            if not first and not batch.size:
                 break
             both = [np.concatenate((a, b[batch])) for a, b in zip(self._ahead, others)]
             self._ahead = (np.empty(0),) * 3
