@@ -35,7 +35,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
-        (f"{SHARE}/config", glob("config/*.yaml")),
+        (f"{SHARE}/config", glob("config/*.yaml") + glob("config/*.xml")),
         (f"{SHARE}/config/scenarios", glob("config/scenarios/*.yaml")),
         (f"{SHARE}/launch", glob("launch/*launch.*")),
         (f"{SHARE}/layout", glob("layout/*")),

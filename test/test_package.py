@@ -252,7 +252,7 @@ def test_installs_every_shipped_file_in_its_place(distribution: Any) -> None:
     placed = {path: target for target, paths in distribution.data_files for path in paths}
     shipped = {
         relative(path)
-        for pattern in ("package.xml", "config/**/*.yaml", "launch/*.launch.*", "layout/*")
+        for pattern in ("package.xml", "config/**/*.*ml", "launch/*.launch.*", "layout/*")
         for path in ROOT.glob(pattern)
     }
     assert {"config/scenarios/case1.yaml", "launch/simulate.launch.py"} <= shipped

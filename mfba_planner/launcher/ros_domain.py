@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..core.errors import GraphError
+from ..core.shipped_files import config_path
 from .ros_environment import ignored_settings, private_environment, require_isolating_middleware
 
 # Domains above 101 map to ports that Linux gives to any program. Each process starts its search
@@ -83,6 +84,11 @@ def private_domain(note: Callable[[str], None] = _print_note) -> Iterator[int]:
     if ignored := ignored_settings():
         note(f"ignored, since a run is private: {', '.join(ignored)}")
     domain, lock = claim_domain()
-    variables = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    variables = {
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        # The name that these versions of Fast DDS read.
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(config_path("private_discovery.xml")),
+    }
     with lock, private_environment(variables):
         yield domain

@@ -59,7 +59,8 @@ def ignored_settings() -> list[str]:
 def private_environment(variables: Mapping[str, str]) -> Iterator[None]:
     """Set variables for this process and its children, without IGNORED_VARIABLES."""
     variables = {**variables, SKIP_XML: "1"}
-    previous = {name: os.environ.pop(name, None) for name in (*variables, *IGNORED_VARIABLES)}
+    names = dict.fromkeys((*variables, *IGNORED_VARIABLES))
+    previous = {name: os.environ.pop(name, None) for name in names}
     os.environ.update(variables)
     try:
         yield

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from launched_programs import complete
@@ -134,9 +135,31 @@ def test_what_would_open_a_private_domain_is_removed_meanwhile_and_named(
     monkeypatch.setenv(name, "anything")
     notes: list[str] = []
     with private_domain(notes.append):
-        assert name not in os.environ
+        assert os.environ.get(name, "") != "anything"
+        assert (name in os.environ) == (name == "FASTRTPS_DEFAULT_PROFILES_FILE")
     assert os.environ[name] == "anything"
     assert notes == [f"ignored, since a run is private: {name}"]
+
+
+def test_nodes_of_a_private_run_announce_themselves_often(domain_id: int) -> None:
+    """The profile is taken by the middleware: it names what it cannot read, and then goes on."""
+    with private_domain() as domain:
+        profile = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
+        root = ElementTree.parse(profile).getroot()
+        found = {e.tag.rpartition("}")[2]: (e.text or "").strip() for e in root.iter()}
+        assert (found["count"], found["nanosec"]) == ("20", "50000000")
+        code = "import rclpy; rclpy.init(); rclpy.create_node('a'); rclpy.shutdown()"
+        env = {**os.environ, "RCUTILS_LOGGING_USE_STDOUT": "0"}
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
+        )
+        assert done.stdout + done.stderr == ""
+        broken = {**env, "FASTRTPS_DEFAULT_PROFILES_FILE": __file__}
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=broken, capture_output=True, text=True, check=True
+        )
+        assert __file__ in done.stdout, "what is read is what the variable names"
+    assert domain != domain_id
 
 
 def test_a_profile_in_the_working_directory_is_not_read(
