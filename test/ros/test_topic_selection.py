@@ -177,6 +177,19 @@ def test_which_subscribers_are_awaited(line: str, wanted: dict[str, int] | None)
     assert awaited(played, settings, resolve) == wanted
 
 
+@pytest.mark.parametrize(("scans", "needed"), [(0, {"/obstacles"}), (3, {"/scan"})])
+def test_a_sensor_reads_scans_or_else_obstacles(scans: int, needed: set[str]) -> None:
+    settings = parse(["bag", "--as-fast-as-possible", "--inputs-of", "virtual_sensor"])
+    recorded = {
+        "/odom": topic("/odom", "nav_msgs/msg/Odometry"),
+        "/obstacles": topic("/obstacles", "geometry_msgs/msg/PoseArray"),
+    }
+    if scans:
+        recorded["/scan"] = topic("/scan", "sensor_msgs/msg/LaserScan")
+    played, _ = choose(recorded, settings, resolve)
+    assert set(awaited(played, settings, resolve) or {}) == {"/odom", *needed}
+
+
 def test_only_played_topics_can_be_awaited() -> None:
     settings = parse(["bag", "--wait-for-subscribers", "odm"])
     played, _ = choose({"/odom": topic("/odom")}, settings, resolve)

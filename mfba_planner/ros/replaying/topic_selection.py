@@ -125,8 +125,14 @@ def awaited(
         return dict.fromkeys(names, int(given[0]))
     if given:
         return dict.fromkeys(known(map(resolve, given), names, "--wait-for-subscribers"), 1)
-    # Not every planner reads a map, and one that does gets it whenever it subscribes.
-    needed = [name for name in names if name != resolve(topics.MAP.name)]
+    # Not every planner reads a map, and one that does gets it whenever it subscribes. Where there
+    # are scans, the sensor reads these and not the obstacles.
+    never = {resolve(topics.MAP.name)}
+    if any(
+        topic.recorded == resolve(topics.SCAN.name) and topic.message_count for topic in played
+    ):
+        never.add(resolve(topics.OBSTACLES.name))
+    needed = [name for name in names if name not in never]
     return dict.fromkeys(needed, 1) if settings.inputs_of else {}
 
 
