@@ -13,7 +13,7 @@ from ..core.geometry import Point, Pose2D, rotated
 
 MOST_CIRCLES = 16
 FARTHEST_M = 100.0  # of a centre from base_link on each axis, and the largest radius
-_ROUNDING_M = 1e-7
+_ROUNDING_M, _SAME_M = 1e-7, 1e-12
 _REMEDY = "give [x, y, radius] in base_link, m"
 
 
@@ -94,7 +94,7 @@ def inscribed_radius_m(footprint: Footprint) -> float:
 
 def _nearest(circle: FootprintCircle) -> list[Point]:
     """The point of a circle's edge that is nearest to base_link; if all are, one of them."""
-    if circle.offset_m == 0.0:
+    if circle.offset_m < _SAME_M:
         return [(circle.radius, 0.0)]
     share = 1.0 - circle.radius / circle.offset_m
     return [(share * circle.x, share * circle.y)]
@@ -103,7 +103,7 @@ def _nearest(circle: FootprintCircle) -> list[Point]:
 def _intersections(a: FootprintCircle, b: FootprintCircle) -> list[Point]:
     dx, dy = b.x - a.x, b.y - a.y
     square = dx * dx + dy * dy
-    if square == 0.0:
+    if square < _SAME_M * _SAME_M:
         return []
     share = 0.5 * (1.0 + (a.radius * a.radius - b.radius * b.radius) / square)
     beside = a.radius * a.radius / square - share * share

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from trip_samples import trip
 
@@ -86,6 +86,8 @@ def test_the_radius_within_is_that_of_the_circles_together() -> None:
 
 
 @given(footprint=CIRCLES, share=st.floats(0.0, 1.0), heading_rad=st.floats(-3.2, 3.2))
+@example(footprint=[(0.0, 2e-162, 0.5)], share=0.0, heading_rad=0.0)
+@example(footprint=[(0.0, 2e-11, 0.5), (0.0, -2e-11, 0.4)], share=1.0, heading_rad=1.5)
 def test_the_disc_within_is_covered(
     footprint: list[tuple[float, float, float]], share: float, heading_rad: float
 ) -> None:
