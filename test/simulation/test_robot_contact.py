@@ -228,6 +228,9 @@ def test_one_circle_in_the_middle_is_a_disc() -> None:
     found, expected = steps(middle, *poses), steps(disc, *poses)
     assert found.gaps_with_walls_m == pytest.approx(expected.gaps_with_walls_m, abs=1e-12)
     assert found.contact_s == pytest.approx(expected.contact_s)
+    assert found.walls is not None
+    assert expected.walls is not None
+    assert found.walls.contact_s == pytest.approx(expected.walls.contact_s)
     assert found.distance_m.tolist() == expected.distance_m.tolist()
 
 

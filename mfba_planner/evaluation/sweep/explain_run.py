@@ -91,7 +91,7 @@ def _contact_step(episode: Episode, index: int, number: int) -> str:
     )
     return (
         f"contact: in the step after tick {index} ({time_s:.2f} s)"
-        + (f", {ttc:.2f} s into it" if math.isfinite(ttc) else "")
+        + (f", {ttc:.2f} s into it" if math.isfinite(ttc) and not _swings(episode, index) else "")
         + f"; {at_tick}"
     )
 
@@ -191,6 +191,12 @@ def _gap(episode: Episode, index: int, number: int) -> float:
     return episode.scenario.gap_m(
         tick.pose, center, episode.scenario.obstacles[number - 1].radius_m
     )
+
+
+def _swings(episode: Episode, index: int) -> bool:
+    """Whether the circles of a footprint move on curves in the step after a tick."""
+    yaws = {tick.pose.yaw for tick in episode.ticks[index : index + 2]}
+    return bool(episode.scenario.robot.footprint_m) and len(yaws) > 1
 
 
 def _moves(episode: Episode, index: int) -> bool:
