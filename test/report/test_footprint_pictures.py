@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from browser import Browser
 from matplotlib.figure import Figure
@@ -78,7 +79,7 @@ def test_the_picture_shows_them_at_the_closest_pass(episode: Episode) -> None:
     assert len(circles(figure)) == 2
     assert "robot" in [label for _, label in legend.entries(figure.axes[0])]
     (line,) = [a for a in figure.axes[0].lines if a.get_gid() == "pass:1"]
-    assert line.get_xydata().ravel().tolist() == pytest.approx([1.0, -0.5, 1.0, -0.6], abs=1e-6)
+    assert np.ravel(line.get_xydata()).tolist() == pytest.approx([1.0, -0.5, 1.0, -0.6], abs=1e-6)
     disc = replace(episode, scenario=replace(episode.scenario, robot=Robot()))
     assert circles(run_figure(disc)) == []
 
