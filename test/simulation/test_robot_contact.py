@@ -263,7 +263,7 @@ def test_a_turn_in_place_between_two_ticks_is_a_contact() -> None:
     assert steps(clear, *poses).walls.gap_m[0] == pytest.approx(0.01, abs=2 * CURVE_M)  # type: ignore[union-attr]
 
 
-def test_the_yaw_turns_the_shorter_way() -> None:
+def test_the_yaw_takes_the_shorter_turn() -> None:
     behind = world([(0.6, 0.0, 0.1)], (Obstacle(center_m=(-0.8, 0.0), radius_m=0.1),))
     found = steps(behind, (0.0, 0.0, 3.0), (0.0, 0.0, -3.0))
     assert found.gap_m[0, 0] == pytest.approx(0.0, abs=2 * CURVE_M)
