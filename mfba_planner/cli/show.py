@@ -140,9 +140,15 @@ def _time_limit(limit_s: float) -> Iterator[None]:
 
 
 def _oracle_lines(completed: CompletedRun, setting: Setting) -> Iterator[str]:
-    solution = solve(completed.episode.scenario, setting.params.speed_mps)
+    scenario = completed.episode.scenario
+    solution = solve(scenario, setting.params.speed_mps)
     length = f", {solution.length_m:.3f} m" if solution.waypoints else ""
-    why = f" ({solution.reason})" if with_triggers(completed.episode.scenario) else ""
+    why = ""
+    if scenario.robot.footprint_m:
+        disc = f"for the disc of {scenario.robot_radius_m:.3g} m around the footprint"
+        why = f" ({solution.reason or disc})"
+    elif with_triggers(scenario):
+        why = f" ({solution.reason})"
     yield f"oracle: {solution.certificate.value} at {solution.speed_mps:g} m/s{length}{why}"
 
 

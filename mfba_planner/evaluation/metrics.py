@@ -14,8 +14,9 @@ import numpy as np
 from ..core.geometry import Pose2D, distance
 from ..core.planner_types import NANO, Decision, Mode
 from ..planning.odometry_jump import is_odometry_jump
-from ..simulation.batched_motion import Array, Motion, StepClearances
+from ..simulation.batched_motion import Array, StepClearances
 from ..simulation.episode import Episode, Outcome
+from ..simulation.robot_contact import RobotContact
 from .contacts_and_clearances import DrivenPath, ObstaclePasses, RunMotion
 
 BLOCK = 512  # ticks
@@ -77,7 +78,7 @@ class MetricsAccumulator:
     def __init__(self, run: Episode) -> None:
         """Start before the first tick. Uses scenario and parameters of run, not its ticks."""
         self._run = run
-        self._motion = Motion(run.scenario)
+        self._contact = RobotContact(run.scenario)
         self._block: list[Decision] = []
         self._evaluated = 0  # ticks of the block already evaluated: 1 or 0
         self._first: Decision | None = None
@@ -149,8 +150,8 @@ class MetricsAccumulator:
         if self._modes.total() != 1:
             return self._passes
         at_rest = ObstaclePasses()
-        times_s, positions_m = self._times_and_positions([self._block[0]] * 2)
-        at_rest.add(self._motion.steps(times_s, positions_m), times_s, np.zeros(1))
+        times_s, poses = self._times_and_poses([self._block[0]] * 2)
+        at_rest.add(self._contact.steps(times_s, poses), times_s, np.zeros(1))
         return at_rest
 
     def _evaluate_block(self) -> None:
@@ -160,11 +161,11 @@ class MetricsAccumulator:
             return
         driven = np.array([not is_odometry_jump(tick.reason) for tick in ticks[1:]], dtype=bool)
         self._extend_path(ticks[self._evaluated :])
-        times_s, positions_m = self._times_and_positions(ticks)
-        steps = self._motion.steps(times_s, positions_m)
-        near = steps.distance_m - self._motion.radius_m <= self._run.sensor.sensing_range_m
+        times_s, poses = self._times_and_poses(ticks)
+        steps = self._contact.steps(times_s, poses)
+        near = steps.distance_m - self._contact.disc.radius_m <= self._run.sensor.sensing_range_m
         self._encounters.update(dict.fromkeys(np.argwhere(near)[:, 1].tolist()))
-        dx, dy = np.diff(positions_m)
+        dx, dy = np.diff(poses[:2])
         moved_m = np.sqrt(dx * dx + dy * dy)
         starts_s = times_s[:-1]
         if not driven.all():  # a kidnapping adds no length and no contact
@@ -188,10 +189,10 @@ class MetricsAccumulator:
                 first = number
         self._path.add([tick.pose.position for tick in ticks[first:]])
 
-    def _times_and_positions(self, ticks: list[Decision]) -> tuple[Array, Array]:
-        """Times (K,) and positions (2, K) of ticks."""
+    def _times_and_poses(self, ticks: list[Decision]) -> tuple[Array, Array]:
+        """Times (K,) and poses (3, K) of ticks."""
         times_s = [self._run.time_s(tick.stamp_ns) for tick in ticks]
-        return np.array(times_s), np.array([tick.pose.position for tick in ticks]).T
+        return np.array(times_s), np.array([tick.pose for tick in ticks]).T
 
 
 def steps_driven(episode: Episode) -> list[tuple[Decision, Decision]]:
@@ -212,15 +213,15 @@ def tick_clearances(episode: Episode) -> list[list[float]]:
 
     In a scenario with wall segments the last column is the gap to the nearest of them.
     """
-    steps, motion = steps_driven(episode), Motion(episode.scenario)
+    steps, contact = steps_driven(episode), RobotContact(episode.scenario)
     moments = [*(a for a, _ in steps), steps[-1][1]]
     times_s = np.array([episode.time_s(tick.stamp_ns) for tick in moments])
-    positions_m = np.array([tick.pose.position for tick in moments]).T
-    gaps_m = motion.steps(times_s, positions_m).gaps_with_walls_m
+    poses = np.array([tick.pose for tick in moments]).T
+    gaps_m = contact.steps(times_s, poses).gaps_with_walls_m
     for k, (_, b) in enumerate(steps):
         if is_odometry_jump(b.reason):  # the next step starts elsewhere
-            at_rest_m = positions_m[:, [k, k]]
-            gaps_m[k] = motion.steps(times_s[k : k + 2], at_rest_m).gaps_with_walls_m[0]
+            at_rest = poses[:, [k, k]]
+            gaps_m[k] = contact.steps(times_s[k : k + 2], at_rest).gaps_with_walls_m[0]
     return [[float(gap) for gap in row] for row in gaps_m]
 
 

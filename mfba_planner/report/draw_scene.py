@@ -46,7 +46,7 @@ def draw_scene(
         _track(ax, episode, view, obstacle, moment)
         _obstacle(ax, episode, obstacle, moment)
         if moment.number in encountered:
-            _connect(ax, moment)
+            _connect(ax, episode, moment)
     for index, tick in enumerate(encounter_ticks(episode)):
         if is_finite(tick.pose.position):
             _ring(ax, episode, index, tick)
@@ -118,10 +118,20 @@ def _obstacle(ax: Axes, episode: Episode, obstacle: Obstacle, moment: Pass) -> N
     patch(ax, edge, f"enlarged:{moment.number}")
 
 
-def _connect(ax: Axes, moment: Pass) -> None:
-    """A line from the robot's centre to the enlarged edge; a point if they touch."""
-    heading = bearing(moment.robot_m, moment.center_m)
-    ends = [moment.robot_m, towards(moment.robot_m, heading, max(0.0, moment.gap_m))]
+def _connect(ax: Axes, episode: Episode, moment: Pass) -> None:
+    """A line from the robot's centre to the enlarged edge; a point if they touch.
+
+    With a footprint its circles, and a line from the edge of the nearest one to the obstacle's.
+    """
+    center, reach_m = moment.robot.position, 0.0
+    if episode.scenario.robot.footprint_m:
+        circles = episode.scenario.robot_circles(moment.robot)
+        for own, radius in circles:
+            body = Circle(own, radius, zorder=Z_OBSTACLE, **style.ROBOT)
+            patch(ax, body, f"robot:{moment.number}")
+        center, reach_m = min(circles, key=lambda c: distance(c[0], moment.center_m) - c[1])
+    heading = bearing(center, moment.center_m)
+    ends = [towards(center, heading, far) for far in (reach_m, reach_m + max(0.0, moment.gap_m))]
     line(ax, ends, f"pass:{moment.number}", zorder=Z_MARK, markevery=[0], **style.PASS)
 
 

@@ -53,8 +53,8 @@ def draw_robot(ax: Axes, episode: Episode, index: int) -> None:
     draw_sectors(ax, position, reach, tick.vs, "closing" if ring.of_headings else "set", ring)
     patch(ax, Circle(position, reach, fill=False, zorder=Z_RING, **style.RING), "reach")
     draw_path(ax, replace(episode, ticks=episode.ticks[: index + 1]))
-    radius = episode.scenario.robot_radius_m
-    patch(ax, Circle(position, radius, zorder=Z_ROBOT, **style.ROBOT), "robot")
+    for center, radius in episode.scenario.robot_circles(tick.pose):
+        patch(ax, Circle(center, radius, zorder=Z_ROBOT, **style.ROBOT), "robot")
 
 
 def draw_track(ax: Axes, episode: Episode, index: int, number: int) -> None:

@@ -248,8 +248,9 @@ class _RunLogger:
     def _log_robot(self, tick: Decision) -> None:
         rr, position = self.rr, (tick.pose.x, tick.pose.y, 0.0)
         color = _rgb(style.MODE_COLOURS[tick.mode])
-        radius_m = self.scenario.robot_radius_m
-        body = rr.Points3D([position], radii=radius_m, colors=color, labels=self.label)
+        circles = self.scenario.robot_circles(tick.pose)
+        centers, radii = [_flat(center) for center, _ in circles], [r for _, r in circles]
+        body = rr.Points3D(centers, radii=radii, colors=color, labels=[self.label])
         self._log("world/robot", body)
         reach = self.episode.sensor.sensing_range_m
         self._log(

@@ -9,7 +9,7 @@ from itertools import groupby
 
 import numpy as np
 
-from mfba_planner.core.geometry import Point, distance
+from mfba_planner.core.geometry import Point, Pose2D, distance, wrap_angle
 from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.evaluation.metrics import steps_driven, tick_clearances
 from mfba_planner.simulation.episode import Episode
@@ -35,7 +35,7 @@ class Pass:
 
     number: int
     time_s: float
-    robot_m: Point
+    robot: Pose2D
     center_m: Point
     gap_m: float
 
@@ -82,22 +82,28 @@ def closest_passes(episode: Episode) -> list[Pass]:
 def _closest_within(episode: Episode, index: int, step: int) -> Pass:
     """Search between two ticks: uniform motion of robot and obstacle, except for bounces."""
     a, b = steps_driven(episode)[step]
-    (ax, ay), (bx, by) = a.pose.position, b.pose.position
+    (ax, ay, yaw), (bx, by, later_yaw) = a.pose, b.pose
+    turn = wrap_angle(later_yaw - yaw) if math.isfinite(later_yaw - yaw) else math.nan
     ta, tb = episode.time_s(a.stamp_ns), episode.time_s(b.stamp_ns)
     moments = (
-        _pass(episode, index, ta + s * (tb - ta), (ax + s * (bx - ax), ay + s * (by - ay)))
+        _pass(
+            episode,
+            index,
+            ta + s * (tb - ta),
+            Pose2D(ax + s * (bx - ax), ay + s * (by - ay), yaw + s * turn),
+        )
         for s in np.linspace(0.0, 1.0, _INTERVALS + 1).tolist()
     )
     return min(moments, key=lambda moment: moment.gap_m)
 
 
-def _pass(episode: Episode, index: int, time_s: float, robot_m: Point) -> Pass:
+def _pass(episode: Episode, index: int, time_s: float, robot: Pose2D) -> Pass:
     obstacle = episode.scenario.obstacles[index]
     center = center_at(obstacle, time_s, episode.scenario.walls)
-    gap = distance(robot_m, center) - episode.scenario.enlarged_radius(obstacle)
+    gap = episode.scenario.gap_m(robot, center, obstacle.radius_m)
     if not is_present(obstacle, time_s):
         gap = math.inf
-    return Pass(number=index + 1, time_s=time_s, robot_m=robot_m, center_m=center, gap_m=gap)
+    return Pass(number=index + 1, time_s=time_s, robot=robot, center_m=center, gap_m=gap)
 
 
 def track(obstacle: Obstacle, walls: Walls | None, t0_s: float, t1_s: float) -> list[Point]:

@@ -6,13 +6,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
 from ..core.option_specs import override
 from ..core.segments import Segment
+from ..simulation.footprint import parse_footprint
 from ..simulation.obstacle_motion import Obstacle, Turn, Walls
 from ..simulation.recorded_motion import Knot
 from ..simulation.robot_model import Robot
@@ -23,6 +24,7 @@ EXAMPLE = "compare config/scenarios/case1.yaml"
 
 
 LIMIT = 1e6  # no number in a scenario is larger
+FOOTPRINT = "footprint_m"  # of a robot, left out where it is a disc
 # Keys of an obstacle that are left out where unused.
 OPTIONAL = ("turns", "trajectory", "loop", "stays", "appears_s", "vanishes_s", "trigger")
 TRIGGER = ("within_m", "point_m", "absent_before")  # of a trigger, the last one if true
@@ -34,6 +36,8 @@ def scenario_to_dict(scenario: Scenario) -> dict[str, Any]:
     # Unused keys are left out, as recordings compare scenarios as text.
     if scenario.robot == Robot():
         del plain["robot"]
+    elif not scenario.robot.footprint_m:
+        del plain["robot"]["footprint_m"]
     if not scenario.kidnappings:
         del plain["kidnappings"]
     if not scenario.robots:
@@ -63,12 +67,17 @@ def scenario_to_json(scenario: Scenario) -> str:
 
 
 def parse_robot(options: dict[str, Any]) -> Robot:
-    """The robot from options of simulation.robot_model, nested or dotted.
+    """The robot from options of simulation.robot_model, nested or dotted, and its footprint_m.
 
     Raises ConfigError for an unknown option or a bad value.
     """
+    single = {name: value for name, value in options.items() if name != FOOTPRINT}
     try:
-        return override(Robot(), dict(_dotted(options)))
+        for name in single:
+            if "footprint" in str(name):
+                raise ConfigError(f"{name}: unknown option; did you mean {FOOTPRINT!r}?")
+        footprint = parse_footprint(options.get(FOOTPRINT, []))
+        return replace(override(Robot(), dict(_dotted(single))), footprint_m=footprint)
     except ConfigError as error:
         raise ConfigError(f"robot.{error}") from None
 

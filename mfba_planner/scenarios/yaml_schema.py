@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from ..core.errors import ConfigError
 from ..core.option_specs import did_you_mean
+from ..simulation.footprint import circumscribed_radius_m
 from ..simulation.obstacle_motion import Obstacle, Trigger, Turn, Walls
 from ..simulation.scenario import FleetRobot, Kidnapping, Scenario
 from ..simulation.triggered_motion import with_trigger
@@ -148,17 +149,19 @@ class _Scenario(Place, _Strict):
         return found
 
     def build(self, directory: Path) -> Scenario:
-        walls = self.walls
+        walls, robot, radius_m = self.walls, parse_robot(self.robot), self.robot_radius_m
+        if robot.footprint_m and "robot_radius_m" not in self.model_fields_set:
+            radius_m = circumscribed_radius_m(robot.footprint_m)
         return Scenario(
             name=self.name,
             description=self.description,
             start_m=self.start_m,
             goal_m=self.goal_m,
-            robot_radius_m=self.robot_radius_m,
+            robot_radius_m=radius_m,
             obstacles=tuple(obstacle.build() for obstacle in self.obstacles),
             walls=Walls(lower_m=walls.lower_m, upper_m=walls.upper_m) if walls else None,
             time_limit_s=self.time_limit_s,
-            robot=parse_robot(self.robot),
+            robot=robot,
             kidnappings=tuple(kidnapping.build() for kidnapping in self.kidnappings),
             robots=tuple(member.build() for member in self.robots),
             segments_m=self.segments(directory, self.positions()),
@@ -170,7 +173,8 @@ _MEANINGS = {
     "description": "purpose, in a sentence",
     "start_m": "start of the robot, m",
     "goal_m": "goal of the robot, m",
-    "robot_radius_m": "added to every obstacle (Fig. 4), m",
+    "robot_radius_m": "added to every obstacle (Fig. 4), m; with a footprint at least the radius "
+    "around it, which is the default",
     "obstacles": "circles at rest or moving",
     "walls": "a rectangle that reflects obstacles; the robot may cross it",
     "time_limit_s": "simulated time after which the run fails, s",
@@ -192,7 +196,8 @@ _MEANINGS = {
     "point_m": "the point; left out, the centre of the obstacle at its t = 0, m",
     "absent_before": "it is absent before it starts, instead of standing there",
     "at_s": "simulated time since the start, s",
-    "robot": "base, lidar and noise, where they differ from the paper",
+    "robot": "base, lidar and noise, where they differ from the paper, and footprint_m: "
+    "circles [x, y, radius] in base_link, m",
     "kidnappings": "times at which the robot is moved elsewhere, sorted by time",
     "to_m": "position it is moved to, m",
     "lower_m": "corner with the smaller x and y, m",

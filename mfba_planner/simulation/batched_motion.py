@@ -46,11 +46,15 @@ class StepClearances:
 class Motion:
     """The motion of all obstacles of one scenario, evaluated at many times."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        """Build the arrays once: a row for each stretch between two turns."""
+    def __init__(self, scenario: Scenario, radius_m: float | None = None) -> None:
+        """Build the arrays once: a row for each stretch between two turns.
+
+        radius_m is that of the disc among them; None: robot_radius_m.
+        """
         self._scenario = scenario
+        self._disc_m = scenario.robot_radius_m if radius_m is None else radius_m
         obstacles, walls = scenario.obstacles, scenario.walls
-        self.radius_m = np.array([scenario.enlarged_radius(o) for o in obstacles])
+        self.radius_m = np.array([o.radius_m + self._disc_m for o in obstacles])
         stretches = [_rows_of(obstacle, walls) for obstacle in obstacles]
         rows = [row for stretch in stretches for row in stretch]
         self._since = np.array([since_s for since_s, _, _ in rows])
@@ -120,15 +124,16 @@ class Motion:
             (x0, x1), (y0, y1) = positions_m[:, k : k + 2].tolist()
             t0, t1 = times_s[k : k + 2].tolist()
             obstacle = self._scenario.obstacles[i]
-            gap[k, i] = clearance(self._scenario, obstacle, t0, t1, (x0, y0), (x1, y1))
+            gap[k, i] = clearance(
+                self._scenario, obstacle, t0, t1, (x0, y0), (x1, y1), self._disc_m
+            )
         return StepClearances(gap, contact, distance, self._walls(times_s, positions_m))
 
     def _walls(self, times_s: Array, positions_m: Array) -> WallClearances | None:
         scenario = self._scenario
         if not scenario.segments_m:
             return None
-        radius_m = scenario.robot_radius_m
-        return wall_clearances(scenario.segments, radius_m, np.diff(times_s), positions_m)
+        return wall_clearances(scenario.segments, self._disc_m, np.diff(times_s), positions_m)
 
     def _rows(self, times_s: Array, side: Literal["left", "right"] = "right") -> Array:
         """Row number of each obstacle's stretch at each time, (K, N) or (1, N).

@@ -58,10 +58,11 @@ def with_lidar(
 ) -> Scenario:
     """The same task for the robot of that perception, with changed options of Robot.
 
-    noise_m deviates ranges further. Raises ConfigError for a change that is refused.
+    Its footprint is the scenario's, as its radius is. noise_m deviates ranges further. Raises
+    ConfigError for a change that is refused.
     """
     robot = scenario.robot if name == OWN_ROBOT else LIDAR_ROBOTS[name].robot
-    robot = override(robot, changes or {})
+    robot = replace(override(robot, changes or {}), footprint_m=scenario.robot.footprint_m)
     if not robot.lidar.beams:
         robot = replace(robot, lidar=replace(robot.lidar, beams=DEFAULT_BEAMS))
     if noise_m:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated robot: drive and its limits, lidar, sensor noise."""
+"""The simulated robot: drive and its limits, footprint, lidar, sensor noise."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from ..core.errors import ConfigError
 from ..core.option_specs import check, option
 from ..core.robot_base import Base
+from .footprint import Footprint, parse_footprint
 
 FEWEST_BEAMS = 12
 DEFAULT_BEAMS = 360  # of the lidar that a robot without one gets for a planner that reads scans
@@ -105,10 +106,20 @@ class Noise:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot(Base):
-    """A base with its sensors."""
+    """A base with its sensors and its shape.
+
+    footprint_m are its circles in base_link; empty: the disc of the scenario's robot_radius_m. No
+    option of `--set` and no ROS parameter, as these are single values.
+    """
 
     lidar: Lidar = field(default_factory=Lidar)
     noise: Noise = field(default_factory=Noise)
+    footprint_m: Footprint = ()
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value out of range."""
+        Base.__post_init__(self)
+        object.__setattr__(self, "footprint_m", parse_footprint(self.footprint_m))
 
     @property
     def base(self) -> Base:

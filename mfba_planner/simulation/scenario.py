@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 from ..core.errors import ConfigError
-from ..core.geometry import Point, distance
+from ..core.geometry import Point, Pose2D, distance
 from ..core.planner_types import ROBOT_RADIUS_M
 from ..core.segments import Segment, Segments, segments_of
 from ..planning.planner_params import PlannerParams
+from .footprint import circles_at, circumscribed_radius_m, inscribed_radius_m
 from .obstacle_motion import Obstacle, Walls, center_at
 from .recorded_motion import check_motion, is_present
 from .robot_model import Robot
@@ -58,6 +59,8 @@ class Scenario:
     segments_m are static walls that the robot touches and its lidar detects; walls is a rectangle
     that obstacles bounce from and the robot may cross. Moving obstacles pass through segments.
     With robots it is the task of a fleet (fleet.py); start_m and goal_m are its first robot's.
+    robot_radius_m is what planners keep clear; with a footprint (robot.footprint_m) its circles
+    are what touches, and robot_radius_m is at least the radius around all of them.
     """
 
     name: str
@@ -87,6 +90,7 @@ class Scenario:
         """Raise ConfigError for a task that is invalid at t = 0."""
         if self.start_m == self.goal_m:
             raise ConfigError(f"goal_m={list(self.goal_m)}: equal to start_m; move one of them")
+        _check_footprint(self)
         for number, obstacle in enumerate(self.obstacles, start=1):
             motion = obstacle.trigger.motion if obstacle.trigger else obstacle
             check_motion(number, motion)
@@ -106,6 +110,16 @@ class Scenario:
         """The options of a planner, for this scenario's robot."""
         return params.for_robot(self.robot_radius_m, self.robot.base)
 
+    def robot_circles(self, pose: Pose2D) -> list[tuple[Point, float]]:
+        """(centre, radius) in metres of what the robot covers at a pose: footprint, or disc."""
+        footprint = self.robot.footprint_m
+        return circles_at(footprint, pose) if footprint else [(pose.position, self.robot_radius_m)]
+
+    def gap_m(self, pose: Pose2D, center: Point, radius_m: float) -> float:
+        """Gap between the robot's edge at a pose and a circle, edge to edge; < 0 in contact."""
+        circles = self.robot_circles(pose)
+        return min(distance(own, center) - (radius_m + radius) for own, radius in circles)
+
     def enlarged_radius(self, obstacle: Obstacle) -> float:
         """Obstacle radius plus robot radius (Fig. 4), metres."""
         return obstacle.radius_m + self.robot_radius_m
@@ -122,11 +136,28 @@ class Scenario:
         return list(zip(self.centers(t_s), map(self.enlarged_radius, self.obstacles)))
 
 
+def _check_footprint(scenario: Scenario) -> None:
+    least_m = circumscribed_radius_m(scenario.robot.footprint_m)
+    if scenario.robot_radius_m < least_m - TOUCH_M:
+        raise ConfigError(
+            f"robot_radius_m={scenario.robot_radius_m:g}: robot.footprint_m reaches "
+            f"{least_m:.12g} m from base_link; give at least that, or leave robot_radius_m out"
+        )
+
+
+def _circles_later(scenario: Scenario, point: Point) -> list[tuple[Point, float]]:
+    """What the robot surely covers at a point that it reaches with a heading not known before."""
+    footprint = scenario.robot.footprint_m
+    if footprint and scenario.robot.turns:
+        return [(point, inscribed_radius_m(footprint))]
+    return scenario.robot_circles(Pose2D(*point))
+
+
 def _check_start(scenario: Scenario, number: int, obstacle: Obstacle) -> None:
     if not is_present(obstacle, 0.0):
         return
     center = center_at(obstacle, 0.0) if obstacle.trajectory else obstacle.center_m
-    gap = distance(scenario.start_m, center) - scenario.enlarged_radius(obstacle)
+    gap = scenario.gap_m(Pose2D(*scenario.start_m), center, obstacle.radius_m)
     if gap < 0.0:
         raise ConfigError(
             f"start_m={list(scenario.start_m)}: the robot starts {-gap:.3g} m inside obstacle "
@@ -142,16 +173,21 @@ def _check_place(scenario: Scenario) -> None:
                 f"segment {number} [{x0:g}, {y0:g}, {x1:g}, {y1:g}]: of length 0; "
                 "give two different ends"
             )
-    places = [("start_m", scenario.start_m), ("goal_m", scenario.goal_m)]
-    places += [("kidnapping to_m", kidnapping.to_m) for kidnapping in scenario.kidnappings]
-    for what, point in places:
-        near = scenario.segments.near(point, scenario.robot_radius_m).distances(*point)
-        inside_m = scenario.robot_radius_m - float(near.min(initial=math.inf))
-        if inside_m > TOUCH_M:
-            raise ConfigError(
-                f"{what}={list(point)}: {inside_m:.3g} m inside a wall segment "
-                "(robot_radius_m added); move it away from the wall"
-            )
+    later = [("goal_m", scenario.goal_m)]
+    later += [("kidnapping to_m", kidnapping.to_m) for kidnapping in scenario.kidnappings]
+    start = scenario.start_m
+    places = [("start_m", start, scenario.robot_circles(Pose2D(*start)))]
+    places += [(what, point, _circles_later(scenario, point)) for what, point in later]
+    added = "robot.footprint_m" if scenario.robot.footprint_m else "robot_radius_m"
+    for what, point, circles in places:
+        for center, radius_m in circles:
+            near = scenario.segments.near(center, radius_m).distances(*center)
+            inside_m = radius_m - float(near.min(initial=math.inf))
+            if inside_m > TOUCH_M:
+                raise ConfigError(
+                    f"{what}={list(point)}: {inside_m:.3g} m inside a wall segment "
+                    f"({added} added); move it away from the wall"
+                )
 
 
 def _check_inside(number: int, obstacle: Obstacle, walls: Walls) -> None:
@@ -181,10 +217,12 @@ def _check_ascending(what: str, times_s: list[float]) -> None:
 def _check_kidnappings(scenario: Scenario) -> None:
     _check_ascending("kidnappings", [kidnapping.at_s for kidnapping in scenario.kidnappings])
     for kidnapping in scenario.kidnappings:
-        for number, (center, radius) in enumerate(scenario.enlarged(kidnapping.at_s), start=1):
-            if scenario.obstacles[number - 1].trigger:
+        circles = _circles_later(scenario, kidnapping.to_m)
+        for number, center in enumerate(scenario.centers(kidnapping.at_s), start=1):
+            obstacle = scenario.obstacles[number - 1]
+            if obstacle.trigger:
                 continue  # where it is then depends on the robot
-            gap = distance(kidnapping.to_m, center) - radius
+            gap = min(distance(own, center) - (obstacle.radius_m + r) for own, r in circles)
             if gap < 0.0:
                 raise ConfigError(
                     f"kidnapping to_m={list(kidnapping.to_m)}: {-gap:.3g} m inside obstacle "
@@ -197,6 +235,10 @@ def _check_fleet(scenario: Scenario) -> None:
     if (scenario.start_m, scenario.goal_m) != (first.start_m, first.goal_m):
         raise ConfigError(
             "robots: start_m and goal_m differ from those of the first robot; leave those two out"
+        )
+    if scenario.robot.footprint_m:
+        raise ConfigError(
+            "robots: a fleet with robot.footprint_m not supported; leave one of them out"
         )
     for what in ("walls", "kidnappings"):
         if getattr(scenario, what):

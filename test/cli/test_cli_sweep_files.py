@@ -106,3 +106,25 @@ def test_a_changed_file_is_not_mixed_with_old_results(suite: Path, capsys: Captu
     capsys.readouterr()
     assert mfba(*args) == 1
     assert "the scenario files have changed since" in capsys.readouterr().err
+
+
+def test_what_the_oracle_decides_for_a_footprint_is_said(suite: Path, capsys: Capture) -> None:
+    cart = "robot: {footprint_m: [[0.2, 0, 0.15], [0, 0, 0.15], [-0.2, 0, 0.15]]}\n"
+    beside = "segments_m: [[-1, 0.3, 4, 0.3]]\n"  # free for the circles, not for the disc
+    (suite / "1.yaml").write_text(OPEN + cart, encoding="utf-8")
+    (suite / "2.yaml").write_text(f"{OPEN.replace('open', 'wall')}{cart}{beside}", "utf-8")
+    args = ("sweep", "mine", "--planner", "straight", "--perception", "known")
+    assert mfba(*args, "--workers", "1", "--out", "out") == 0
+    with open("out/table.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["success"] for row in rows] == ["true", "true"]
+    assert [float(row["min_clearance_m"]) for row in rows] == [float("inf"), pytest.approx(0.15)]
+    capsys.readouterr()
+    for number, said in (
+        (0, "oracle: feasible at 0.785 m/s, 3.000 m (for the disc of 0.35 m around the "
+            "footprint)"),
+        (1, "oracle: undecided at 0.785 m/s (for the disc around the footprint, "
+            "start_m=[0.0, 0.0]: 0.05 m inside a wall segment"),
+    ):  # fmt: skip
+        assert mfba("show", "out", f"mine/{number}/straight/0", "--out", f"why{number}") == 0
+        assert said in capsys.readouterr().out

@@ -323,7 +323,7 @@ def test_a_pass_lies_on_the_run(speed: float, heading: float, seed: int) -> None
     (moment,) = closest_passes(episode)
     assert moment.center_m == center_at(mover, moment.time_s)
     before = [t for t in episode.ticks if episode.time_s(t.stamp_ns) <= moment.time_s + 1e-9]
-    assert math.dist(before[-1].pose.position, moment.robot_m) <= 0.3 + 1e-9
+    assert math.dist(before[-1].pose.position, moment.robot.position) <= 0.3 + 1e-9
     assert moment.gap_m >= evaluate(episode).min_clearance_m - 1e-9
 
 

@@ -36,7 +36,8 @@ class Waypoint(NamedTuple):
 class Solution:
     """The shortest trajectory found at constant speed; length inf and no waypoints without one.
 
-    length_m is an upper bound of the true optimum, straight_m a lower bound.
+    length_m is an upper bound of the true optimum, straight_m a lower bound. Of a robot with a
+    footprint trajectory and clearance are those of the disc of robot_radius_m.
     """
 
     certificate: Certificate

@@ -15,6 +15,7 @@ from ...simulation.obstacle_motion import Walls
 from ...simulation.scenario import Scenario
 from ...simulation.triggers import with_triggers
 from .distance_to_go import DistanceToGo
+from .footprint_discs import disc_around, disc_within
 from .infeasibility_proof import unreachable
 from .lattice_search import LatticeParams, lattice_paths
 from .path_check import inspect
@@ -41,23 +42,28 @@ def solve(
 
     The robot may cross Scenario.walls, as in every run, but no wall segment; inside keeps its
     centre within a rectangle (start and goal have to lie in it). Undecided where an obstacle
-    waits for a trigger. Raises ConfigError for a speed that is not above 0.
+    waits for a trigger. For a robot with a footprint it is the trajectory of the disc of
+    robot_radius_m around it, and infeasible means so for a disc within it. Raises ConfigError for
+    a speed that is not above 0.
     """
     if not (math.isfinite(speed_mps) and speed_mps > 0.0):
         raise ConfigError(f"speed_mps={speed_mps}: no speed; give a number above 0")
     if numbers := with_triggers(scenario):
-        return Solution(
-            certificate=Certificate.UNDECIDED,
-            speed_mps=speed_mps,
-            straight_m=distance(scenario.start_m, scenario.goal_m),
-            reason=f"obstacle {numbers[0]} waits for a trigger: its motion depends on the path",
-        )
-    task = _Task(scenario, speed_mps, params or SearchParams(), inside)
-    reason = ""
+        reason = f"obstacle {numbers[0]} waits for a trigger: its motion depends on the path"
+        return _undecided(scenario, speed_mps, reason)
+    of_proof: Scenario | None = scenario
+    reason = "no path found, and no proof that there is none"
+    if scenario.robot.footprint_m:
+        of_proof, reason = disc_within(scenario), _about_discs(scenario)
+        try:
+            scenario = disc_around(scenario)
+        except ConfigError as error:
+            return _undecided(scenario, speed_mps, f"for the disc around the footprint, {error}")
+    task = _Task(scenario, speed_mps, params or SearchParams(), inside, of_proof)
     for points in task.paths():
         waypoints = _timed(scenario, points, speed_mps)
-        smallest, reason = inspect(scenario, waypoints, speed_mps)
-        if not reason:
+        smallest, fault = inspect(scenario, waypoints, speed_mps)
+        if not fault:
             return Solution(
                 certificate=Certificate.FEASIBLE,
                 speed_mps=speed_mps,
@@ -65,12 +71,33 @@ def solve(
                 waypoints=waypoints,
                 clearance_m=smallest,
             )
+        reason = fault
     return Solution(
         certificate=Certificate.INFEASIBLE if task.proof else Certificate.UNDECIDED,
         speed_mps=speed_mps,
         straight_m=task.straight_m,
-        reason=task.proof or reason or "no path found, and no proof that there is none",
+        reason=task.proof or reason,
     )
+
+
+def _undecided(scenario: Scenario, speed_mps: float, reason: str) -> Solution:
+    return Solution(
+        certificate=Certificate.UNDECIDED,
+        speed_mps=speed_mps,
+        straight_m=distance(scenario.start_m, scenario.goal_m),
+        reason=reason,
+    )
+
+
+def _about_discs(scenario: Scenario) -> str:
+    """Why a task with a footprint is undecided."""
+    within = disc_within(scenario)
+    proof = (
+        "no circle of it holds base_link, so there is no proof that there is none"
+        if within is None
+        else f"no proof that there is none for the disc of {within.robot_radius_m:g} m within it"
+    )
+    return f"no path found for the disc around the footprint, and {proof}"
 
 
 def _timed(scenario: Scenario, points: np.ndarray, speed_mps: float) -> tuple[Waypoint, ...]:
@@ -92,8 +119,14 @@ class _Task:
     """State of the search in one world for one speed."""
 
     def __init__(
-        self, scenario: Scenario, speed_mps: float, params: SearchParams, inside: Walls | None
+        self,
+        scenario: Scenario,
+        speed_mps: float,
+        params: SearchParams,
+        inside: Walls | None,
+        of_proof: Scenario | None,
     ) -> None:
+        self.of_proof = of_proof  # the task whose infeasibility counts; None: there is no proof
         self.scenario, self.v, self.params, self.inside = scenario, speed_mps, params, inside
         self.straight = np.array([scenario.start_m, scenario.goal_m])
         self.straight_m = distance(scenario.start_m, scenario.goal_m)
@@ -126,8 +159,9 @@ class _Task:
         if found := self._refined(self._by_tangents(segments, horizon_s), segments):
             yield from self._compared_with_lattice(found, segments)
             return
-        moving = uniform_segments(self.scenario, limit_s)
-        self.proof = unreachable(self.scenario, self.v, moving)
+        if self.of_proof:
+            moving = uniform_segments(self.of_proof, limit_s)
+            self.proof = unreachable(self.of_proof, self.v, moving)
         if self.proof:
             return
         segments = self._segments(limit_s)

@@ -12,9 +12,9 @@ import numpy as np
 from ...core.geometry import Point, bearing, distance, wrap_angle
 from ...core.planner_types import Decision
 from ...perception.sensory_vector import bits_text
-from ...simulation.batched_motion import Motion
 from ...simulation.episode import Episode, Outcome
 from ...simulation.obstacle_motion import velocity_at
+from ...simulation.robot_contact import RobotContact
 from ..contacts_and_clearances import WALL, RunMotion
 from ..metrics import Result, assess, within_range
 from .single_run import CompletedRun
@@ -91,7 +91,7 @@ def _contact_step(episode: Episode, index: int, number: int) -> str:
     )
     return (
         f"contact: in the step after tick {index} ({time_s:.2f} s)"
-        + (f", {ttc:.2f} s into it" if math.isfinite(ttc) else "")
+        + (f", {ttc:.2f} s into it" if math.isfinite(ttc) and not _swings(episode, index) else "")
         + f"; {at_tick}"
     )
 
@@ -185,10 +185,18 @@ def _center(episode: Episode, number: int, time_s: float) -> Point:
 def _gap(episode: Episode, index: int, number: int) -> float:
     tick = episode.ticks[index]
     if number == WALL:
-        distances = episode.scenario.segments.distances(*tick.pose.position)
-        return float(distances.min()) - episode.scenario.robot_radius_m
-    center, radius = episode.scenario.enlarged(episode.time_s(tick.stamp_ns))[number - 1]
-    return distance(tick.pose.position, center) - radius
+        segments, circles = episode.scenario.segments, episode.scenario.robot_circles(tick.pose)
+        return min(float(segments.distances(*own).min()) - radius for own, radius in circles)
+    center = _center(episode, number, episode.time_s(tick.stamp_ns))
+    return episode.scenario.gap_m(
+        tick.pose, center, episode.scenario.obstacles[number - 1].radius_m
+    )
+
+
+def _swings(episode: Episode, index: int) -> bool:
+    """Whether the circles of a footprint move on curves in the step after a tick."""
+    yaws = {tick.pose.yaw for tick in episode.ticks[index : index + 2]}
+    return bool(episode.scenario.robot.footprint_m) and len(yaws) > 1
 
 
 def _moves(episode: Episode, index: int) -> bool:
@@ -201,8 +209,8 @@ def _time_to_contact(episode: Episode, index: int, number: int) -> float:
     if len(ticks) < 2:
         return math.inf
     times_s = np.array([episode.time_s(tick.stamp_ns) for tick in ticks])
-    positions = np.array([tick.pose.position for tick in ticks]).T
-    steps = Motion(episode.scenario).steps(times_s, positions)
+    poses = np.array([tick.pose for tick in ticks]).T
+    steps = RobotContact(episode.scenario).steps(times_s, poses)
     if number == WALL and steps.walls is not None:
         return float(steps.walls.contact_s[0])
     return float(steps.contact_s[0, number - 1])

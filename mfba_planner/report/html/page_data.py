@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mfba_planner.core.geometry import wrap_angle
 from mfba_planner.core.option_specs import walk
 from mfba_planner.core.planner_types import Bits, Mode
 from mfba_planner.evaluation.metrics import evaluate, tick_clearances, within_range
@@ -120,6 +121,7 @@ def run_data(
             "start": list(episode.scenario.start_m),
             "goal": list(episode.scenario.goal_m),
             "robot_radius": episode.scenario.robot_radius_m,
+            "footprint": [list(circle) for circle in episode.scenario.robot.footprint_m],
             "walls": _walls(episode),
             "segments": [_drawn(segment) for segment in episode.scenario.segments_m],
             "times": times_s,
@@ -134,6 +136,7 @@ def run_data(
             "time": [episode.time_s(tick.stamp_ns) for tick in episode.ticks],
             "x": _exact(tick.pose.x for tick in episode.ticks),
             "y": _exact(tick.pose.y for tick in episode.ticks),
+            "yaw": _yaws(episode),
             "mode": [_MODES.index(tick.mode) for tick in episode.ticks],
             "reason": [number_of[tick.reason] for tick in episode.ticks],
             "vs": [_digits(tick.vs) for tick in episode.ticks],
@@ -205,6 +208,20 @@ def clearances(episode: Episode) -> list[float]:
 def speeds(episode: Episode) -> list[float]:
     """The speed (m/s) decided at each tick."""
     return [math.hypot(*tick.velocity) for tick in episode.ticks]
+
+
+def _yaws(episode: Episode) -> list[float | None]:
+    """The heading (rad) at each tick, without a jump by a full turn; empty for a disc."""
+    if not episode.scenario.robot.footprint_m:
+        return []
+    found: list[float | None] = []
+    last = 0.0
+    for tick in episode.ticks:
+        yaw = tick.pose.yaw
+        if math.isfinite(yaw):
+            last += wrap_angle(yaw - last)
+        found.append(round(last, 4) if math.isfinite(yaw) else None)
+    return found
 
 
 def _configuration(episode: Episode) -> list[list[Any]]:

@@ -147,10 +147,11 @@ class Scene {
   drawRobot(world) {
     this.bats = this.add("g", { class: "bats" });
     this.velocity = this.add("path", { class: "velocity" });
+    const circles = world.footprint.length ? world.footprint : [[0, 0, world.robot_radius]];
     this.robot = this.add(
       "g",
       { class: "robot" },
-      svg("circle", { class: "outline", r: world.robot_radius }),
+      ...circles.map(([x, y, r]) => svg("circle", { class: "outline", cx: x, cy: -y, r })),
       svg("circle", { class: "center", r: 0.16 * world.robot_radius }),
     );
     this.waypoint = this.add("g", {}, svg("path", { class: "waypoint", d: "M0-5L5 0L0 5L-5 0Z" }));
@@ -177,7 +178,7 @@ class Scene {
       between(values[from], values[Math.min(from + 1, values.length - 1)], fraction);
     const x = at(ticks.x, k);
     const y = at(ticks.y, k);
-    this.moveTo(this.robot, x, y);
+    this.moveTo(this.robot, x, y, world.footprint.length ? at(ticks.yaw, k) : 0);
     // Sectors, gaps and waypoint are those of the tick: they are not interpolated.
     if (isNew) this.showDecision(k);
     this.moveTo(this.sensors, x, y);
@@ -189,10 +190,11 @@ class Scene {
     }
   }
 
-  moveTo(element, x, y) {
+  moveTo(element, x, y, yaw = 0) {
     const hidden = x === null || y === null;
+    const turned = yaw ? ` rotate(${(-180 / Math.PI) * yaw})` : "";
     set(element, {
-      transform: hidden ? null : `translate(${x} ${-y})`,
+      transform: hidden ? null : `translate(${x} ${-y})${turned}`,
       visibility: hidden ? "hidden" : null,
     });
   }

@@ -62,7 +62,10 @@ def world_markers(world: World, stamp_ns: int, frame_id: str) -> MarkerArray:
     """Robot, goal, wall segments, obstacles with their radii and velocity arrows."""
     robot_radius = world.scenario.robot_radius_m
     marks = [
-        _disc("robot", 0, world.pose.position, robot_radius, SKY),
+        *(
+            _disc("robot", number, center, radius, SKY)
+            for number, (center, radius) in enumerate(world.scenario.robot_circles(world.pose))
+        ),
         _disc("goal", 0, world.scenario.goal_m, 0.5 * robot_radius, GREEN),
     ]
     now = world.scenario.centers(world.time_s)

@@ -23,6 +23,7 @@ from .imported import (
     rounded,
     static_shapes,
 )
+from .rectangle_circles import rectangle_circles
 
 TIME_LIMIT_S = 120.0
 _SPEED_MPS = 1.0  # IR-SIM's default of vel_max
@@ -51,6 +52,9 @@ def read_ir_sim(source: Source, options: ImportOptions) -> Imported:
         raise ConfigError("no robot in it; give an IR-SIM world with robot and obstacle")
     found = _Found()
     robot, radius = _robot(robots[0], found)
+    if options.robot_radius_m:  # a disc instead
+        robot.pop("footprint_m", None)
+        radius = options.robot_radius_m
     count = sum(_count(entry) for entry in robots)
     if count > 1:
         found.lost["further robot"] += count - 1
@@ -67,7 +71,7 @@ def read_ir_sim(source: Source, options: ImportOptions) -> Imported:
         "description": "imported from an IR-SIM world",
         "start_m": list(options.start_m or rounded(*numbers(state, 2, "robot state"))),
         "goal_m": list(options.goal_m or rounded(*numbers(goal, 2, "robot goal"))),
-        "robot_radius_m": options.robot_radius_m or radius,
+        **({"robot_radius_m": radius} if radius else {}),
         "time_limit_s": options.time_limit_s or TIME_LIMIT_S,
         **({"robot": robot} if robot else {}),
         "obstacles": found.circles,
@@ -117,8 +121,8 @@ def _first(given: object, default: list[float]) -> object:
     return default if given is None else given
 
 
-def _robot(entry: Plain, found: _Found) -> tuple[Plain, float]:
-    """The robot's drive, limits and lidar as a scenario says them, and its radius."""
+def _robot(entry: Plain, found: _Found) -> tuple[Plain, float | None]:
+    """Drive, limits, lidar and footprint as a scenario says them, and the radius of a disc."""
     robot: Plain = {}
     kinematics = _named(entry.get("kinematics")).get("name", "diff")
     drive = _DRIVES.get(str(kinematics))
@@ -140,9 +144,11 @@ def _robot(entry: Plain, found: _Found) -> tuple[Plain, float]:
     if name == "circle":
         return robot, number(shape.get("radius", 0.2), "radius")
     if name == "rectangle":
-        found.lost["shape of the robot: the circle around its rectangle"] += 1
-        a, b = (number(shape.get(key), f"robot {key}") for key in ("length", "width"))
-        return robot, rounded(0.5 * math.hypot(a, b))[0]
+        length, width = (number(shape.get(key), f"robot {key}") for key in ("length", "width"))
+        # With a wheelbase the origin is the rear axle, else the middle.
+        ahead = 0.5 * number(shape.get("wheelbase") or 0.0, "robot wheelbase")
+        robot["footprint_m"] = rectangle_circles(length, width, ahead)
+        return robot, None
     raise ConfigError(f"robot shape {str(name)[:20]!r}: not a circle or rectangle; change it")
 
 
