@@ -201,7 +201,8 @@ def check_motion(number: int, obstacle: Moving) -> None:
     if obstacle.loop and obstacle.stays:
         raise ConfigError(f"{name} loop: with stays as well; leave one of them out")
     first, last = obstacle.trajectory[0], obstacle.trajectory[-1]
-    if obstacle.loop and last[0] - first[0] < SHORTEST_LOOP_S:
+    # 0.3 - 0.2 is a little less than 0.1.
+    if obstacle.loop and last[0] - first[0] < SHORTEST_LOOP_S * (1.0 - 1e-9):
         raise ConfigError(
             f"{name} loop: a lap of {last[0] - first[0]:g} s is shorter than {SHORTEST_LOOP_S:g} "
             "s; give a longer trajectory"

@@ -30,7 +30,12 @@ from mfba_planner.simulation.obstacle_motion import (
     velocity_at,
 )
 from mfba_planner.simulation.planner_observations import Perception
-from mfba_planner.simulation.recorded_motion import Knot, is_present, presence
+from mfba_planner.simulation.recorded_motion import (
+    SHORTEST_LOOP_S,
+    Knot,
+    is_present,
+    presence,
+)
 from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
@@ -287,6 +292,13 @@ def test_the_start_may_be_where_somebody_comes_later() -> None:
 def test_what_makes_no_sense_is_refused(changes: dict[str, object], reason: str) -> None:
     with pytest.raises(ConfigError, match=reason):
         scenario(Obstacle(center_m=(9.0, 9.0), radius_m=0.3), recorded(loop=True, **changes))
+
+
+def test_the_shortest_lap_is_taken_though_its_difference_rounds_down() -> None:
+    knots = ((0.2, 5.0, 0.0), (0.3, 5.0, 0.1))
+    assert knots[1][0] - knots[0][0] < SHORTEST_LOOP_S
+    found = scenario(recorded(loop=True, trajectory=knots, center_m=(5.0, 0.0)))
+    assert found.obstacles[0].loop
 
 
 def test_distances_at_a_knot_are_no_worse_than_rounding() -> None:
