@@ -31,7 +31,13 @@ from ..evaluation.sweep.sweep_spec import (
 )
 from ..evaluation.sweep.table import kinds_of, write
 from ..evaluation.sweep.table_columns import COLUMNS, SCENARIO, TIMINGS
-from ..launcher.set_option import add_set_argument, robot_changes, with_settings
+from ..launcher.set_option import (
+    add_optimizer_argument,
+    add_set_argument,
+    robot_changes,
+    settings_of,
+    with_settings,
+)
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD
 from ..planning.planner_registry import PLANNERS
@@ -139,6 +145,7 @@ def _parser() -> Parser:
         "--patience", type=float, default=PATIENCE_S, metavar="S",
         help="wall time, s, after which a run counts as hung (default: 60)",
     )  # fmt: skip
+    add_optimizer_argument(parser)
     add_set_argument(parser)
     parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="format of the table"
@@ -161,7 +168,7 @@ def _sweep_spec(parsed: argparse.Namespace) -> tuple[SweepSpec, list[str]]:
         setting = default_setting(name)
     default = setting.params
     planners = tuple(parsed.planners or [DEFAULT_METHOD.value])
-    robot, settings = robot_changes(parsed.settings)
+    robot, settings = robot_changes(settings_of(parsed))
     params, sensor = with_settings(default, SensorParams(), settings)
     # --set overrides every planner's own preset.
     own = {
