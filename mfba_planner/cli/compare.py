@@ -254,12 +254,16 @@ def _facts(
     return [
         f"`{command_line(parsed)}`",
         *(
-            f"{sweep.suite}: {sweep.worlds} worlds from {sweep.first} on, {sweep.seeds} seeds "
-            f"each, perception {sweep.setting.perception}, robot "
+            f"{sweep.suite}: {sweep.worlds} worlds from {sweep.first} on, {sweep.seeds} "
+            f"seed{'s' * (sweep.seeds > 1)} each, perception {sweep.setting.perception}, robot "
             f"{sweep.setting.params.speed_mps:g} m/s"
             for sweep in spec.sweeps
         ),
-        *(f"{name}: {functions.seeds} seeds" for name in functions.functions),
+        *(
+            [f"{' '.join(functions.functions)}: {functions.seeds} seeds"]
+            if functions.functions
+            else []
+        ),
         *(f"{name} {version}" for name, version in libraries.items()),
         f"sorted hash of the table `{table_hash}`",
     ]

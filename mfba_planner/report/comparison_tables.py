@@ -83,11 +83,11 @@ def tally_tables(found: Sequence[Group]) -> list[str]:
         ("functions", [group for group in found if group.is_function]),
     ):
         head = (f"in {title}", *(which.value for which in Finding))
-        lines = (
+        lines = [
             [name, *(str(counts[which]) for which in Finding)]
             for name, counts in tally(some).items()
-        )
-        blocks += [markdown(head, lines)] * bool(some)
+        ]
+        blocks += [markdown(head, lines)] * bool(lines)
     return blocks
 
 

@@ -3,11 +3,13 @@
 
 import csv
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from mfba_planner import cli
+from mfba_planner.cli import compare
 from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.evaluation.sweep import sweep_chunks
 from mfba_planner.evaluation.sweep.run_sweep import sweep
@@ -72,6 +74,26 @@ def test_rows_are_those_of_a_sweep(compared: Path) -> None:
 def test_the_same_for_two_workers(compared: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert mfba("compare", *SMALL, "--workers=2", "--out", str(out)) == 0
+    for name in SAME:
+        assert (out / name).read_bytes() == (compared / name).read_bytes(), name
+
+
+@pytest.fixture
+def scheduler() -> Iterator[str]:
+    """The address of a real cluster of two worker processes."""
+    from distributed import LocalCluster
+
+    cluster = LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+    )
+    with cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.mark.filterwarnings("default")  # warnings of dask itself
+def test_the_same_by_dask(compared: Path, tmp_path: Path, scheduler: str) -> None:
+    out = tmp_path / "out"
+    assert mfba("compare", *SMALL, "--scheduler", scheduler, "--out", str(out)) == 0
     for name in SAME:
         assert (out / name).read_bytes() == (compared / name).read_bytes(), name
 
@@ -199,6 +221,22 @@ def test_mistakes_give_one_line_and_leave_nothing(
     assert (out, err.count("\n")) == ("", 1), err
     assert reason in err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_default_is_the_whole_comparison() -> None:
+    spec, functions = compare._specs(compare._parser().parse([]))
+    names = [sweep.suite for sweep in spec.sweeps]
+    assert names == ["paper", "random-10", "random-20", "random-30", "fast-10", "rooms", "crowd"]
+    assert {(sweep.worlds, sweep.planners) for sweep in spec.sweeps} == {
+        (500, ("paper", "predictive"))
+    }
+    assert spec.budgets == functions.budgets == (25, 150, 1000)
+    assert (functions.functions, functions.seeds) == (("F1", "F2", "F3", "F4", "F5", "F6"), 500)
+    chunks = [*spec.chunks(), *functions.chunks()]
+    assert len({chunk.name for chunk in chunks}) == len(chunks)
+    presets = {arm.planner: spec.sweep_of(arm).setting.params for arm in spec.arms()}
+    # Each planner keeps its own step.
+    assert presets["paper"].step_length_m > 3 * presets["predictive"].step_length_m
 
 
 def test_functions_alone_and_suites_alone(tmp_path: Path) -> None:

@@ -78,6 +78,7 @@ def test_a_pair_is_that_of_scipy_and_corrected_by_holm() -> None:
     assert found.pairs[0].paired.losses == sum(x > y for x, y in zip(b, a))
 
 
+NO_VERDICT = "No suite has enough worlds, and runs that succeed, for a verdict."
 LENGTHS = [10.1 + 0.3 * k for k in range(12)]
 
 
@@ -103,7 +104,16 @@ def test_few_worlds_have_no_verdict() -> None:
     found = group_of(a=LENGTHS[:5], b=[x + 5.0 for x in LENGTHS[:5]], c=LENGTHS[:5])
     assert verdict(found) == "5 cases are too few for a verdict (at least 6)."
     assert {finding(found, pair) for pair in found.pairs} == {Finding.OPEN}
-    assert overall([found], "a") == "No suite has enough worlds for a verdict."
+    assert overall([found], "a") == NO_VERDICT
+    assert not tally([found])
+
+
+def test_optimizers_that_all_fail_are_not_called_equal() -> None:
+    found = group_of(a=[math.inf] * 12, b=[math.inf] * 12, c=[math.inf] * 12)
+    assert verdict(found) == "No run succeeds in any of 12 worlds: nothing to compare."
+    assert {finding(found, pair) for pair in found.pairs} == {Finding.OPEN}
+    assert not tally([found])
+    assert overall([found], "a") == NO_VERDICT
 
 
 def test_ranks_in_the_verdict() -> None:

@@ -20,8 +20,9 @@ RULES = (
     f"p < {ALPHA:.2f}. Else they are *equal* where the 95 % interval of the mean difference of "
     f"losses lies within {100 * MARGIN:g} point, and *open* where it does not: neither a "
     "difference nor equality is shown. Of functions, whose values have no common scale, "
-    f"equality is not judged. Below {FEWEST_CASES} cases everything is open. Groups are not "
-    "corrected for each other: of twenty groups without any difference one shows some."
+    f"equality is not judged. Below {FEWEST_CASES} cases, and where no run succeeds, everything "
+    "is open and not counted. Groups are not corrected for each other: of twenty groups without "
+    "any difference one shows some."
 )
 
 
@@ -34,9 +35,18 @@ class Finding(Enum):
     OPEN = "open"
 
 
+def is_judged(group: Group) -> bool:
+    """Whether a group has enough cases for findings, and runs that succeed."""
+    return group.cases >= FEWEST_CASES and not _all_fail(group)
+
+
+def _all_fail(group: Group) -> bool:
+    return not group.is_function and all(arm.loss.middle == 1.0 for arm in group.arms)
+
+
 def finding(group: Group, pair: Pair) -> Finding:
     """The finding of a pair, by the rules in RULES."""
-    if group.cases < FEWEST_CASES:
+    if not is_judged(group):
         return Finding.OPEN
     if pair.p < ALPHA:
         return Finding.BETTER if pair.effect > 0.0 else Finding.WORSE
@@ -56,6 +66,8 @@ def verdict(group: Group) -> str:
         return "No world has an optimum: nothing to compare."
     if group.cases < FEWEST_CASES:
         return f"{group.cases} cases are too few for a verdict (at least {FEWEST_CASES})."
+    if _all_fail(group):
+        return f"No run succeeds in any of {group.cases} worlds: nothing to compare."
     return " ".join([_by_ranks(group), *_by_pairs(group)])
 
 
@@ -95,9 +107,9 @@ def _by_pairs(group: Group) -> Iterator[str]:
 
 
 def tally(found: Sequence[Group]) -> dict[str, Counter[Finding]]:
-    """For each optimiser, how often which finding, over all groups with its pair."""
+    """For each optimiser, how often which finding, over all groups that are judged."""
     counts: dict[str, Counter[Finding]] = {}
-    for group in found:
+    for group in filter(is_judged, found):
         for pair in group.pairs:
             counts.setdefault(pair.optimizer, Counter())[finding(group, pair)] += 1
     return counts
@@ -105,9 +117,9 @@ def tally(found: Sequence[Group]) -> dict[str, Counter[Finding]]:
 
 def overall(found: Sequence[Group], against: str) -> str:
     """A sentence about all groups of worlds: how often the search matters, and by how much."""
-    places = [g for g in found if not g.is_function and g.cases >= FEWEST_CASES]
+    places = [g for g in found if not g.is_function and is_judged(g)]
     if not places:
-        return "No suite has enough worlds for a verdict."
+        return "No suite has enough worlds, and runs that succeed, for a verdict."
     pairs = [(g, pair) for g in places for pair in g.pairs if pair.against == against]
     of = Counter(finding(g, pair) for g, pair in pairs)
     large = sum(

@@ -45,8 +45,8 @@ def draw_ranks(groups: Sequence[Group]) -> Figure:
     sheet = Sheet(EDGE + _LABELS + _COLUMNS * _WIDE + (_COLUMNS - 1) * _GAP + EDGE, height)
     sheet.head(
         "Mean ranks of the optimisers",
-        "1 is best; bars: half the critical difference (Nemenyi, 95 %) to each side: where bars "
-        "overlap, no difference is shown",
+        "suite, planner, evaluations; 1 is best; bars: half the critical difference (Nemenyi) "
+        "to each side; where bars overlap, no difference is shown",
     )
     for number, group in enumerate(shown):
         row, column = divmod(number, _COLUMNS)
@@ -55,7 +55,8 @@ def draw_ranks(groups: Sequence[Group]) -> Figure:
         ax = sheet.axes(left, bottom, _WIDE, tall)
         _rank_panel(ax, group, names)
         ax.tick_params(length=0.0, labelleft=column == 0)
-        sheet.text(left, bottom + tall + 0.1, group.title, fontsize=style.SMALL)
+        parts = [group.suite, group.planner, str(group.budget)]
+        sheet.text(left, bottom + tall + 0.1, ", ".join(filter(None, parts)))
     return sheet.figure
 
 
