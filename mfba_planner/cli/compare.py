@@ -256,7 +256,7 @@ def _facts(
         *(
             f"{sweep.suite}: {sweep.worlds} worlds from {sweep.first} on, {sweep.seeds} "
             f"seed{'s' * (sweep.seeds > 1)} each, perception {sweep.setting.perception}, robot "
-            f"{sweep.setting.params.speed_mps:g} m/s"
+            f"{sweep.setting_of(sweep.planners[0]).params.speed_mps:g} m/s"
             for sweep in spec.sweeps
         ),
         *(

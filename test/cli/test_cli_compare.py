@@ -223,6 +223,19 @@ def test_mistakes_give_one_line_and_leave_nothing(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_setting_holds_for_every_arm_and_its_oracle(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    args = ["random-3", "--optimizer=ba", "--optimizer=none", "--budget=10", "--worlds=1"]
+    args += ["--planner=paper", "--planner=predictive", "--set=planner.speed_mps=0.5"]
+    assert mfba("compare", *args, "--workers=1", "--out", str(out)) == 0
+    assert "perception lidar, robot 0.5 m/s" in (out / "report.md").read_text(encoding="utf-8")
+    found = rows(out)
+    assert len(found) == 4
+    for row in found:
+        assert float(row["length_m"]) / float(row["time_s"]) < 0.55
+    assert len({row["optimum_m"] for row in found}) == 1
+
+
 def test_the_default_is_the_whole_comparison() -> None:
     spec, functions = compare._specs(compare._parser().parse([]))
     names = [sweep.suite for sweep in spec.sweeps]
