@@ -15,7 +15,7 @@ from mfba_planner.cli import compare
 
 SOURCE = ROOT / "docs/optimizers.md"
 PAGE = SOURCE.read_text(encoding="utf-8")
-QUICK, RESULTS = shown_commands.commands(PAGE)
+QUICK, ROOMS, RESULTS = shown_commands.commands(PAGE)
 BEGIN, END = (f"<!-- {word} generated: comparison -->" for word in ("begin", "end"))
 BLOCK = PAGE[PAGE.index(BEGIN) : PAGE.index(END)]
 
@@ -55,6 +55,8 @@ def test_sentences_and_tables_agree() -> None:
 def test_the_quick_form_runs_and_a_row_is_run_again_as_described(tmp_path: Path) -> None:
     shown_commands.mfba(shown_commands.reduced(QUICK)[1:], tmp_path)
     wanted = {"suite": "random-10", "world": "3", "optimizer": "random", "budget": "25"}
+    shown_commands.mfba(shown_commands.reduced(ROOMS)[1:], tmp_path)
+    assert [r["success"] for r in rows(tmp_path / "runs/rooms")] == ["true"] * 2
     (row,) = [r for r in rows(tmp_path / "runs/quick") if wanted.items() <= r.items()]
     iterations = 25 // 5 - 1
     shown_commands.mfba(

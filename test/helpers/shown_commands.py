@@ -46,6 +46,11 @@ REDUCED = {
         "mfba compare paper F1 --planner paper --optimizer mfba --optimizer none --optimizer ba "
         "--budget 25 --worlds 2 --runs 6 --workers 1 --update docs/optimizers.md"
     ),
+    "mfba compare rooms --planner predictive --optimizer mfba --optimizer none --budget 25 "
+    "--worlds 60 --first 80000 --out runs/rooms": (
+        "mfba compare rooms --planner predictive --optimizer mfba --optimizer none --budget 25 "
+        "--worlds 1 --first 80000 --workers 1 --no-oracle --out runs/rooms"
+    ),
     "mfba compare random-10 F5 --planner paper --optimizer mfba --optimizer random "
     "--optimizer my_swarm:ParticleSwarm --worlds 100 --runs 100 --out runs/compared": (
         "mfba compare random-10 F5 --planner paper --optimizer mfba --optimizer random "
