@@ -32,6 +32,7 @@ COMMANDS = {
     "import": "make scenario files of Gazebo worlds, recordings and other formats",
     "sweep": "run planners in many worlds, generated or your own: success, gap to the optimum",
     "show": "explain one run of a sweep: pictures, text, bag",
+    "compare": "compare optimisers in the same planners, worlds and budgets",
     "check-optimizer": "check that an optimiser keeps budget, region and seed",
     "tables": "reproduce the paper's tables: our value, printed value, verdict",
 }

@@ -6,8 +6,6 @@ from __future__ import annotations
 import argparse
 import shlex
 from collections.abc import Iterator
-from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +17,7 @@ from ..core.output_files import new_run_directory, write_same
 from ..evaluation.study.compute_chunks import check_workers
 from ..evaluation.suites import suite_names
 from ..evaluation.suites.scenario_suite import are_files, read_scenario_files
-from ..evaluation.sweep.run_sweep import SweepResult, dask_executor, open_store, sweep
+from ..evaluation.sweep.run_sweep import SweepResult, open_store, sweep
 from ..evaluation.sweep.sweep_chunks import chunks_of
 from ..evaluation.sweep.sweep_spec import (
     DEFAULT_PERCEPTION,
@@ -31,12 +29,18 @@ from ..evaluation.sweep.sweep_spec import (
 )
 from ..evaluation.sweep.table import kinds_of, write
 from ..evaluation.sweep.table_columns import COLUMNS, SCENARIO, TIMINGS
-from ..launcher.set_option import add_set_argument, robot_changes, with_settings
+from ..launcher.set_option import (
+    add_optimizer_argument,
+    add_set_argument,
+    robot_changes,
+    settings_of,
+    with_settings,
+)
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD
 from ..planning.planner_registry import PLANNERS
 from ..simulation.lidar_perception import OWN_ROBOT
-from .support.study_progress import add_work_arguments, print_status, progress
+from .support.study_progress import add_work_arguments, executor_at, print_status, progress
 
 WORLDS = 100  # of a built-in suite
 _DESCRIPTION = """Run planners in the worlds of a suite and compare them.
@@ -67,7 +71,7 @@ def main(args: list[str]) -> int:
     store = open_store(directory, spec)
     for line in left_out:
         print_status(f"left out: {line}")
-    with _executor(parsed.scheduler) as executor, progress(chunks_of(spec), directory) as done:
+    with executor_at(parsed.scheduler) as executor, progress(chunks_of(spec), directory) as done:
         swept = sweep(
             spec,
             workers=parsed.workers,
@@ -139,6 +143,7 @@ def _parser() -> Parser:
         "--patience", type=float, default=PATIENCE_S, metavar="S",
         help="wall time, s, after which a run counts as hung (default: 60)",
     )  # fmt: skip
+    add_optimizer_argument(parser)
     add_set_argument(parser)
     parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="format of the table"
@@ -161,7 +166,7 @@ def _sweep_spec(parsed: argparse.Namespace) -> tuple[SweepSpec, list[str]]:
         setting = default_setting(name)
     default = setting.params
     planners = tuple(parsed.planners or [DEFAULT_METHOD.value])
-    robot, settings = robot_changes(parsed.settings)
+    robot, settings = robot_changes(settings_of(parsed))
     params, sensor = with_settings(default, SensorParams(), settings)
     # --set overrides every planner's own preset.
     own = {
@@ -188,15 +193,6 @@ def _sweep_spec(parsed: argparse.Namespace) -> tuple[SweepSpec, list[str]]:
         own={name: preset for name, preset in own.items() if preset != params},
     )
     return spec, left_out
-
-
-@contextmanager
-def _executor(scheduler: str | None) -> Iterator[Executor | None]:
-    if scheduler is None:
-        yield None
-        return
-    with dask_executor(scheduler) as executor:
-        yield executor
 
 
 def command_line(spec: SweepSpec) -> str:

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.errors import InputError, OutputError
-from ..core.output_files import new_run_directory, write_new, write_same
+from ..core.output_files import new_run_directory, write_same
 from ..paper.study.plan import FULL, QUICK
 from ..paper.study.run import open_store
 from ..paper.tables.build_tables import SECTIONS, build, check_sections, plan
@@ -19,6 +17,7 @@ from ..report.figures.paper_figures import FIGURES, render
 from ..report.tables import html, json_and_csv, markdown
 from ..report.tables.text import Origin
 from ..scenarios.scenario_files import load_scenario
+from .support.page_blocks import read_page, replace_file
 from .support.study_progress import add_arguments, check, run_with_progress
 
 _DESCRIPTION = """Reproduce Tables 1 to 7 and compare each printed number with ours.
@@ -43,7 +42,9 @@ def main(args: list[str]) -> int:
     parsed = parser.parse(args)
     sections = check_sections(parsed.tables)
     check(parsed)
-    page = None if parsed.update is None else _read_page(parsed.update, sections)
+    page = (
+        None if parsed.update is None else read_page(parsed.update, markdown.block_names(sections))
+    )
     directory = parsed.out or new_run_directory(stem="tables")
     arguments = ["mfba", "tables", *parsed.tables, *(["--quick"] if parsed.quick else [])]
     origin = Origin(
@@ -54,7 +55,8 @@ def main(args: list[str]) -> int:
     computed = _compute_tables(sections, parsed.quick, parsed.seed, parsed.workers, directory)
     _write_forms(directory, computed, origin)
     if page is not None:
-        _replace_page(parsed.update, markdown.fill(page, markdown.blocks(computed, origin)))
+        filled = markdown.fill(page, markdown.blocks(computed, origin))
+        replace_file(parsed.update, filled.encode())
     _print_table(computed, origin)
     print(f"wrote {directory}: tables.html, tables.md, tables.csv, tables.json")
     return 0
@@ -93,33 +95,6 @@ def _figures(quick: bool) -> list[html.Picture]:
         for name, what in FIGURES.items()
         if not (quick and name == "convergence")
     ]
-
-
-def _read_page(path: Path, sections: Sequence[str]) -> str:
-    """The page's text; raises, before the long runs, if it lacks the marks of a block."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise InputError(
-            f"{path}: cannot be read ({reason.lower()}); give a Markdown page"
-        ) from None
-    markdown.fill(text, dict.fromkeys(markdown.block_names(sections), ""))
-    return text
-
-
-def _replace_page(path: Path, content: str) -> None:
-    """Replace the page atomically."""
-    new = path.with_name(f"{path.name}.new")
-    try:
-        write_new(new, content.encode())
-        os.replace(new, path)
-    except OSError as error:
-        raise OutputError(
-            f"{path}: cannot be written ({error.strerror}); give a writable page"
-        ) from None
-    finally:
-        new.unlink(missing_ok=True)
 
 
 def _print_table(sections: Sequence[Section], origin: Origin) -> None:

@@ -20,7 +20,13 @@ from ..planning.planner_params import Method
 from ..scenarios.run_config import NODES, Driver, RunConfig, with_perception
 from ..scenarios.scenario_files import load_scenario
 from ..swarm.bat_swarm import Algorithm
-from .set_option import add_set_argument, with_robot_settings, with_settings
+from .set_option import (
+    add_optimizer_argument,
+    add_set_argument,
+    settings_of,
+    with_robot_settings,
+    with_settings,
+)
 
 RECORDER = "recorder"
 # With discovery on this machine only, 32 processes find each other, later ones may not (measured
@@ -138,6 +144,7 @@ def add_world_arguments(parser: argparse.ArgumentParser, peers: Collection[str] 
         metavar="NAME",
         help=f"interpretation of the paper's eq. 3-10: {', '.join(readings_of_paper.SWARMS)}",
     )
+    add_optimizer_argument(parser)
     add_set_argument(parser)
 
 
@@ -151,7 +158,7 @@ def read_config(parsed: argparse.Namespace, **more: Any) -> RunConfig:
     algorithm_1 = any((parsed.algorithm, parsed.reading, parsed.swarm))
     planner = params_for_method(parsed.planner, planner, algorithm_1=algorithm_1)
     scenario = load_scenario(parsed.scenario)
-    robot, others = with_robot_settings(scenario.robot, parsed.settings)
+    robot, others = with_robot_settings(scenario.robot, settings_of(parsed))
     planner, sensor = with_settings(planner, SensorParams(), others)
     scenario, planner = with_perception(replace(scenario, robot=robot), planner)
     return RunConfig(

@@ -19,6 +19,8 @@ OF_ROBOT = {"robot_radius_m": "set robot_radius_m in the scenario file"} | {
     name: f"give robot.{name}" for name in flatten(Base())
 }
 
+OPTIMIZER = "planner.optimizer"
+
 
 def add_set_argument(parser: argparse.ArgumentParser) -> None:
     """Add --set, which may be repeated."""
@@ -31,6 +33,27 @@ def add_set_argument(parser: argparse.ArgumentParser) -> None:
         help="an option of planner, sensor or robot, such as planner.bat.population=30; "
         "`mfba options` lists them",
     )
+
+
+def add_optimizer_argument(parser: argparse.ArgumentParser) -> None:
+    """Add --optimizer, short for --set planner.optimizer=NAME."""
+    parser.add_argument(
+        "--optimizer", metavar="NAME", help=f"the same as --set {OPTIMIZER}=NAME (default: bats)"
+    )
+
+
+def settings_of(parsed: argparse.Namespace) -> list[str]:
+    """The settings of --set and --optimizer. Raises ConfigError where they contradict."""
+    settings: list[str] = parsed.settings
+    if parsed.optimizer is None:
+        return settings
+    wanted = f"{OPTIMIZER}={parsed.optimizer}"
+    for text in settings:
+        if text.startswith(f"{OPTIMIZER}=") and text != wanted:
+            raise ConfigError(
+                f"--optimizer {parsed.optimizer}: --set {text}; leave one of them out"
+            )
+    return [*settings, wanted]
 
 
 def with_settings(

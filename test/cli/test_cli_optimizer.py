@@ -36,6 +36,26 @@ def test_an_unknown_optimizer_is_one_line(args: list[str], line: str, capsys: Ca
     assert (out, err) == ("", f"mfba: {line}\n")
 
 
+@pytest.mark.parametrize("args", [["sim"], ["run"], ["sweep", "random-3"]])
+def test_optimizer_is_short_for_set(args: list[str], capsys: Capture) -> None:
+    assert mfba(*args, "--optimizer", "randon") == 1
+    out, err = capsys.readouterr()
+    assert (out, err) == ("", "mfba: optimizer 'randon': unknown; did you mean 'random'?\n")
+    assert mfba(*args, "--optimizer=random", "--set=planner.optimizer=grid") == 1
+    out, err = capsys.readouterr()
+    line = "--optimizer random: --set planner.optimizer=grid; leave one of them out"
+    assert (out, err) == ("", f"mfba: {line}\n")
+
+
+def test_optimizer_decides_as_its_set_does(capsys: Capture) -> None:
+    printed = []
+    same = "--set=planner.optimizer=random"
+    for args in (["--optimizer=random"], [same], ["--optimizer=random", same], []):
+        assert mfba("sim", "case1", "--planner=paper", *args) == 0
+        printed.append(capsys.readouterr().out)
+    assert printed[0] == printed[1] == printed[2] != printed[3]
+
+
 def test_sim_names_planner_and_optimizer(capsys: Capture) -> None:
     assert mfba("sim", "case1", "--planner=paper", "--set", "planner.optimizer=random") == 0
     assert capsys.readouterr().out.startswith("case1, paper with random, seed 0, core driver\n")

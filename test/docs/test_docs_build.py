@@ -22,6 +22,7 @@ OWN_TESTS = {
     "benchmark.md": "bench/test_benchmark.py",
     "planners.md": "docs/test_docs_planners.py",
     "optimizer.md": "docs/test_docs_optimizer.py",
+    "optimizers.md": "docs/test_docs_optimizers.py",
     "how-to/your-optimizer.md": "docs/test_docs_your_optimizer.py",
     "how-to/import-worlds.md": "docs/test_docs_import_worlds.py",
 }

@@ -13,7 +13,7 @@ from mfba_planner.evaluation.optimizer_check import check
 from mfba_planner.optimizers.registry import NAMES
 
 PAGE = (ROOT / "docs/how-to/your-optimizer.md").read_text(encoding="utf-8")
-CHECK, SIM, SWEEP, BATS = map(shown_commands.reduced, shown_commands.commands(PAGE))
+CHECK, SIM, SWEEP, BATS, COMPARE = map(shown_commands.reduced, shown_commands.commands(PAGE))
 
 
 @pytest.fixture
@@ -44,6 +44,15 @@ def test_it_is_judged_beside_the_bats(here: Path) -> None:
         lengths.append([float(row["length_m"]) for row in rows])
     assert lengths[0] != lengths[1]
     assert "planner.optimizer=my_swarm:ParticleSwarm" in (here / "runs/mine/report.md").read_text()
+
+
+def test_it_appears_in_the_report_of_a_comparison(here: Path) -> None:
+    shown_commands.mfba(COMPARE[1:], here)
+    report = (here / "runs/compared/report.md").read_text(encoding="utf-8")
+    name = "my_swarm:ParticleSwarm"
+    assert f"| {name} | 6 | 100.00 % [60.97, 100.00] |" in report
+    assert report.count(f"| {name} | 6 |") == 2
+    assert "F5, 25 evaluations: " in report
 
 
 def test_every_property_and_every_name_has_a_row() -> None:

@@ -36,6 +36,27 @@ REDUCED = {
         "mfba sweep random-10 --planner paper --planner predictive --worlds 2 --workers 1 "
         "--out runs/bats"
     ),
+    "mfba compare --quick --out runs/quick": (
+        "mfba compare --quick --worlds 6 --runs 6 --budget 25 --workers 1 --out runs/quick"
+    ),
+    "mfba compare paper random-20 rooms F1 F2 F3 F4 F5 F6 --optimizer mfba --optimizer ba "
+    "--optimizer random --optimizer grid --optimizer none --optimizer cmaes:CMA "
+    "--optimizer niapy:ParticleSwarmAlgorithm --budget 25 --budget 150 --worlds 10 --runs 30 "
+    "--first 80000 --update docs/optimizers.md": (
+        "mfba compare paper F1 --planner paper --optimizer mfba --optimizer none --optimizer ba "
+        "--budget 25 --worlds 2 --runs 6 --workers 1 --update docs/optimizers.md"
+    ),
+    "mfba compare rooms --planner predictive --optimizer mfba --optimizer none --budget 25 "
+    "--worlds 60 --first 80000 --out runs/rooms": (
+        "mfba compare rooms --planner predictive --optimizer mfba --optimizer none --budget 25 "
+        "--worlds 1 --first 80000 --workers 1 --no-oracle --out runs/rooms"
+    ),
+    "mfba compare random-10 F5 --planner paper --optimizer mfba --optimizer random "
+    "--optimizer my_swarm:ParticleSwarm --worlds 100 --runs 100 --out runs/compared": (
+        "mfba compare random-10 F5 --planner paper --optimizer mfba --optimizer random "
+        "--optimizer my_swarm:ParticleSwarm --worlds 6 --runs 6 --budget 25 --workers 1 "
+        "--no-oracle --out runs/compared"
+    ),
     "python bench/robots.py": "python bench/robots.py --worlds 1 --only sectors",
     "python bench/kidnapped.py --graph 5": "python bench/kidnapped.py --graph 1 --count 1",
     "python bench/tracking.py --seeds 30": (

@@ -15,7 +15,7 @@ from ...evaluation.sweep.single_run import run_one
 from ...evaluation.sweep.sweep_spec import Run, SweepSpec, default_setting, own_preset
 from ...launcher.run_directory import RunDirectory
 from ...launcher.run_result import show, why_no_success
-from ...launcher.set_option import with_robot_settings, with_settings
+from ...launcher.set_option import settings_of, with_robot_settings, with_settings
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
 from ...scenarios.run_config import Driver, RunConfig
@@ -40,7 +40,7 @@ class Peer:
                 f"--planner {self._name}: of one robot, {scenario.name!r} has "
                 f"{len(scenario.robots)}; give paper or predictive"
             )
-        robot, others = with_robot_settings(scenario.robot, parsed.settings)
+        robot, others = with_robot_settings(scenario.robot, settings_of(parsed))
         params, sensor = with_settings(
             own_preset(self._name, PlannerParams()), SensorParams(), others
         )

@@ -7,6 +7,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from ...core.errors import ConfigError
 from ...evaluation.study.chunk import Chunk
 from ...evaluation.study.chunk_store import Store
 from ...evaluation.study.compute_chunks import check_workers
+from ...evaluation.sweep.run_sweep import dask_executor
 from ...paper.study.chunk import SampleChunk
 from ...paper.study.run import Sample, run_plan
 
@@ -78,6 +80,16 @@ def progress(chunks: Sequence[Chunk], directory: Path) -> Iterator[Callable[[Chu
     except (KeyboardInterrupt, SystemExit):
         print_status(f"interrupted; continue with --out {directory}")
         raise
+
+
+@contextmanager
+def executor_at(scheduler: str | None) -> Iterator[Executor | None]:
+    """The workers of a dask.distributed scheduler; None without an address."""
+    if scheduler is None:
+        yield None
+        return
+    with dask_executor(scheduler) as executor:
+        yield executor
 
 
 def _available_cores() -> int:

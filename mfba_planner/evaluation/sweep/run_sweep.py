@@ -22,7 +22,10 @@ from .table_columns import Row
 
 COMMAND = "mfba sweep"
 # The folders whose code determines the results.
-PACKAGES = ("core", "evaluation", "perception", "planning", "scenarios", "simulation", "swarm")
+PACKAGES = (
+    "core", "evaluation", "optimizers", "perception", "planning", "scenarios", "simulation",
+    "swarm",
+)  # fmt: skip
 CONNECT_S = 10
 
 

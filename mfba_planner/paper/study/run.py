@@ -16,7 +16,9 @@ from ...evaluation.study.compute_chunks import compute
 from .chunk import SampleChunk
 
 # The numbers depend on the code in these folders of mfba_planner.
-PACKAGES = ("core", "swarm", "perception", "planning", "simulation", "evaluation", "paper")
+PACKAGES = (
+    "core", "swarm", "optimizers", "perception", "planning", "simulation", "evaluation", "paper",
+)  # fmt: skip
 Sample = Mapping[str, NDArray[np.float64]]
 
 
