@@ -72,6 +72,10 @@ def test_seeds_settings_and_a_directory(here: Path, capsys: Capture) -> None:
     [
         (["--planner", "orcaa"], "planner 'orcaa': unknown; did you mean 'orca'?"),
         (["--planner", "orca", "--algorithm", "ba"], "--algorithm: of planner paper only"),
+        (
+            ["--planner", "orca", "--optimizer", "grid"],
+            "--optimizer: of paper and predictive only",
+        ),
         (["--planner", "none_here:X"], "planner none_here:X: cannot be imported"),
         (["--planner", "deaf_planner:Deaf"], "planner deaf_planner:Deaf uses none of it"),
         (["--planner", "deaf_planner:Broken"], "tick 0: raised ValueError: no"),

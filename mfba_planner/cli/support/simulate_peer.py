@@ -34,6 +34,10 @@ class Peer:
                 raise ConfigError(
                     f"--{option}: of planner paper only; leave it out with {self._name}"
                 )
+        if parsed.optimizer and ":" not in self._name:
+            raise ConfigError(
+                f"--optimizer: of paper and predictive only; leave it out with {self._name}"
+            )
         scenario = load_scenario(parsed.scenario)
         if scenario.robots:
             raise ConfigError(
