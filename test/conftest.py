@@ -59,3 +59,15 @@ def graph(ros_context: Any) -> Iterator[Any]:
 def ros_env(domain_id: int) -> dict[str, str]:
     """Return the environment for a subprocess in this test's domain."""
     return {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
+
+
+@pytest.fixture
+def scheduler() -> Iterator[str]:
+    """The address of a real cluster of two worker processes."""
+    from distributed import LocalCluster
+
+    cluster = LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+    )
+    with cluster:
+        yield cluster.scheduler_address

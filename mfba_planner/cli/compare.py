@@ -36,7 +36,7 @@ from ..paper.optimizers_on_functions import FunctionSpec
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import Method, PlannerParams
 from .support.page_blocks import read_page, replace_file
-from .support.study_progress import add_work_arguments, executor_at, print_status, progress
+from .support.study_progress import add_study_arguments, executor_at, print_status, progress
 
 _DESCRIPTION = """Compare optimisers: each searches in the same planners, worlds, seeds and numbers
 of evaluations, and on the functions of Table 2.
@@ -179,10 +179,7 @@ def _parser() -> Parser:
         help="also fill the generated block of this Markdown page, and write its pictures into "
         "images/ beside it",
     )  # fmt: skip
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="tcp://HOST:PORT of a dask.distributed scheduler"
-    )
-    add_work_arguments(parser)
+    add_study_arguments(parser)
     return parser
 
 

@@ -40,7 +40,7 @@ from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD
 from ..planning.planner_registry import PLANNERS
 from ..simulation.lidar_perception import OWN_ROBOT
-from .support.study_progress import add_work_arguments, executor_at, print_status, progress
+from .support.study_progress import add_study_arguments, executor_at, print_status, progress
 
 WORLDS = 100  # of a built-in suite
 _DESCRIPTION = """Run planners in the worlds of a suite and compare them.
@@ -148,10 +148,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="format of the table"
     )
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="tcp://HOST:PORT of a dask.distributed scheduler"
-    )
-    add_work_arguments(parser)
+    add_study_arguments(parser)
     return parser
 
 

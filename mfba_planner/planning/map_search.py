@@ -24,6 +24,7 @@ from .turn_delay import TurnDelay
 Array = np.ndarray
 Candidates = tuple[Array, Array, Array]  # (m,) x, y (m, relative to the robot), t1 (s)
 
+_NO_CANDIDATES: Candidates = (np.empty(0),) * 3
 LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of waypoints, in reach_m
 WAITS_S = (0.4, 1.0, 2.0)
 SPEEDS = (1e-6, 0.5)
@@ -207,7 +208,7 @@ class _Best:
 
     def take_ahead(self) -> bool:
         """Whether a point ahead is free; it is the best then."""
-        ahead, self._ahead = self._ahead, (np.empty(0),) * 3
+        ahead, self._ahead = self._ahead, _NO_CANDIDATES
         return bool(ahead[0].size) and self._take(ahead, ahead[0].size)
 
     def take(self, order: Array, lower: Array, others: Candidates) -> bool:
@@ -221,7 +222,7 @@ class _Best:
             if not first and not batch.size:
                 break
             both = [np.concatenate((a, b[batch])) for a, b in zip(self._ahead, others)]
-            self._ahead = (np.empty(0),) * 3
+            self._ahead = _NO_CANDIDATES
             if self._take((both[0], both[1], both[2]), first):
                 return True
         return False

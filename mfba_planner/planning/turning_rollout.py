@@ -95,7 +95,6 @@ class TurningRollout:
         arrived, on_first = np.full(m, steps), np.ones(m, dtype=bool)
         goal = np.array(self.to_go.goal)[:, None]
         near_goal = self._comes_near(goal, step_s)
-        root, more, less = (alpha * held_s) ** 2, 2.0 * alpha, alpha * held_s
         limit = np.array([[accel], [alpha]])
         left, any_first, all_first = waypoint - at, True, True
         xy[0] = at
@@ -109,10 +108,7 @@ class TurningRollout:
             error -= math.pi
             back = _turn_round(error) if base.reverse else None
             off = np.abs(error)
-            turn = off * more  # differential_drive.brake()
-            turn += root
-            np.sqrt(turn, out=turn)
-            turn -= less
+            turn = _brake(off, alpha, held_s)
             np.minimum(turn, base.max_turn_radps, out=turn)
             np.copysign(turn, error, out=wanted[1])
             share = self.share.at(at)
@@ -219,5 +215,9 @@ def _turn_round(error: Array) -> Array | None:
 
 def _brake(remaining: Array, deceleration: float, held_s: float) -> Array:
     """differential_drive.brake() of many distances."""
-    root: Array = np.sqrt(held_s * held_s + 2.0 * remaining / deceleration)
-    return deceleration * (root - held_s)
+    held_mps = deceleration * held_s
+    found: Array = remaining * (2.0 * deceleration)
+    found += held_mps * held_mps
+    np.sqrt(found, out=found)
+    found -= held_mps
+    return found

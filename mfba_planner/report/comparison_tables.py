@@ -20,6 +20,7 @@ from mfba_planner.evaluation.comparison.verdict import (
 from mfba_planner.evaluation.statistics import Interval
 from mfba_planner.evaluation.suites import suite
 
+from .result_json import plain
 from .sweep_tables import markdown, percent, points
 
 _NONE = "-"
@@ -182,7 +183,7 @@ def failures(group: Group) -> list[str]:
 
 def to_json(found: Sequence[Group], against: str) -> dict[str, Any]:
     """All figures but computing times as plain data; null where there is none."""
-    plain = []
+    groups = []
     for group in found:
         data = asdict(group)
         for arm in data["arms"]:
@@ -190,13 +191,5 @@ def to_json(found: Sequence[Group], against: str) -> dict[str, Any]:
                 del arm["summary"]["decision_us"]
         for pair, data_of_pair in zip(group.pairs, data["pairs"]):
             data_of_pair["finding"] = finding(group, pair).value
-        plain.append({**data, "verdict": verdict(group)})
-    return {"schema_version": 1, "verdict": overall(found, against), "groups": _finite(plain)}
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _finite(v) for name, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        groups.append({**data, "verdict": verdict(group)})
+    return {"schema_version": 1, "verdict": overall(found, against), "groups": plain(groups)}

@@ -56,8 +56,8 @@ def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str,
         "driver": episode.driver,
         "algorithm": episode.label,
         "parameters": {
-            "planner": _plain(flatten(episode.planner)),
-            "sensor": _plain(flatten(episode.sensor)),
+            "planner": plain(flatten(episode.planner)),
+            "sensor": plain(flatten(episode.sensor)),
         },
         "versions": {
             "mfba_planner": __version__,
@@ -65,23 +65,23 @@ def result_to_dict(episode: Episode, extra: Mapping[str, Any] = {}) -> dict[str,
             "numpy": np.__version__,
         },
         "digest": digest(episode.ticks),
-        "result": _plain(asdict(evaluate(episode))),
-        "extra": _plain(extra),
+        "result": plain(asdict(evaluate(episode))),
+        "extra": plain(extra),
     }
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Convert a value to plain JSON values; numbers that are not finite become None."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, Enum):
-        return _plain(value.value)
+        return plain(value.value)
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, (np.generic, np.ndarray)):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

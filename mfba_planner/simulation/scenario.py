@@ -117,8 +117,7 @@ class Scenario:
 
     def gap_m(self, pose: Pose2D, center: Point, radius_m: float) -> float:
         """Gap between the robot's edge at a pose and a circle, edge to edge; < 0 in contact."""
-        circles = self.robot_circles(pose)
-        return min(distance(own, center) - (radius_m + radius) for own, radius in circles)
+        return _gap_m(self.robot_circles(pose), center, radius_m)
 
     def enlarged_radius(self, obstacle: Obstacle) -> float:
         """Obstacle radius plus robot radius (Fig. 4), metres."""
@@ -134,6 +133,11 @@ class Scenario:
     def enlarged(self, t_s: float) -> list[tuple[Point, float]]:
         """(centre, enlarged radius) of all obstacles at time t; centres as in centers()."""
         return list(zip(self.centers(t_s), map(self.enlarged_radius, self.obstacles)))
+
+
+def _gap_m(circles: list[tuple[Point, float]], center: Point, radius_m: float) -> float:
+    """The least gap between circles (centre, radius) and another, edge to edge."""
+    return min(distance(own, center) - (radius_m + radius) for own, radius in circles)
 
 
 def _check_footprint(scenario: Scenario) -> None:
@@ -222,7 +226,7 @@ def _check_kidnappings(scenario: Scenario) -> None:
             obstacle = scenario.obstacles[number - 1]
             if obstacle.trigger:
                 continue  # where it is then depends on the robot
-            gap = min(distance(own, center) - (obstacle.radius_m + r) for own, r in circles)
+            gap = _gap_m(circles, center, obstacle.radius_m)
             if gap < 0.0:
                 raise ConfigError(
                     f"kidnapping to_m={list(kidnapping.to_m)}: {-gap:.3g} m inside obstacle "

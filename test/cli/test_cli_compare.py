@@ -3,7 +3,6 @@
 
 import csv
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -76,18 +75,6 @@ def test_the_same_for_two_workers(compared: Path, tmp_path: Path) -> None:
     assert mfba("compare", *SMALL, "--workers=2", "--out", str(out)) == 0
     for name in SAME:
         assert (out / name).read_bytes() == (compared / name).read_bytes(), name
-
-
-@pytest.fixture
-def scheduler() -> Iterator[str]:
-    """The address of a real cluster of two worker processes."""
-    from distributed import LocalCluster
-
-    cluster = LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
-    )
-    with cluster:
-        yield cluster.scheduler_address
 
 
 @pytest.mark.filterwarnings("default")  # warnings of dask itself

@@ -6,7 +6,7 @@ import io
 import math
 import os
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -187,18 +187,6 @@ def test_processes_change_nothing(small: SweepResult, workers: int) -> None:
     again = sweep(spec_of(oracle=True), workers=workers)
     assert again.hash == small.hash
     assert again.rows == small.rows or repr(again.rows) == repr(small.rows)
-
-
-@pytest.fixture
-def scheduler() -> Iterator[str]:
-    """The address of a real cluster of two worker processes."""
-    from distributed import LocalCluster
-
-    cluster = LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
-    )
-    with cluster:
-        yield cluster.scheduler_address
 
 
 @pytest.mark.usefixtures("tiny_chunks")

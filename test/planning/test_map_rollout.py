@@ -209,6 +209,19 @@ def test_a_differential_base_slows_down_where_it_is_narrow() -> None:
     assert 0.3 * ends[1] < ends[0] < 0.9 * ends[1]
 
 
+def test_what_a_differential_base_stays_behind_counts_until_its_waypoint() -> None:
+    """At 0.4 of the speed it stays behind by 1.5 m per metre, the last step among them."""
+    walls = polyline((-1.0, 0.35), (4.0, 0.35)) + polyline((-1.0, -0.35), (4.0, -0.35))
+    for circles in ((), (FAR,)):
+        made, _ = rollout(
+            PointMap(walls), (9.0, 0.0), *circles, base=TURNS, speeds=Speeds(0.4 * SPEED, 0.0)
+        )
+        paths = through(made, (1.0, 0.0))
+        driven_m = float(paths.driven_s[0, paths.arrived[0]]) * SPEED
+        assert 0.85 < driven_m < 1.0
+        assert float(paths.slowed_m[0]) == pytest.approx(1.5 * driven_m, rel=1e-6)
+
+
 circles = st.builds(
     lambda x, y, vx, vy, r: Circle(center_m=(x, y), velocity_mps=(vx, vy), radius_m=r),
     st.floats(-4.0, 4.0),

@@ -43,6 +43,14 @@ def add_work_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def add_study_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add --scheduler, for executor_at(), and those of add_work_arguments()."""
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="tcp://HOST:PORT of a dask.distributed scheduler"
+    )
+    add_work_arguments(parser)
+
+
 def check(parsed: argparse.Namespace) -> None:
     """Raise ConfigError for a seed or a number of workers out of range."""
     if not 0 <= parsed.seed < 2**62:

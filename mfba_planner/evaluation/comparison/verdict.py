@@ -50,8 +50,7 @@ def finding(group: Group, pair: Pair) -> Finding:
         return Finding.OPEN
     if pair.p < ALPHA:
         return Finding.BETTER if pair.effect > 0.0 else Finding.WORSE
-    within = -MARGIN < pair.paired.difference.low <= pair.paired.difference.high < MARGIN
-    return Finding.EQUAL if within and not group.is_function else Finding.OPEN
+    return Finding.EQUAL if is_small(group, pair) else Finding.OPEN
 
 
 def is_small(group: Group, pair: Pair) -> bool:
