@@ -199,6 +199,11 @@ class Tracker:
         return self._pose_error.error
 
     @property
+    def pose_variance(self) -> tuple[float, float]:
+        """Variances of single poses, per axis (m^2) and of the heading (rad^2), as learnt."""
+        return self._pose_error.variance_m2, self._pose_error.variance_rad2
+
+    @property
     def radii_m(self) -> Array:
         """Radii of the tracks (m,), not enlarged; circles() begins with them."""
         radii: Array = self._bank.state[RADIUS]

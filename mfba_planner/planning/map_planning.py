@@ -72,6 +72,7 @@ class MapPlanning:
         self.search = MapSearch(route, params.robot_radius_m, headings, reach_m, self._known_map)
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
+        self._may_move = np.empty(0, dtype=bool)  # each of them
         self._blocked, self._place = BlockedHeadings(), PlaceCheck()
 
     def update(self, stamp_ns: int, pose: Pose2D, tracker: Tracker) -> None:
@@ -79,6 +80,7 @@ class MapPlanning:
         assert tracker.beams is not None
         moving, surely = tracker.moving()
         self._radii_m = tracker.radii_m
+        self._may_move = tracker.may_move()
         self._reach_m = self.map.params.spacing_m / tracker.beams.spacing_rad
         self.map.update(stamp_ns, pose, tracker.beams, moving, surely, tracker.pose_error)
         if self._known_map is not None:
@@ -190,6 +192,7 @@ class MapPlanning:
             rows, x, y, dx, dy
         )
         kept |= dx * dx + dy * dy > self._reach_m * self._reach_m
+        kept[: self._may_move.size] |= self._may_move
         return [
             replace(c, center_m=(cx, cy))
             for c, cx, cy, keep in zip(circles, x.tolist(), y.tolist(), kept.tolist())

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.geometry import Point, Pose2D, bearing, distance
+from ..core.geometry import Point, Pose2D, bearing, distance, rotated
 from ..core.planner_types import NANO, Bits, Circle, Decision, Observation, Ranges
 from ..core.random_streams import stream
 from ..optimizers.registry import NONE, optimize, require_optimizer
@@ -22,6 +22,8 @@ from ..perception.static_map import StaticMap
 from ..swarm.optimizer import Found
 from ..swarm.search_region import Disc, Vector
 from .base_planner import BasePlanner, Move, blocked
+from .candidate_waypoints import HEADINGS_IF_CLOSED, CandidateWaypoints, nearest_free
+from .dead_reckoning import DeadReckoning
 from .differential_drive import Speeds, apply_command, command
 from .drive_rollout import DriveRollout
 from .map_planning import ENCLOSED, MapPlanning
@@ -39,10 +41,6 @@ from .trajectory_cost import (
 )
 from .turn_to_observe import turn_to_observe
 
-LENGTHS = (0.25, 0.5, 0.75, 1.0)  # distances of a gap's waypoints, in reach_m
-WAITS_S = (0.4, 0.8, 1.4, 2.0, 3.0)
-SPEEDS = (1e-6, 0.5)  # while waiting, as share of full speed; not 0: a direction is needed
-HEADINGS_IF_CLOSED = 12  # headings evaluated when all are closed
 TOWARDS = math.cos(math.radians(80.0))
 UNOBSERVED = "no direction that the lidar has covered leads on"
 _FREE_M = 1e-9
@@ -95,17 +93,21 @@ class Predictive(BasePlanner):
         n = self.options.headings
         angles = 2.0 * math.pi / n * np.arange(1, n + 1)
         self._cos, self._sin = np.cos(angles), np.sin(angles)
-        lengths = [share * self.options.reach_m for share in LENGTHS]
-        self._rays = [
-            [((c * length, s * length), length) for length in lengths]
-            for c, s in zip(self._cos.tolist(), self._sin.tolist())
-        ]
+        self._candidates = CandidateWaypoints(
+            self._cos.tolist(), self._sin.tolist(), self.options.reach_m
+        )
         self._waypoint: Point | None = None
         super().__init__(params, sensor, seed)
 
     def move(self, obs: Observation, goal: Point) -> Move:
         """Choose waypoint and speed, and never touch what stands before the robot can stop."""
-        move = self._move(obs, goal)
+        self._perceived = self._circles(obs)
+        among = self._beside_the_scan(obs)
+        move = self._turned_to_observe(self._move(among, goal), among, goal)
+        turn = obs.pose.yaw - among.pose.yaw
+        return replace(move, velocity=rotated(move.velocity, turn)) if turn else move
+
+    def _turned_to_observe(self, move: Move, obs: Observation, goal: Point) -> Move:
         if self._unobserved is None or not self.params.turns:
             return move
         if move.reason == ENCLOSED:
@@ -121,7 +123,7 @@ class Predictive(BasePlanner):
     def _move(self, obs: Observation, goal: Point) -> Move:
         position = obs.pose.position
         last_waypoint, self._waypoint = self._waypoint, None
-        self._perceived = circles = self._circles(obs)
+        circles = self._perceived
         self._by_sectors = obs.circles is None and obs.scan is None
         self._unobserved = None if obs.scan is None else self._coverage.unsafe(obs.pose_ns)
         if obs.scan is not None and obs.circles is None and self.has_map:
@@ -173,7 +175,7 @@ class Predictive(BasePlanner):
             return blocked(enclosure, vs)
         if self._unobserved is not None and not self._is_towards(to_goal):
             return blocked(UNOBSERVED, vs)
-        gaps = self._nearest_free(vs, to_goal)
+        gaps = nearest_free(vs, to_goal)
         if drive is not None:  # where the bits, which know the turn but not the arc, are wrong
             gaps = sorted({*gaps, *range(0, len(vs), len(vs) // HEADINGS_IF_CLOSED)})
         candidates = self._waypoints(gaps, to_goal, goal_distance)
@@ -278,10 +280,14 @@ class Predictive(BasePlanner):
     def plan(self, obs: Observation) -> Decision:
         """Decide, and for a differential drive keep the speeds that the decision leads to."""
         decision = super().plan(obs)
+        pose, tick_ns = obs.pose, self.params.tick_ns
         if self.params.turns:
-            tick_ns = self.params.tick_ns
             given = command(decision, self.params, tick_ns)
-            _, self._speeds = apply_command(obs.pose, self._speeds, given, self.params, tick_ns)
+            after, self._speeds = apply_command(pose, self._speeds, given, self.params, tick_ns)
+        else:
+            (vx, vy), tick_s = decision.velocity, self.tick_s
+            after = Pose2D(pose.x + vx * tick_s, pose.y + vy * tick_s, pose.yaw)
+        self._dead_reckoning.command(obs.pose_ns, pose, after)
         return decision
 
     def replan(self) -> None:
@@ -299,6 +305,7 @@ class Predictive(BasePlanner):
         self._changes = SectorChanges()
         self._memory = ObstacleMemory(self.options.memory)
         self._tracker = Tracker(self.options.tracking)
+        self._dead_reckoning = DeadReckoning(self.params.tick_ns)
         self._map_planning = MapPlanning(
             self.params, self.options.map, self.options.route, self.options.risk,
             self.options.headings, self.options.reach_m, self.options.search_m, self.seed,
@@ -325,6 +332,14 @@ class Predictive(BasePlanner):
             return self._tracker.circles(obs.pose_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
+    def _beside_the_scan(self, obs: Observation) -> Observation:
+        """The observation with the pose beside a scan that is older (dead_reckoning.py)."""
+        if obs.scan is None or obs.circles is not None or obs.sensed is None:
+            return obs
+        now = obs.pose_ns, obs.pose
+        error, variance = self._tracker.pose_error, self._tracker.pose_variance
+        return replace(obs, pose=self._dead_reckoning.pose(obs.sensed, now, error, variance))
+
     def _drive_rollout(self, obs: Observation) -> DriveRollout | None:
         """The rollout of a differential drive from its present state; None for others."""
         if not self.params.turns:
@@ -339,39 +354,15 @@ class Predictive(BasePlanner):
         nearer = self._cos * math.cos(angle) + self._sin * math.sin(angle) > TOWARDS
         return bool((nearer & ~self._unobserved).any())
 
-    def _nearest_free(self, closed: Bits, to_goal: Point) -> list[int]:
-        """The free headings nearest to the goal's on both sides; every sixth if none is free."""
-        n = len(closed)
-        if 0 not in closed:
-            return list(range(0, n, n // HEADINGS_IF_CLOSED))
-        above = math.floor(math.atan2(to_goal[1], to_goal[0]) * n / (2.0 * math.pi)) % n
-        around = closed[above:] + closed[:above]
-        left, right = around.index(0), n - 1 - around[::-1].index(0)
-        return [(above + k) % n for k in sorted({left, right})]
-
     def _gap(self, waypoint: Point) -> int:
         """Number (from 1) of the heading nearest to a waypoint; the last one is +x."""
         n = self.options.headings
         return (round(math.atan2(waypoint[1], waypoint[0]) * n / (2.0 * math.pi)) - 1) % n + 1
 
     def _waypoints(self, gaps: list[int], to_goal: Point, goal_distance: float) -> list[Candidate]:
-        """Candidate waypoints, numbered by heading, or from n on for those with waiting.
-
-        They are sorted by their least possible cost, so that most need no evaluation.
-        """
-        speed, (gx, gy), candidates = self.params.speed_mps, to_goal, []
-        for k in gaps:
-            for q, length in self._rays[k]:
-                rx, ry = gx - q[0], gy - q[1]
-                candidates.append((length + math.sqrt(rx * rx + ry * ry), q, length / speed, k))
-        ex, ey = gx / goal_distance * speed, gy / goal_distance * speed
-        waiting = self.options.risk.waiting * speed
-        for number, share in enumerate(SPEEDS, self.options.headings):
-            for t in WAITS_S:
-                lower = goal_distance + waiting * t * (1.0 - share)
-                candidates.append((lower - _FREE_M, (ex * share * t, ey * share * t), t, number))
-        candidates.sort()
-        return candidates
+        """Candidate waypoints, by their least possible cost (candidate_waypoints.py)."""
+        speed, waiting = self.params.speed_mps, self.options.risk.waiting
+        return self._candidates.of(gaps, to_goal, goal_distance, speed, waiting)
 
     def _refine(
         self, costs: TrajectoryCost, center: Point, to_goal: Point, bound: float, stamp_ns: int
