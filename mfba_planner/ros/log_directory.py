@@ -10,8 +10,6 @@ from pathlib import Path
 
 from ..core.errors import ConfigError
 
-VARIABLE = "ROS_LOG_DIR"
-
 
 def choose_log_directory() -> None:
     """Set ROS_LOG_DIR where the default directory cannot be written, and print so on stderr.
@@ -19,12 +17,12 @@ def choose_log_directory() -> None:
     The default is $ROS_HOME/log, ~/.ros/log. Raises ConfigError for a ROS_LOG_DIR that cannot be
     written: rclpy.init would raise.
     """
-    given = os.environ.get(VARIABLE)
+    given = os.environ.get("ROS_LOG_DIR")
     if given:
         reason = _why_not(Path(given).expanduser())
         if reason:
             raise ConfigError(
-                f"{VARIABLE}={given}: {reason}; give a directory that can be written, or unset it"
+                f"ROS_LOG_DIR={given}: {reason}; give a directory that can be written, or unset it"
             )
         return
     default = _default()
@@ -35,9 +33,9 @@ def choose_log_directory() -> None:
     if reason_of_other := _why_not(other):
         raise ConfigError(
             f"{default or other}: {reason}; {other}: {reason_of_other}; "
-            f"set {VARIABLE} to a directory that can be written"
+            "set ROS_LOG_DIR to a directory that can be written"
         )
-    os.environ[VARIABLE] = str(other)
+    os.environ["ROS_LOG_DIR"] = str(other)
     if default:
         print(f"{default}: {reason}; ROS logs go to {other}", file=sys.stderr)
 

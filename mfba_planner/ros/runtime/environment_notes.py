@@ -7,7 +7,6 @@ import os
 import re
 from pathlib import Path
 
-DISTRIBUTION = "jazzy"
 SHARED_MEMORY = Path("/dev/shm")
 # RTPS port mapping: first port of domain 0, ports per domain.
 _FIRST_PORT, _PORTS = 7400, 250
@@ -16,11 +15,11 @@ _FIRST_PORT, _PORTS = 7400, 250
 def environment_notes(domain_id: int, shared_memory: Path = SHARED_MEMORY) -> list[str]:
     """One line each, with the remedy; empty where nothing is to be said."""
     notes = []
-    distribution = os.environ.get("ROS_DISTRO", DISTRIBUTION)
-    if distribution != DISTRIBUTION:
+    distribution = os.environ.get("ROS_DISTRO", "jazzy")
+    if distribution != "jazzy":
         notes.append(
-            f"ROS_DISTRO={distribution}: this package is made and tested for {DISTRIBUTION}; "
-            f"source a {DISTRIBUTION} workspace, or no other"
+            f"ROS_DISTRO={distribution}: this package is made and tested for jazzy; "
+            "source a jazzy workspace, or no other"
         )
     # rcl compares both by letter.
     enabled = os.environ.get("ROS_SECURITY_ENABLE") == "true"
