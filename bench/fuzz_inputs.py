@@ -45,8 +45,13 @@ def changed_data(rng: Rng, data: Any) -> Any:
         key = (
             pick(rng, list(holder)) if isinstance(holder, dict) else int(rng.integers(len(holder)))
         )
-        kind = rng.integers(6)
-        if kind == 0:
+        kind = rng.integers(12)
+        if kind > 5:  # most often a value that may still be good
+            if isinstance(holder[key], (int, float)):
+                holder[key] = float(
+                    holder[key] + rng.normal() * pick(rng, [1e-9, 0.1, 1.0, 100.0])
+                )
+        elif kind == 0:
             del holder[key]
         elif kind == 1 and isinstance(holder, dict):
             holder[str(pick(rng, VALUES))] = holder.pop(key)
