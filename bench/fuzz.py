@@ -39,29 +39,29 @@ DOORS: dict[str, Any] = {
     "bag": fuzz_doors.Bags,
     "messages": Nodes,
 }
-SLOW_S, HANG_S = 2.0, 60
+SLOW_S, TIMEOUT_S = 2.0, 60
 
 
-class HangError(BaseException):
+class EndlessError(BaseException):
     """A case that does not end; no except clause of a door takes it."""
 
 
 def _on_alarm(_signum: int, _frame: FrameType | None) -> None:
-    raise HangError
+    raise EndlessError
 
 
 def run_case(name: str, door: Any, number: int) -> str:
     """What became of a case: accepted, refused, or how it failed in several lines."""
     rng = np.random.default_rng([zlib.crc32(name.encode()), number])
     start_s = time.process_time()
-    signal.alarm(HANG_S)
+    signal.alarm(TIMEOUT_S)
     try:
         with tempfile.TemporaryDirectory(prefix="mfba_fuzz_") as directory:
             door(rng, Path(directory))
         found = "accepted"
     except MfbaError as error:
         found = "refused" if "\n" not in str(error) else f"two lines: {error!r}"
-    except (HangError, Exception) as error:
+    except (EndlessError, Exception) as error:
         found = "".join(traceback.format_exception(error)[-6:])
     finally:
         signal.alarm(0)
