@@ -47,7 +47,7 @@ def changed_data(rng: Rng, data: Any) -> Any:
         )
         kind = rng.integers(12)
         if kind > 5:  # most often a value that may still be good
-            if isinstance(holder[key], (int, float)):
+            if isinstance(holder[key], (int, float)) and abs(holder[key]) < 1e300:
                 holder[key] = float(
                     holder[key] + rng.normal() * pick(rng, [1e-9, 0.1, 1.0, 100.0])
                 )

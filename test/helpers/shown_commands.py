@@ -58,7 +58,7 @@ REDUCED = {
         "--no-oracle --out runs/compared"
     ),
     "python bench/fuzz.py scenario map import parameters bag messages --cases 4000 --first 1000 "
-    "--budget 240": "python bench/fuzz.py scenario parameters --cases 10",
+    "--budget 40": "python bench/fuzz.py scenario parameters --cases 10",
     "python bench/mutation.py --sample 150 --budget 1300 --jobs 1 --out runs/sample.jsonl": (
         "python bench/mutation.py swarm/search_region --sample 3 --jobs 1 --out sample.jsonl"
     ),
