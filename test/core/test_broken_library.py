@@ -92,7 +92,7 @@ def test_an_error_of_our_own_or_of_a_call_is_not(source: str, module: str) -> No
 def raised_by(source: str, module: str) -> BaseException:
     """What the source raises as the code of a module of that name."""
     try:
-        exec(compile(source, f"{module}.py", "exec"), {"__name__": module})
+        exec(compile(source, "<a module>", "exec"), {"__name__": module})
     except Exception as error:
         return error
     raise AssertionError("nothing raised")
