@@ -12,11 +12,14 @@ WORKERS ?= 2
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH RMW_IMPLEMENTATION
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help demo test lint chromium docs colcon venv clean
+.PHONY: help demo test coverage fuzz mutation lint chromium docs colcon venv clean
 
 help:
 	@echo "make demo    run case study 1 and record it under runs/"
 	@echo "make test    lint, then all tests with branch coverage"
+	@echo "make coverage  all tests with branch coverage of the whole package, its processes included"
+	@echo "make fuzz    changed files, options, bags and messages; CASES=1000 of each"
+	@echo "make mutation  a mutation test of five rooms, hours; go on with it by calling it again"
 	@echo "make lint    ruff and mypy"
 	@echo "make chromium  install what the tests of the report page need, where that may be done"
 	@echo "make docs    build the documentation under build/docs, warnings as errors"
@@ -31,6 +34,19 @@ demo: $(VENV)/.runtime
 test: lint
 	@tools/chromium.sh || true
 	$(VENV)/bin/python -m pytest -n $(WORKERS) --cov --cov-fail-under=95
+
+# Processes are measured too, which costs about a third more time.
+coverage: $(VENV)/.dev
+	$(VENV)/bin/python -m pytest -n $(WORKERS) --cov --cov-config=tools/coverage.toml \
+	  --cov-fail-under=95
+
+CASES ?= 1000
+fuzz: $(VENV)/.dev
+	$(VENV)/bin/python bench/fuzz.py scenario map import parameters bag messages --cases $(CASES)
+
+mutation: $(VENV)/.dev
+	mkdir -p runs
+	$(VENV)/bin/python bench/mutation.py --out runs/mutation.jsonl
 
 lint: $(VENV)/.dev
 	$(VENV)/bin/ruff check

@@ -18,7 +18,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from mutation import module_path, mutants, start
+from mutant_process import module_path, start
+from mutants import mutants
 
 MODULES = ("swarm/bat_swarm", "swarm/swarm_iteration", "swarm/batched_swarms")
 _DELETED = "the line, deleted"

@@ -12,7 +12,11 @@ from launch.launch_description import LaunchDescription
 
 from mfba_planner.launcher.launch_actions import make_description
 from mfba_planner.launcher.robot_launch_description import NodeStart
-from mfba_planner.launcher.simulate_launch_description import ARGUMENTS, launch_parameters
+from mfba_planner.launcher.simulate_launch_description import (
+    ARGUMENTS,
+    launch_parameters,
+    params_files,
+)
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -21,7 +25,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _node_starts(given: Mapping[str, str]) -> list[NodeStart]:
-    files = (given["params_file"],) if given["params_file"] else ()
+    files = params_files(given["params_file"])
     return [
         NodeStart(name=name, parameters=parameters, files=files)
         for name, parameters in launch_parameters(given).items()

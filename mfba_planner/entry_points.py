@@ -6,13 +6,16 @@ import gc
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Callable
 from importlib import import_module
 from types import FrameType
 
 from mfba_planner.core.errors import MfbaError
+from mfba_planner.core.standard_streams import open_closed_streams, require_stdout
 
 _PACKAGE = "mfba_planner"
+_INSTALL = "pip install what setup.py and requirements-ros.txt name"
 _ROS_ARGS = "after --ros-args give -p NAME:=VALUE, -r FROM:=TO or --params-file FILE"
 
 _SIGINT_CODE = 128 + signal.SIGINT
@@ -116,6 +119,7 @@ def _command(name: str, module: str) -> int:
     _start(on_sigint=_SIGINT_CODE, on_sigterm=_SIGTERM_CODE)
 
     def run() -> int:
+        require_stdout()
         main = import_module(module).main
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, _unwind)
@@ -137,9 +141,11 @@ def _start(on_sigint: int, on_sigterm: int) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Node logs go to stdout; stderr is for errors.
     os.environ.setdefault("RCUTILS_LOGGING_USE_STDOUT", "1")
-    if "HOME" not in os.environ:
-        # rclpy writes its logs below the home directory and fails without one.
-        os.environ.setdefault("ROS_LOG_DIR", f"/tmp/ros_log_{os.getuid()}")
+    # A notebook's backend is not there in another process; pictures need none.
+    os.environ["MPLBACKEND"] = "agg"
+    open_closed_streams()
+    # Of a node that cannot be made rclpy warns too; the error says why.
+    warnings.filterwarnings("ignore", "Failed to fini", RuntimeWarning)
     # No file is open yet, and an exception could be caught by an import's except clause.
     signal.signal(signal.SIGINT, lambda *_: os._exit(on_sigint))
     signal.signal(signal.SIGTERM, lambda *_: os._exit(on_sigterm))
@@ -153,19 +159,24 @@ def _one_line(error: BaseException) -> str | None:
         name = error.filename or "output"
         return f"{name}: {error.strerror}; {_REMEDIES[error.errno]}"
     if isinstance(error, ImportError) and not (error.name or _PACKAGE).startswith(_PACKAGE):
-        return f"{error}; pip install what setup.py and requirements-ros.txt name"
+        return f"{error}; {_INSTALL}"
+    if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
+        return f"{error.object}: not UTF-8, as ROS 2 needs; rename that file or directory"
     if type(error).__module__.startswith("rclpy."):
         return _explain_rclpy(type(error).__name__, str(error))
-    return None
+    from mfba_planner.core.broken_library import explain_broken_library
+
+    broken = explain_broken_library(error)
+    return None if broken is None else f"{broken}; {_INSTALL}"
 
 
 def _explain_rclpy(kind: str, text: str) -> str | None:
     """One line for what rclpy.init refuses (arguments, environment); None for a bug."""
     if kind == "UnknownROSArgsError":
         return f"{text}: unknown ROS arguments; {_ROS_ARGS}"
-    if not text.startswith("failed to initialize"):
-        return None
-    reason = text.partition(", at /")[0]
-    if "log" in reason and "directory" in reason:
-        return f"{reason}; set ROS_LOG_DIR to a directory that can be written"
-    return f"{reason}; {_ROS_ARGS}"
+    reason = text.partition(", at /")[0].strip()
+    if "SECURITY" in reason:
+        return f"{reason}; set ROS_SECURITY_KEYSTORE to the keys, or unset ROS_SECURITY_ENABLE"
+    if text.startswith("error creating node"):
+        return f"{reason}; correct or unset what ROS_*, RMW_* and FASTRTPS_* variables name"
+    return f"{reason}; {_ROS_ARGS}" if text.startswith("failed to initialize") else None

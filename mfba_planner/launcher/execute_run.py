@@ -90,6 +90,7 @@ def _run_driver(run: Run) -> Episode | None:
 
 
 def _run_in_process(run: Run) -> None:
+    from ..ros import require_ros  # noqa: F401  (before rclpy, which would exit by itself)
     from .in_process_driver import run_in_process
     from .ros_domain import private_domain
 

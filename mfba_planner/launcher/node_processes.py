@@ -180,7 +180,13 @@ class NodeProcesses:
 
 
 def parameters_yaml(values: Mapping[str, Any]) -> str:
-    """The text of a --params-file for any node name; floats keep their point."""
+    """The text of a --params-file for any node name; floats keep their point.
+
+    Raises UnicodeEncodeError for text with bytes that are not UTF-8: rcl reads no other file.
+    """
+    for value in values.values():
+        if isinstance(value, str):
+            value.encode("utf-8")
     content = {"/**": {"ros__parameters": dict(values)}}
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=2**31)
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError
 from ..core.shipped_files import config_path
-from .simulate_launch_description import LaunchArgument
+from .simulate_launch_description import LaunchArgument, params_files
 
 TRUE_OR_FALSE = ("true", "false")
 ENABLED = {"true": True, "false": False}
@@ -47,7 +46,7 @@ PLANNER_ARGUMENTS = {
 
 def robot_nodes(given: Mapping[str, str]) -> list[NodeStart]:
     """virtual_sensor on a lidar's scan, and planner. InputError for a missing params_file."""
-    files = (_params_file(given["params_file"]),)
+    files = params_files(given["params_file"]) or (str(config_path("planner.yaml")),)
     sim_time = {"use_sim_time": ENABLED[given["use_sim_time"]]}
 
     def remaps(*names: str) -> tuple[tuple[str, str], ...]:
@@ -94,16 +93,9 @@ def replay_nodes(given: Mapping[str, str]) -> list[NodeStart]:
     arguments += ["--clock", given["clock"]] + ["--loop"] * ENABLED[given["loop"]]
     if not ENABLED[given["planner"]]:
         return [NodeStart(name="replay", arguments=tuple(arguments))]
-    files = (_params_file(given["params_file"]),) if given["params_file"] else ()
+    files = params_files(given["params_file"])
     arguments += ["--inputs-of", "planner", "--wait-for-subscribers"]
     return [
         NodeStart(name="planner", parameters={"lockstep": True}, files=files),
         NodeStart(name="replay", arguments=tuple(arguments)),
     ]
-
-
-def _params_file(given: str) -> str:
-    path = Path(given) if given else config_path("planner.yaml")
-    if not path.is_file():
-        raise InputError(f"params_file:={given}: does not exist; give a YAML file")
-    return str(path)

@@ -11,8 +11,13 @@ from pathlib import Path
 from ..core.errors import GraphError
 
 # Participants of one discovery server find each other whatever their domains, and static peers
-# are asked wherever they are.
-DISCOVERY_VARIABLES = ("ROS_DISCOVERY_SERVER", "ROS_SUPER_CLIENT", "ROS_STATIC_PEERS")
+# are asked wherever they are. The old ROS_LOCALHOST_ONLY overrides the range that a run sets.
+DISCOVERY_VARIABLES = (
+    "ROS_DISCOVERY_SERVER",
+    "ROS_SUPER_CLIENT",
+    "ROS_STATIC_PEERS",
+    "ROS_LOCALHOST_ONLY",
+)
 # A middleware's own configuration can name servers, peers, interfaces and another domain, and
 # Fast DDS reads more variables from its environment file.
 CONFIGURATION_VARIABLES = (

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from ..core.errors import ConfigError
+from ..core.errors import ConfigError, InputError
 from ..core.option_specs import override
 from ..paper import readings_of_paper
 from ..planning.planner_factory import DEFAULT_METHOD, params_for_method
@@ -85,10 +86,19 @@ def launch_parameters(given: Mapping[str, str]) -> Parameters:
         speed_factor=_number("speed_factor", given["speed_factor"], float),
     )
     recorders = (RECORDER,) if given["record"] == "true" else ()
+    if given["bag"] and not recorders:
+        raise ConfigError(f"bag:={given['bag']}: nothing is recorded; add record:=true")
     parameters = graph_parameters(config, (*NODES, *recorders))
     parameters["world_sim"]["start_paused"] = False  # no launcher resumes it
     recorder = recorder_parameters(config, given["bag"], parameters)
     return {**dict.fromkeys(recorders, recorder), **parameters}
+
+
+def params_files(given: str) -> tuple[str, ...]:
+    """The file of a params_file:= argument, if any. InputError where it does not exist."""
+    if given and not Path(given).is_file():
+        raise InputError(f"params_file:={given}: does not exist; give a YAML file")
+    return (given,) if given else ()
 
 
 def _number(name: str, text: str, kind: type) -> Any:

@@ -27,6 +27,7 @@ from .known_route import KnownRoute
 
 Array = np.ndarray
 
+_LEAST_LINE_M = 1e-6  # a shorter one has no direction: squares of lengths would underflow
 _CLEAR_M = 0.04  # beside the robot's radius: a straight line with so much room is driven
 _MARGIN_M, _LEAST_MARGIN_M = 5.0, 3.0  # around robot and goal
 _MOST_CELLS = 20_000  # about 8 ms
@@ -292,7 +293,10 @@ class DistanceToGo:
 
 
 def is_clear(known: StaticMap, start: Point, end: Point, room_m: float) -> bool:
-    """Whether no point of the map is nearer to the line than room_m; its ends may be."""
+    """Whether no point of the map is nearer to the line than room_m.
+
+    What stands beside its start does not count; a line of less than 1 um is clear.
+    """
     return are_clear(known.established_points(), start, end, room_m)
 
 
@@ -303,7 +307,7 @@ def are_clear(points: Array, start: Point, end: Point, room_m: float) -> bool:
     x, y = points[:, 0] - start[0], points[:, 1] - start[1]
     dx, dy = end[0] - start[0], end[1] - start[1]
     length2 = dx * dx + dy * dy
-    if length2 == 0.0:
+    if length2 < _LEAST_LINE_M * _LEAST_LINE_M:
         return True
     share = np.clip((x * dx + y * dy) / length2, 0.0, 1.0)
     x, y = x - share * dx, y - share * dy

@@ -25,6 +25,7 @@ from ..planning.differential_drive import command
 
 SECOND_NS = 1_000_000_000
 LONGEST_SCAN_S = 10.0  # from first to last beam
+FARTHEST_M = 1e7  # of a position: the largest coordinate of UTM; cells of a map count in integers
 
 T = TypeVar("T")
 
@@ -40,6 +41,18 @@ def _finite(what: str, values: Iterable[float]) -> None:
             raise InputError(f"{what} holds {value}; send finite numbers")
 
 
+def _position(what: str, position: Any) -> Point:
+    """The plane part of a geometry_msgs/Point; InputError for NaN, inf or beyond FARTHEST_M."""
+    x, y = position.x, position.y
+    _finite(what, (x, y))
+    if abs(x) > FARTHEST_M or abs(y) > FARTHEST_M:
+        raise InputError(
+            f"{what} ({x:g}, {y:g}) is farther than {FARTHEST_M:g} m from the origin; check its "
+            "source"
+        )
+    return (x, y)
+
+
 def value_or_refusal(read: Callable[[Any], T], message: Any) -> T | RefusalReason:
     """read(message), or the text of its InputError."""
     try:
@@ -51,15 +64,16 @@ def value_or_refusal(read: Callable[[Any], T], message: Any) -> T | RefusalReaso
 def pose2d(pose: Any, what: str) -> Pose2D:
     """geometry_msgs/Pose as planar pose; yaw from the quaternion (REP-103).
 
-    Raises InputError for NaN, inf or a quaternion far from unit length.
+    Raises InputError for NaN, inf, a position beyond FARTHEST_M or a quaternion that is no unit
+    quaternion by far.
     """
-    p, q = pose.position, pose.orientation
-    _finite(f"{what} position", (p.x, p.y))
+    q = pose.orientation
+    x, y = _position(f"{what} position", pose.position)
     _finite(f"{what} orientation", (q.x, q.y, q.z, q.w))
     norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
     if not 1e-6 < norm < 1e6:
         raise InputError(f"{what} orientation has norm {norm:g}; send a unit quaternion (w=1)")
-    return Pose2D(p.x, p.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
+    return Pose2D(x, y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
 
 
 def require_frame(message: Any, frame: str, what: str, parameter: str = "odom_frame") -> None:
@@ -84,9 +98,7 @@ def goal_point(pose_stamped: Any, frame: str = "", what: str = "goal_pose") -> P
     """
     if pose_stamped.header.frame_id:
         require_frame(pose_stamped, frame, what)
-    p = pose_stamped.pose.position
-    _finite(f"{what} position", (p.x, p.y))
-    return (p.x, p.y)
+    return _position(f"{what} position", pose_stamped.pose.position)
 
 
 def waypoint_points(path: Any, frame: str = "") -> tuple[Point, ...]:
@@ -152,7 +164,8 @@ def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF
             f"scan of {count} beams has angle_increment=0: all in one direction; "
             "check the lidar driver"
         )
-    spanned = count if count == 1 or first == last == 0.0 else (last - first) / increment + 1.0
+    unset = first == last == 0.0 or (count == 1 and (first == last or increment == 0.0))
+    spanned = count if unset else (last - first) / increment + 1.0
     if abs(spanned - count) > max(2.0, 0.02 * count):
         raise InputError(
             f"scan holds {count} ranges, but angle_min={first:g}, angle_max={last:g} and "

@@ -4,7 +4,20 @@
 import ctypes
 import os
 
+from ..core.broken_library import explain_broken_library
 from ..core.errors import ConfigError
+from .log_directory import choose_log_directory
+
+# With any other value rcutils prints an error for every line that a node logs.
+_LOG_SWITCHES = (
+    "RCUTILS_LOGGING_USE_STDOUT",
+    "RCUTILS_LOGGING_BUFFERED_STREAM",
+    "RCUTILS_COLORIZED_OUTPUT",
+)
+_SHARED_MEMORY = "/dev/shm"
+# Some pages that tracing and middleware write to at once: a process without them ends with a bus
+# error, before or after its first line. With less than they would like, they use UDP.
+_SHARED_MEMORY_BYTES = 2**16
 
 
 def _require_ros() -> None:
@@ -12,6 +25,11 @@ def _require_ros() -> None:
     domain = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not (domain.isdecimal() and int(domain) <= 232):
         raise ConfigError(f"ROS_DOMAIN_ID={domain}: no such domain; give 0 to 232 or unset it")
+    for switch in _LOG_SWITCHES:
+        if (value := os.environ.get(switch) or "0") not in ("0", "1"):
+            raise ConfigError(f"{switch}={value}: neither 0 nor 1; give one of them or unset it")
+    choose_log_directory()
+    _require_shared_memory()
     name = os.environ.get("RMW_IMPLEMENTATION")
     try:
         if name:
@@ -23,11 +41,32 @@ def _require_ros() -> None:
         ) from None
     try:
         import rclpy  # noqa: F401
-    except ImportError as error:
-        reason = str(error).partition("\n")[0]
+    except Exception as error:
+        reason = f"rclpy: {str(error).partition(chr(10))[0]}"
+        if not isinstance(error, ImportError):
+            reason = explain_broken_library(error) or reason
+        distribution = os.environ.get("ROS_DISTRO", "jazzy")
+        if distribution != "jazzy":
+            reason += f" (ROS_DISTRO={distribution}, and this package is for jazzy)"
         raise ConfigError(
-            f"rclpy: {reason}; source a ROS 2 workspace or pip install -r requirements-ros.txt"
+            f"{reason}; source a ROS 2 workspace or pip install -r requirements-ros.txt"
         ) from None
+
+
+def _require_shared_memory() -> None:
+    """Raise ConfigError when shared memory is full."""
+    try:
+        status = os.statvfs(_SHARED_MEMORY)
+    except OSError:
+        return  # the middleware says so, and uses UDP
+    free = status.f_bavail * status.f_frsize
+    # Zero blocks: a file system without a limit.
+    if status.f_blocks and free < _SHARED_MEMORY_BYTES:
+        raise ConfigError(
+            f"{_SHARED_MEMORY}: {free // 1024} kB free, and nodes need "
+            f"{_SHARED_MEMORY_BYTES // 1024}; remove what fills it (`fastdds shm clean`) or make "
+            "it larger"
+        )
 
 
 _require_ros()

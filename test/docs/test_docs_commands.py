@@ -19,7 +19,11 @@ COMMANDS = [
     for w in shown_commands.commands(page) + shown_commands.inline(page)
 ]
 # docs/test_docs_build.py runs the builder of `make docs`, with the same strictness.
-BY_TESTS = {"docs": "--builder html --nitpicky --fail-on-warning --keep-going"}
+# test_docs_trust measures a command with the configuration of `make coverage`.
+BY_TESTS = {
+    "docs": "--builder html --nitpicky --fail-on-warning --keep-going",
+    "coverage": "--cov-config=tools/coverage.toml",
+}
 
 
 def is_run(words: list[str]) -> bool:

@@ -57,6 +57,11 @@ REDUCED = {
         "--optimizer my_swarm:ParticleSwarm --worlds 6 --runs 6 --budget 25 --workers 1 "
         "--no-oracle --out runs/compared"
     ),
+    "python bench/fuzz.py scenario map import parameters bag messages --cases 4000 --first 1000 "
+    "--budget 40": "python bench/fuzz.py scenario parameters --cases 10",
+    "python bench/mutation.py --sample 150 --budget 1300 --jobs 1 --out runs/sample.jsonl": (
+        "python bench/mutation.py swarm/search_region --sample 3 --jobs 1 --out sample.jsonl"
+    ),
     "python bench/robots.py": "python bench/robots.py --worlds 1 --only sectors",
     "python bench/kidnapped.py --graph 5": "python bench/kidnapped.py --graph 1 --count 1",
     "python bench/tracking.py --seeds 30": (

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from point_maps import PointMap, polyline
 
@@ -227,6 +227,7 @@ def test_a_line_is_clear_where_no_point_is_near_to_it(
     points: list[Point], start: Point, end: Point, room_m: float
 ) -> None:
     """By 2001 positions on the line; points beside the start and behind it do not count."""
+    assume(math.dist(start, end) > 1e-6)  # a line leads somewhere
     found = is_clear(PointMap(points), start, end, room_m)
     share = np.linspace(0.0, 1.0, 2001)[:, None]
     line = np.array(start) * (1.0 - share) + np.array(end) * share
@@ -244,6 +245,8 @@ def test_what_stands_beside_the_robot_does_not_close_the_path_from_it() -> None:
     assert is_clear(known, START, (3.0, 0.0), RADIUS_M)
     assert not is_clear(known, START, (-3.0, 0.0), RADIUS_M)
     assert is_clear(known, START, START, RADIUS_M)
+    for line_m, clear in ((4e-181, True), (1e-160, True), (9e-7, True), (2e-6, False)):
+        assert is_clear(known, START, (0.0, line_m), RADIUS_M) == clear, "nowhere, or up to it"
 
 
 def closed_by(known: PointMap, goal: Point, seconds: float) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from point_maps import PointMap, polyline
 
@@ -232,9 +232,14 @@ circles = st.builds(
 )
 
 
-def sampled_risk(paths: Paths, row: int, circle: Circle, risk: RiskParams) -> float:
-    """The risk of one path and circle by 1600 times per step; docs of TrajectoryCost."""
-    (vx, vy), r = circle.velocity_mps, circle.radius_m
+def sampled_risk(
+    paths: Paths, row: int, circle: Circle, risk: RiskParams, slack_m: float = 0.0
+) -> float:
+    """The risk of one path and circle by 1600 times per step; docs of TrajectoryCost.
+
+    With a slack the circle is larger by it, and what is almost at rest beside it approaches.
+    """
+    (vx, vy), r = circle.velocity_mps, circle.radius_m + slack_m
     margin, close = risk.around(math.hypot(vx, vy), TICK_S)
     worst = 0.0
     share = np.linspace(0.0, 1.0, 1601)
@@ -244,7 +249,11 @@ def sampled_risk(paths: Paths, row: int, circle: Circle, risk: RiskParams) -> fl
         y = paths.y[row, k] + share * (paths.y[row, k + 1] - paths.y[row, k])
         away = np.hypot(circle.center_m[0] + vx * t - x, circle.center_m[1] + vy * t - y)
         driven = float(paths.driven_s[row, k])
-        if driven >= risk.horizon_s or away[1] >= away[0] or away.min() >= r + margin:
+        if (
+            driven >= risk.horizon_s
+            or away[1] >= away[0] + 1e-3 * slack_m
+            or away.min() >= r + margin
+        ):
             continue
         nearest = int(away.argmin())
         left = max(1.0 - (driven + share[nearest] * step_s) / risk.horizon_s, 0.0)
@@ -259,6 +268,9 @@ def sampled_risk(paths: Paths, row: int, circle: Circle, risk: RiskParams) -> fl
 
 @settings(max_examples=100, deadline=None)
 @given(circles, waypoints, st.sampled_from([OMNI, TURNS]), st.floats(1.0, 2.0))
+@example(
+    Circle(center_m=(-0.5, 0.0), velocity_mps=(8e-12, 0.0), radius_m=0.5), (0.0, 1.0), TURNS, 1.0
+)
 def test_the_risk_of_what_moves_is_the_one_by_sampling(
     circle: Circle, waypoint: Point, base: Base, waiting: float
 ) -> None:
@@ -266,9 +278,13 @@ def test_the_risk_of_what_moves_is_the_one_by_sampling(
     made, _ = rollout(PointMap(), (9.0, 0.0), circle, FAR, base=base)
     qx, qy = np.array([waypoint[0], -waypoint[0]]), np.array([waypoint[1], 0.1])
     paths = made.paths(qx, qy, waiting * np.hypot(qx, qy) / SPEED)
+    # A touch is contact or not, and one that hardly moves approaches or not: both may be right.
     for row, found in enumerate(made.moving_risk(paths, RISK).tolist()):
-        expected = max(sampled_risk(paths, row, one, RISK) for one in (circle, FAR))
-        assert found == pytest.approx(expected, rel=0.03, abs=0.01)
+        far = sampled_risk(paths, row, FAR, RISK)
+        expected = [
+            max(sampled_risk(paths, row, circle, RISK, slack), far) for slack in (-1e-6, 0.0, 1e-6)
+        ]
+        assert 0.97 * min(expected) - 0.01 <= found <= 1.03 * max(expected) + 0.01
 
 
 @settings(max_examples=100, deadline=None)

@@ -220,13 +220,14 @@ def test_late_circles_are_predicted() -> None:
     vy=st.floats(-0.5, 0.5), heading=st.floats(-math.pi, math.pi), t1=st.floats(0.1, 2.5),
 )  # fmt: skip
 @example(x=1.0, y=0.0, vx=0.4375, vy=0.0, heading=1.5, t1=0.5)
+@example(x=0.875, y=-0.5, vx=-0.5, vy=-0.5, heading=-1.0, t1=0.125)
 @settings(max_examples=200)
 def test_a_cost_is_the_length_exactly_when_no_margin_is_entered(
     x: float, y: float, vx: float, vy: float, heading: float, t1: float
 ) -> None:
     risk = RiskParams()
     circle = Circle(center_m=(x, y), radius_m=0.6, velocity_mps=(vx, vy))
-    margin = risk.margin_m + risk.margin_ticks * 0.1 * math.hypot(vx, vy)
+    margin, _ = risk.around(math.hypot(vx, vy), 0.1)  # a fast one has more
     if math.hypot(x, y) < 0.61 + margin:  # within the margin moving out is free
         return
     waypoint = (0.8 * t1 * math.cos(heading), 0.8 * t1 * math.sin(heading))

@@ -35,6 +35,7 @@ from mfba_planner.ros.interface import to_messages
 finite = st.floats(allow_nan=False, allow_infinity=False)
 moderate = st.floats(-1e6, 1e6)
 plane_points = st.tuples(finite, finite)
+coordinates = st.floats(-from_messages.FARTHEST_M, from_messages.FARTHEST_M)
 angles = st.floats(-math.pi, math.pi)
 stamps = st.integers(0, (2**31 - 1) * from_messages.SECOND_NS)
 # A string in a message ends at the first NUL.
@@ -82,7 +83,7 @@ def test_stamps_round_trip(stamp_ns: int) -> None:
     assert from_messages.stamp_ns(sent(to_messages.clock_msg(stamp_ns)).clock) == stamp_ns
 
 
-@given(finite, finite, angles, plane_points, stamps)
+@given(coordinates, coordinates, angles, plane_points, stamps)
 def test_odometry_round_trip(
     x: float, y: float, yaw: float, velocity: tuple[float, float], stamp_ns: int
 ) -> None:
@@ -120,7 +121,7 @@ def test_obstacles_round_trip_in_sequence(
     assert from_messages.stamp_ns(message.header.stamp) == stamp_ns
 
 
-@given(plane_points, stamps)
+@given(st.tuples(coordinates, coordinates), stamps)
 def test_goal_round_trip(goal: tuple[float, float], stamp_ns: int) -> None:
     message = sent(to_messages.pose_stamped_msg(goal, stamp_ns, "odom"))
     assert bits(*from_messages.goal_point(message)) == bits(*goal)
@@ -297,6 +298,18 @@ def test_non_finite_values_are_refused_and_named(
         read(sent(make(bad)))
 
 
+@pytest.mark.parametrize("far", [1.1e7, -3e38, 1e308])
+def test_a_position_that_no_map_has_is_refused(far: float) -> None:
+    """Cells of a map are counted in integers: 3e38 m raised an OverflowError in the planner."""
+    for read, message in (
+        (from_messages.robot_pose, odometry_with(x=far)),
+        (from_messages.robot_pose, odometry_with(y=far)),
+        (from_messages.goal_point, PoseStamped(pose=pose_at(y=far))),
+    ):
+        with pytest.raises(InputError, match=r" is farther than 1e\+07 m from the origin; check "):
+            read(sent(message))
+
+
 @pytest.mark.parametrize("bad", [math.nan, -math.inf, -0.1])
 @pytest.mark.parametrize("sector", [1, 7, 12])
 def test_sectors_of_a_blind_sensor_are_refused(bad: float, sector: int) -> None:
@@ -386,6 +399,12 @@ def test_a_scan_of_a_usual_driver_is_accepted(changes: dict[str, Any]) -> None:
     assert scan.ranges_m.tolist() == list(message.ranges)
 
 
+def test_a_range_finder_of_one_beam_is_accepted() -> None:
+    for limits in ((0.3, 0.3, 0.0), (0.3, 0.3, 0.1), (0.0, 0.0, 0.0), (0.0, 0.1, 0.1)):
+        values = dict(zip(("angle_min", "angle_max", "angle_increment"), limits))
+        assert from_messages.laser_scan(a_scan(1, **values)).ranges_m.tolist() == [1.0]
+
+
 @pytest.mark.parametrize("count", [1, 2, 90])
 def test_beams_in_clockwise_sequence_keep_their_directions(count: int) -> None:
     increment = -math.pi / 180.0
@@ -411,6 +430,7 @@ def test_beams_in_clockwise_sequence_keep_their_directions(count: int) -> None:
         ),
         ({"angle_max": 0.0}, r"^scan holds 360 ranges, but angle_min=-3.14159, angle_max=0 and "),
         ({"ranges": [1.0] * 300}, r"angle_increment=0.0174533 make 360; check the lidar driver$"),
+        ({"ranges": [1.0]}, r"^scan holds 1 ranges, but .* make 360; check the lidar driver$"),
         ({"range_min": 11.0}, r"^scan has range_min=11, range_max=10: not 0 <= range_min < rang"),
         ({"range_min": -0.1}, r"^scan has range_min=-0.1, range_max=10: "),
         ({"range_max": math.nan}, r"^scan has range_min=0.1, range_max=nan: "),

@@ -12,6 +12,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from .base_node import SPIN_S, GraphNode
+from .environment_notes import environment_notes
 
 # Longest time that a node stays after its end by a service call, for callers that stay too.
 CALLERS_TIMEOUT_S = 2.0
@@ -60,6 +61,8 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
     executor = make_executor()
     try:
         node = make_node()
+        for note in environment_notes(rclpy.get_default_context().get_domain_id()):
+            node.get_logger().warning(note)
         executor.add_node(node)
         while not stop.is_set and not node.finished:
             node.spin_once(executor)
