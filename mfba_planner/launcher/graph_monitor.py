@@ -26,6 +26,7 @@ from ..ros.runtime.base_node import GraphNode
 from ..ros.runtime.polled_subscriptions import PolledSubscriptions
 
 RESEND_S = 0.5  # a response can get lost during discovery
+ASK_AGAIN_S = 0.02  # a node that is asked without a pause has no time to get ready
 PROGRESS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -57,7 +58,8 @@ class ServiceCall:
         if self._future is not None and now - self._sent_at > RESEND_S:
             self._client.remove_pending_request(self._future)
             self._future = None
-        if self._future is None and self._client.service_is_ready():
+        due = now - self._sent_at >= ASK_AGAIN_S
+        if self._future is None and due and self._client.service_is_ready():
             self._future, self._sent_at = self._client.call_async(self._request), now
         return None
 
