@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import statistics
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -116,9 +115,11 @@ def _summary(good: list[Result], total: int) -> str:
     """The number of successes, and the range of their path lengths."""
     text = f"{len(good)} of {total} at the goal without collision"
     if good:
+        from statistics import fmean
+
         lengths = [result.length_m for result in good]
         text += (
             f"; length {min(lengths):.3f} to {max(lengths):.3f} m, "
-            f"mean {statistics.fmean(lengths):.3f} m"
+            f"mean {fmean(lengths):.3f} m"
         )
     return text

@@ -7,13 +7,10 @@ import sys
 from contextlib import closing, suppress
 
 from ..core.errors import BagError, MfbaError
-from ..recording.fleet_topics import NO_NAMESPACE
-from ..recording.local_maps import NO_MAPS, read_local_maps
 from ..scenarios.run_config import Driver
 from ..simulation.episode import Episode
 from ..simulation.run_episode import simulate
 from .console import RunConsole
-from .fleet_result import finish_fleet_run
 from .forked_process import ForkServer
 from .run_arguments import RunRequest
 from .run_directory import RunDirectory
@@ -53,12 +50,16 @@ def execute(request: RunRequest, fork_server: ForkServer | None = None) -> int:
 def _finish(run: Run, episode: Episode | None, failure: str = "") -> None:
     """Write the results of a run; check the outcome and open the viewer unless it failed."""
     if run.request.config.scenario.robots:
+        from .fleet_result import finish_fleet_run
+
         finish_fleet_run(run, failure)
         return
     run_result = finish_run(run, episode, failure)
     if failure:
         return
     if run.request.view:
+        from ..recording.fleet_topics import NO_NAMESPACE
+        from ..recording.local_maps import NO_MAPS, read_local_maps
         from ..report.rerun_viewer import show
 
         name, maps = run_result.directory.name, NO_MAPS
