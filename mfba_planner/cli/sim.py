@@ -118,8 +118,5 @@ def _summary(good: list[Result], total: int) -> str:
         from statistics import fmean
 
         lengths = [result.length_m for result in good]
-        text += (
-            f"; length {min(lengths):.3f} to {max(lengths):.3f} m, "
-            f"mean {fmean(lengths):.3f} m"
-        )
+        text += f"; length {min(lengths):.3f} to {max(lengths):.3f} m, mean {fmean(lengths):.3f} m"
     return text

@@ -31,7 +31,6 @@ _PRELOADED = (
     # What these import when they start.
     "mfba_planner.planning.algorithm_1",
     "mfba_planner.planning.predictive_planner",
-    "mfba_planner.scenarios.yaml_schema",
 )
 
 
@@ -46,6 +45,7 @@ def main(connection_fd: int) -> None:
 
 
 def _preload() -> None:
+    gc.disable()  # nothing that is imported is garbage
     for name in _PRELOADED:
         import_module(name)
     from rclpy.type_support import check_for_type_support
@@ -57,6 +57,7 @@ def _preload() -> None:
     # Else a collection in a node would write to, and so copy, the memory that all share.
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def _serve(connection: socket.socket) -> Callable[[], int] | None:

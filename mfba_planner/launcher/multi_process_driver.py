@@ -71,6 +71,7 @@ class _MultiProcessDriver:
 
     def run(self) -> dict[str, int]:
         """Run from start to end; return each robot's number of ticks."""
+        self._run.prepare_results()
         self._wait_until_ready()
         self._monitor.subscribe()
         self._run.start()
@@ -81,7 +82,6 @@ class _MultiProcessDriver:
             self._pause_world()
             raise
         self._run.end()
-        self._run.prepare_results()
         self._wait_for_last_decision(ticks)
         return ticks
 
