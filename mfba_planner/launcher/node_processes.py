@@ -25,6 +25,10 @@ GRACE_S = 10.0  # enough on an overloaded machine; a killed node counts as a fai
 MORE_EACH_S = 1.0  # all end at once, and DDS notifies each node of the others' end
 LAST_LINES = 8
 
+# No client calls it, each service makes every spin of an executor slower, and every node of the
+# graph has to be told of it.
+NO_EXTRA_SERVICES = {"start_type_description_service": False}
+
 
 PROGRAM = "mfba_planner.entry_points:{}"
 
@@ -124,7 +128,7 @@ class NodeProcesses:
         """
         for name, values in parameters.items():
             path = Path(self._files.name) / f"{name.replace('/', '.')}.yaml"
-            path.write_text(parameters_yaml(values), encoding="utf-8")
+            path.write_text(parameters_yaml({**values, **NO_EXTRA_SERVICES}), encoding="utf-8")
             args = ["--ros-args", "--disable-external-lib-logs", "--params-file", str(path)]
             args += extra_args.get(name.rpartition("/")[2], [])
             self.children.append(NodeProcess(self._server, name, args, self._sink))
