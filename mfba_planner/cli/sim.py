@@ -17,7 +17,9 @@ from ..planning.planner_params import Method
 from ..planning.planner_registry import PLANNERS
 from ..scenarios.run_config import Driver, RunConfig
 from ..simulation.episode import Episode
-from ..simulation.run_episode import simulate
+from ..simulation.run_episode import always_continue, simulate
+from ..simulation.world import World
+from .support.progress_bar import simulation_progress
 
 _METHODS = [method.value for method in Method]
 _DESCRIPTION = "Simulate episodes without ROS: same decisions as `mfba run`, no bag."
@@ -58,7 +60,7 @@ def main(args: list[str]) -> int:
         from ..launcher.execute_run import execute
 
         return execute(RunRequest(config=config, out=parsed.out, node_args={}))
-    return _run(config, parsed.seeds, _simulate)
+    return _run(config, parsed.seeds, _simulate if parsed.seeds > 1 else _simulate_with_progress)
 
 
 def _check(parsed: argparse.Namespace) -> None:
@@ -68,10 +70,19 @@ def _check(parsed: argparse.Namespace) -> None:
         raise ConfigError(f"--out {parsed.out}: holds one run; leave out --seeds")
 
 
-def _simulate(config: RunConfig) -> Episode:
+def _simulate(config: RunConfig, go_on: Callable[[World], bool] = always_continue) -> Episode:
     return simulate(
-        config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed
+        config.scenario,
+        planner=config.planner,
+        sensor=config.sensor,
+        seed=config.seed,
+        go_on=go_on,
     )
+
+
+def _simulate_with_progress(config: RunConfig) -> Episode:
+    with simulation_progress() as go_on:
+        return _simulate(config, go_on)
 
 
 def _run(config: RunConfig, seeds: int, simulate_one: Callable[[RunConfig], Episode]) -> int:

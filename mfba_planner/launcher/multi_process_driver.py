@@ -104,6 +104,9 @@ class _MultiProcessDriver:
         missing = dict.fromkeys(ready_calls, "no response yet")
 
         def all_ready() -> bool:
+            if self._run.console.is_progress_due():
+                ready = len(ready_calls) - len(missing)
+                self._run.console.show_progress(f"{ready} of {len(ready_calls)} nodes are ready")
             for name in [*missing]:
                 response = ready_calls[name].response()
                 if response is not None:

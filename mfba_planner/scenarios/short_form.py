@@ -9,6 +9,7 @@ from typing import Any
 
 from ..simulation.obstacle_motion import Obstacle
 from ..simulation.scenario import Scenario
+from .scenario_json import LIMIT
 
 HEADING_DEG, HEADING_RAD = "heading_deg", "heading_rad"
 
@@ -34,8 +35,8 @@ def _completed_obstacle(entry: Any) -> Any:
     if not isinstance(entry, dict):
         return entry
     full = _defaults(Obstacle, "speed_mps", HEADING_RAD) | entry
-    degrees = full.get(HEADING_DEG)
-    if HEADING_RAD not in entry and type(degrees) in (int, float) and math.isfinite(degrees):
+    degrees: Any = full.get(HEADING_DEG)
+    if HEADING_RAD not in entry and type(degrees) in (int, float) and abs(degrees) <= LIMIT:
         full[HEADING_RAD] = math.radians(full.pop(HEADING_DEG))
     return full
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs for a fork server's processes that start faster than nodes."""
 
 import os

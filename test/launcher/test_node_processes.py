@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Node processes: a fork server starts them; each is a process with all that is its own."""
 
 import os
