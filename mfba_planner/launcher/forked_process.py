@@ -112,7 +112,9 @@ class ForkServer:
 
     def _receive(self) -> ForkedProcess | None:
         """Take one message: a process that was started, or an exit code."""
-        data, fds, _, _ = socket.recv_fds(self._connection, MAX_BYTES, 1)
+        data, fds = b"", list[int]()
+        with suppress(ConnectionResetError):  # it has ended before it read a request
+            data, fds, _, _ = socket.recv_fds(self._connection, MAX_BYTES, 1)
         if not data:
             self.is_lost = True
             return None
