@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -10,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from mfba_planner.launcher.forked_process import ForkServer
 from mfba_planner.launcher.graph_monitor import GraphMonitor
 from mfba_planner.launcher.node_processes import NodeProcesses
 from mfba_planner.launcher.ros_domain import private_domain
@@ -41,7 +43,8 @@ class ManualRun:
         domain = self._stack.enter_context(private_domain())
         self.monitor = self._stack.enter_context(GraphMonitor(domain))
         keep_line = lambda name, line: self._lines.append(f"{name}: {line}")  # noqa: E731
-        self.processes = self._stack.enter_context(NodeProcesses(keep_line, lambda: False))
+        server = self._stack.enter_context(ForkServer())
+        self.processes = self._stack.enter_context(NodeProcesses(server, keep_line, lambda: False))
         self._deadline = time.monotonic() + TIMEOUT_S
         return self
 
@@ -85,8 +88,8 @@ class ManualRun:
     def replace_planner(self) -> None:
         """Kill the planner with -9 and start another."""
         (planner,) = [child for child in self.processes.children if child.name == topics.PLANNER]
-        planner.process.kill()
-        planner.process.wait()
+        planner.send_signal(signal.SIGKILL)
+        planner.wait_for_exit(TIMEOUT_S)
         self.processes.children.remove(planner)
         self.processes.start(
             {topics.PLANNER: self.parameters[topics.PLANNER] | {"wait_for": ""}}, {}

@@ -20,6 +20,7 @@ os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 from mfba_planner.core.geometry import distance
 from mfba_planner.core.planner_types import NANO
+from mfba_planner.launcher.forked_process import ForkServer
 from mfba_planner.launcher.graph_monitor import GraphMonitor, ServiceCall
 from mfba_planner.launcher.node_processes import NodeProcesses
 from mfba_planner.launcher.ros_domain import private_domain
@@ -58,7 +59,8 @@ def measure(ticks: int) -> dict[str, list[float]]:
         tempfile.TemporaryDirectory() as root,
         private_domain() as domain,
         GraphMonitor(domain) as monitor,
-        NodeProcesses(lambda name, line: None, lambda: False) as processes,
+        ForkServer() as server,
+        NodeProcesses(server, lambda name, line: None, lambda: False) as processes,
     ):
         parameters = node_parameters(config, peers)
         parameters["world_sim"] |= {
@@ -87,7 +89,7 @@ def measure(ticks: int) -> dict[str, list[float]]:
             if tick >= due:
                 due += (ticks - WARM_UP) / READINGS
                 for child in processes.children:
-                    history[child.name].append(resident_mb(child.process.pid))
+                    history[child.name].append(resident_mb(child.pid))
                 now_mb = ", ".join(f"{node} {mb[-1]:.1f}" for node, mb in history.items())
                 print(f"tick {tick}: {now_mb} MB", flush=True)
         print(f"{tick} ticks in {time.monotonic() - begun:.0f} s")

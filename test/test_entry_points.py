@@ -113,6 +113,25 @@ def test_ctrl_c_is_quiet(
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt(), 130), (SystemExit(143), 143)])
+def test_a_signal_in_a_class_statement_is_no_bug(error: BaseException, code: int) -> None:
+    """As in an import: Python 3.11 makes a RuntimeError of it."""
+
+    class Interrupted:
+        def __set_name__(self, *_: object) -> None:
+            raise error
+
+    def run() -> int:
+        type("Late", (), {"field": Interrupted()})
+        return 0
+
+    try:
+        found = run_and_return_exit_code(run, "mfba")
+    except SystemExit as ended:  # not wrapped: it ends the process with its code
+        found = int(ended.code or 0)
+    assert found == code
+
+
 def test_importing_entry_points_imports_nothing_heavy() -> None:
     heavy = "{'numpy', 'rclpy', 'matplotlib', 'yaml', 'pydantic', 'rich', 'argparse'}"
     code, out, err = outcome(start(f"print(sorted({heavy} & set(sys.modules)))"))

@@ -8,7 +8,6 @@ from keyword import iskeyword
 
 from .. import __version__
 from ..core.errors import ConfigError
-from ..core.option_specs import did_you_mean
 
 # Each is a module of this package with main(args) -> exit code.
 COMMANDS = {
@@ -48,6 +47,8 @@ def main(args: list[str]) -> int:
         print(f"mfba {__version__}")
         return 0
     if first not in COMMANDS:
+        from ..core.option_specs import did_you_mean
+
         raise ConfigError(f"{first}: unknown command; {did_you_mean(first, list(COMMANDS))}")
     module = f"{first}_" if iskeyword(first) else first.replace("-", "_")
     code: int = import_module(f"{__name__}.{module}").main(args[1:])

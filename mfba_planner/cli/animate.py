@@ -3,23 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from time import monotonic
 
 from ..core.argument_parser import Parser
 from ..core.errors import ConfigError
 from ..core.output_files import new_file
 from ..report.animation_options import AnimationOptions
 from .support.load_episodes import named_episodes
+from .support.progress_bar import progress_bar
 
 _DESCRIPTION = """Write a run as an animation for a web page or slides: WebP or GIF, by the suffix.
 
 A bag is read. Of a result (`mfba sim --out`) the run is simulated again, and must take the
 decisions that the result's digest stands for. A fleet's bag shows all its robots, or those
 that --robot names; the others are obstacles then. The animation repeats for ever."""
-_QUIET_S = 2.0  # no progress bar before
 
 
 def main(args: list[str]) -> int:
@@ -62,29 +59,8 @@ def main(args: list[str]) -> int:
     )
     with new_file(found.out) as file:
         runs, roster, _ = named_episodes([found.path], found.robots)
-        with _progress_bar() as progress:
+        with progress_bar("drawing") as progress:
             data = animation_bytes(runs, roster, suffix, options, progress)
         file.write(data)
     print(f"wrote {found.out}")
     return 0
-
-
-@contextmanager
-def _progress_bar() -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on a terminal, for frames that take longer than _QUIET_S."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn("drawing"), BarColumn(), TimeRemainingColumn())
-    start_s = monotonic()
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
-        task = bar.add_task("", visible=False)
-
-        def progress(done: int, total: int) -> None:
-            visible = monotonic() - start_s > _QUIET_S
-            bar.update(task, completed=done, total=total, visible=visible)
-
-        yield progress

@@ -11,6 +11,7 @@ from ..core.errors import ConfigError
 from ..core.option_specs import did_you_mean
 from ..core.output_files import new_run_directory, refuse_existing, write_new
 from ..report.figures.paper_figures import FIGURES, FORMATS, render
+from .support.progress_bar import progress_bar
 
 _DESCRIPTION = "Reproduce the paper's figures; the same version writes the same bytes."
 
@@ -34,9 +35,11 @@ def main(args: list[str]) -> int:
     names = _known("figure", parsed.only, FIGURES)
     forms = _known("format", parsed.format.split(","), FORMATS)
     out = new_run_directory(stem="figures") if parsed.out is None else refuse_existing(parsed.out)
-    files = {
-        f"{name}.{form}": data for name in names for form, data in render(name, forms).items()
-    }
+    files: dict[str, bytes] = {}
+    with progress_bar("drawing") as show:
+        for count, name in enumerate(names):
+            show(count, len(names))
+            files |= {f"{name}.{form}": data for form, data in render(name, forms).items()}
     out.mkdir(parents=True)
     for name, data in files.items():
         write_new(out / name, data)

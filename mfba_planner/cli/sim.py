@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import statistics
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,9 @@ from ..planning.planner_params import Method
 from ..planning.planner_registry import PLANNERS
 from ..scenarios.run_config import Driver, RunConfig
 from ..simulation.episode import Episode
-from ..simulation.run_episode import simulate
+from ..simulation.run_episode import always_continue, simulate
+from ..simulation.world import World
+from .support.progress_bar import simulation_progress
 
 _METHODS = [method.value for method in Method]
 _DESCRIPTION = "Simulate episodes without ROS: same decisions as `mfba run`, no bag."
@@ -59,7 +60,7 @@ def main(args: list[str]) -> int:
         from ..launcher.execute_run import execute
 
         return execute(RunRequest(config=config, out=parsed.out, node_args={}))
-    return _run(config, parsed.seeds, _simulate)
+    return _run(config, parsed.seeds, _simulate if parsed.seeds > 1 else _simulate_with_progress)
 
 
 def _check(parsed: argparse.Namespace) -> None:
@@ -69,10 +70,19 @@ def _check(parsed: argparse.Namespace) -> None:
         raise ConfigError(f"--out {parsed.out}: holds one run; leave out --seeds")
 
 
-def _simulate(config: RunConfig) -> Episode:
+def _simulate(config: RunConfig, go_on: Callable[[World], bool] = always_continue) -> Episode:
     return simulate(
-        config.scenario, planner=config.planner, sensor=config.sensor, seed=config.seed
+        config.scenario,
+        planner=config.planner,
+        sensor=config.sensor,
+        seed=config.seed,
+        go_on=go_on,
     )
+
+
+def _simulate_with_progress(config: RunConfig) -> Episode:
+    with simulation_progress() as go_on:
+        return _simulate(config, go_on)
 
 
 def _run(config: RunConfig, seeds: int, simulate_one: Callable[[RunConfig], Episode]) -> int:
@@ -116,9 +126,8 @@ def _summary(good: list[Result], total: int) -> str:
     """The number of successes, and the range of their path lengths."""
     text = f"{len(good)} of {total} at the goal without collision"
     if good:
+        from statistics import fmean
+
         lengths = [result.length_m for result in good]
-        text += (
-            f"; length {min(lengths):.3f} to {max(lengths):.3f} m, "
-            f"mean {statistics.fmean(lengths):.3f} m"
-        )
+        text += f"; length {min(lengths):.3f} to {max(lengths):.3f} m, mean {fmean(lengths):.3f} m"
     return text

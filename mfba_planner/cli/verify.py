@@ -21,6 +21,7 @@ from ..verification.compare_decisions import Divergence, first_divergence, side_
 from ..verification.redecide import is_foreign
 from ..verification.verify_bag import Report, verify_each
 from .support import verify_foreign_bag
+from .support.progress_bar import progress_bar
 from .support.verify_foreign_bag import print_remarks
 
 
@@ -51,7 +52,10 @@ def main(args: list[str]) -> int:
     verify_foreign_bag.refuse_arguments(bag, parsed)
     if parsed.picture and not parsed.settings:
         raise ConfigError("--picture: there is one trail only; give --set NAME=VALUE as well")
-    reports = verify_each(bag, parsed.robots, allow_modules=parsed.allow_modules)
+    with progress_bar("deciding again") as show:
+        reports = verify_each(
+            bag, parsed.robots, allow_modules=parsed.allow_modules, progress=show
+        )
     for robot, report in reports.items():
         _print_report(robot, report)
     failures = [

@@ -7,13 +7,11 @@ import sys
 from contextlib import closing, suppress
 
 from ..core.errors import BagError, MfbaError
-from ..recording.fleet_topics import NO_NAMESPACE
-from ..recording.local_maps import NO_MAPS, read_local_maps
 from ..scenarios.run_config import Driver
 from ..simulation.episode import Episode
 from ..simulation.run_episode import simulate
 from .console import RunConsole
-from .fleet_result import finish_fleet_run
+from .forked_process import ForkServer
 from .run_arguments import RunRequest
 from .run_directory import RunDirectory
 from .run_result import finish_run
@@ -21,9 +19,10 @@ from .run_state import Run
 from .stop_request import StoppedError, StopRequest
 
 
-def execute(request: RunRequest) -> int:
+def execute(request: RunRequest, fork_server: ForkServer | None = None) -> int:
     """Make the run; return 0 for the goal without collision, 128 + number for a signal.
 
+    fork_server starts the nodes of the multi-process driver; None: one that ends with the run.
     Raises MfbaError, in one line, for any other end. A run that fails before its start leaves no
     files; one that fails later leaves what was recorded.
     """
@@ -32,7 +31,7 @@ def execute(request: RunRequest) -> int:
     with StopRequest(request.timeout_s) as stop, closing(RunConsole()) as console:
         run = Run(request, RunDirectory(request.out), console, stop)
         try:
-            episode = _run_driver(run)
+            episode = _run_driver(run, fork_server)
             failure = run.stopped
         except (MfbaError, StoppedError) as error:
             failure = error
@@ -51,12 +50,16 @@ def execute(request: RunRequest) -> int:
 def _finish(run: Run, episode: Episode | None, failure: str = "") -> None:
     """Write the results of a run; check the outcome and open the viewer unless it failed."""
     if run.request.config.scenario.robots:
+        from .fleet_result import finish_fleet_run
+
         finish_fleet_run(run, failure)
         return
     run_result = finish_run(run, episode, failure)
     if failure:
         return
     if run.request.view:
+        from ..recording.fleet_topics import NO_NAMESPACE
+        from ..recording.local_maps import NO_MAPS, read_local_maps
         from ..report.rerun_viewer import show
 
         name, maps = run_result.directory.name, NO_MAPS
@@ -66,13 +69,14 @@ def _finish(run: Run, episode: Episode | None, failure: str = "") -> None:
     run_result.require_success()
 
 
-def _run_driver(run: Run) -> Episode | None:
+def _run_driver(run: Run, fork_server: ForkServer | None) -> Episode | None:
     """Run the requested driver; return the episode where no bag is written."""
     config = run.request.config
     if config.driver is Driver.MULTI_PROCESS:
         from .multi_process_driver import run_multi_process
 
-        run_multi_process(run)
+        with fork_server or ForkServer() as server:
+            run_multi_process(run, server)
         return None
     if config.driver is Driver.IN_PROCESS:
         _run_in_process(run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,7 @@ from ..ros.runtime.base_node import GraphNode
 from ..ros.runtime.polled_subscriptions import PolledSubscriptions
 
 RESEND_S = 0.5  # a response can get lost during discovery
+ASK_AGAIN_S = 0.005  # per node that is asked, or they have no time to get ready
 PROGRESS_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -41,8 +42,9 @@ class Progress:
 class ServiceCall:
     """A service call that is sent again until a response comes; it never blocks."""
 
-    def __init__(self, client: Client, request: Any) -> None:
-        """Send nothing yet."""
+    def __init__(self, client: Client, request: Any, again_s: float = 0.0) -> None:
+        """Send nothing yet, and later at most every again_s."""
+        self._again_s = again_s
         self._client = client
         self._request = request
         self._future: Any = None
@@ -57,7 +59,8 @@ class ServiceCall:
         if self._future is not None and now - self._sent_at > RESEND_S:
             self._client.remove_pending_request(self._future)
             self._future = None
-        if self._future is None and self._client.service_is_ready():
+        due = now - self._sent_at >= self._again_s
+        if self._future is None and due and self._client.service_is_ready():
             self._future, self._sent_at = self._client.call_async(self._request), now
         return None
 
@@ -101,11 +104,12 @@ class GraphMonitor:
         """Take the newest message of each topic, without waiting."""
         self._polled.poll()
 
-    def call_ready(self, nodes: Iterable[str]) -> dict[str, ServiceCall]:
+    def call_ready(self, nodes: Collection[str]) -> dict[str, ServiceCall]:
         """A call of ~/ready for each node."""
+        again_s = ASK_AGAIN_S * len(nodes)
         return {
             name: ServiceCall(
-                self._node.create_client(Trigger, f"{name}/ready"), Trigger.Request()
+                self._node.create_client(Trigger, f"{name}/ready"), Trigger.Request(), again_s
             )
             for name in nodes
         }

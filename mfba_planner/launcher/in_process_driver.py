@@ -27,6 +27,7 @@ from ..scenarios.run_config import (
     graph_parameters,
     recorder_parameters,
 )
+from .node_processes import NO_EXTRA_SERVICES
 
 KINDS: dict[str, Callable[..., GraphNode]] = {
     topics.RECORDER: Recorder,
@@ -35,8 +36,6 @@ KINDS: dict[str, Callable[..., GraphNode]] = {
     topics.PLANNER: PlannerNode,
 }
 
-# No client calls it, and each service makes every spin of the executor slower.
-_NO_EXTRA_SERVICES = {"start_type_description_service": False}
 DRAIN_SPINS = 500  # delivery within a process is synchronous: this empties all queues
 
 
@@ -74,7 +73,7 @@ def run_in_process(
             node = KINDS[program](
                 context=context,
                 namespace=namespace,
-                parameter_overrides=_overrides(values | _NO_EXTRA_SERVICES),
+                parameter_overrides=_overrides(values | NO_EXTRA_SERVICES),
                 start_parameter_services=False,
             )
             stack.callback(node.destroy_node)

@@ -13,6 +13,7 @@ from ..recording.bag_reader import BagReader
 from ..recording.fleet_topics import NO_NAMESPACE, robot_topic
 from ..ros.interface import topics
 from ..scenarios.run_config import NODES, READY_TIMEOUT_S, graph_parameters, recorder_parameters
+from .forked_process import ForkServer
 from .graph_monitor import GraphMonitor
 from .node_processes import NodeProcesses
 from .ros_domain import private_domain
@@ -28,7 +29,7 @@ LAST_DECISION_TIMEOUT_S = 2.0
 POLL_PERIOD_S = 0.02
 
 
-def run_multi_process(run: Run) -> None:
+def run_multi_process(run: Run, fork_server: ForkServer) -> None:
     """Run the graph until goal or time limit; the bag is closed and complete afterwards.
 
     Raises GraphError for a node that ends or does not get ready, StoppedError for a run that is
@@ -44,7 +45,9 @@ def run_multi_process(run: Run) -> None:
     with (
         private_domain(run.console.print_line) as domain,
         GraphMonitor(domain, config.scenario.robot_names or (NO_NAMESPACE,)) as monitor,
-        NodeProcesses(run.console.print_node_line, run.stop.is_urgent) as node_processes,
+        NodeProcesses(
+            fork_server, run.console.print_node_line, run.stop.is_urgent
+        ) as node_processes,
     ):
         run.console.print_line(f"starting the nodes; watch with ROS_DOMAIN_ID={domain}")
         node_processes.start(parameters, run.request.node_args)
@@ -68,6 +71,7 @@ class _MultiProcessDriver:
 
     def run(self) -> dict[str, int]:
         """Run from start to end; return each robot's number of ticks."""
+        self._run.prepare_results()
         self._wait_until_ready()
         self._monitor.subscribe()
         self._run.start()
@@ -100,6 +104,9 @@ class _MultiProcessDriver:
         missing = dict.fromkeys(ready_calls, "no response yet")
 
         def all_ready() -> bool:
+            if self._run.console.is_progress_due():
+                ready = len(ready_calls) - len(missing)
+                self._run.console.show_progress(f"{ready} of {len(ready_calls)} nodes are ready")
             for name in [*missing]:
                 response = ready_calls[name].response()
                 if response is not None:

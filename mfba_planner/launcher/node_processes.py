@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from collections import deque
@@ -20,74 +18,61 @@ import yaml
 
 from ..core.errors import GraphError
 from ..scenarios.run_config import Parameters
+from .forked_process import ForkServer
 
 RECORDER_GRACE_S = 20.0  # it first writes what it has received
 GRACE_S = 10.0  # enough on an overloaded machine; a killed node counts as a failure
 MORE_EACH_S = 1.0  # all end at once, and DDS notifies each node of the others' end
 LAST_LINES = 8
 
-
-# As multiprocessing does: the child gets the launcher's sys.path, so a checkout, a pip and a
-# colcon installation all work, from any directory.
-_BOOT = """\
-import sys
-sys.path[:] = {path!r}
-from mfba_planner.core.child_process import end_with_parent
-end_with_parent({parent})
-from mfba_planner import entry_points
-sys.exit(entry_points.{program}())
-"""
+# No client calls it, each service makes every spin of an executor slower, and every node of the
+# graph has to be told of it.
+NO_EXTRA_SERVICES = {"start_type_description_service": False}
 
 
-_LOGGING = {
-    "RCUTILS_CONSOLE_OUTPUT_FORMAT": "{severity}: {message}",
-    "RCUTILS_COLORIZED_OUTPUT": "0",
-    "RCUTILS_LOGGING_BUFFERED_STREAM": "1",  # by lines, or a killed node loses its last ones
-    # Responses get lost during discovery; graph_monitor sends the request again.
-    "PYTHONWARNINGS": "ignore:failed to send response:RuntimeWarning",
-}
+PROGRAM = "mfba_planner.entry_points:{}"
 
 
 class NodeProcess:
     """A running node; its output goes to sink(name, line), line by line."""
 
-    def __init__(self, name: str, args: list[str], sink: Callable[[str, str], None]) -> None:
+    def __init__(
+        self, server: ForkServer, name: str, args: list[str], sink: Callable[[str, str], None]
+    ) -> None:
         """Start a program of entry_points.py; name is PROGRAM or NAMESPACE/PROGRAM."""
         namespace, _, program = name.rpartition("/")
         if namespace:
             args = [*args, "-r", f"__ns:=/{namespace}"]
         self.name = name
         self.last_lines: deque[str] = deque(maxlen=LAST_LINES)
-        path = [entry or os.getcwd() for entry in sys.path]
-        boot = _BOOT.format(path=path, parent=os.getpid(), program=program)
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", boot, *args],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            env={**_LOGGING, **os.environ},
-            # Ctrl-C must reach the launcher only, which then ends the nodes: the recorder first.
-            start_new_session=True,
-        )
-        self._reader = Thread(target=self._read_output, args=(sink,), daemon=True)
+        output, write_end = os.pipe()
+        try:
+            self._process = server.start(PROGRAM.format(program), args, [program], write_end)
+        finally:
+            os.close(write_end)
+        self._reader = Thread(target=self._read_output, args=(output, sink), daemon=True)
         self._reader.start()
 
-    def _read_output(self, sink: Callable[[str, str], None]) -> None:
-        assert self.process.stdout is not None
-        with self.process.stdout as pipe:
+    def _read_output(self, output: int, sink: Callable[[str, str], None]) -> None:
+        with open(output, "rb") as pipe:
             for raw in pipe:
                 line = raw.decode("utf-8", "replace").rstrip()
                 self.last_lines.append(line)
                 sink(self.name, line)
 
     @property
-    def is_alive(self) -> bool:
-        """Whether the process still runs."""
-        return self.process.poll() is None
+    def pid(self) -> int:
+        """The process id."""
+        return self._process.pid
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code, negative for a signal; None while the process runs."""
+        return self._process.wait()
 
     def describe_exit(self) -> str:
         """Exit code or signal, as text."""
-        code = self.process.poll()
+        code = self.exit_code
         if code is None:
             return "still running"
         if code >= 0:
@@ -99,13 +84,11 @@ class NodeProcess:
 
     def send_signal(self, signum: signal.Signals) -> None:
         """Send a signal; no effect when the process has ended."""
-        self.process.send_signal(signum)
+        self._process.send_signal(signum)
 
     def wait_for_exit(self, timeout_s: float) -> bool:
         """Wait for the exit and for the last output; False after timeout_s."""
-        try:
-            self.process.wait(max(0.0, timeout_s))
-        except subprocess.TimeoutExpired:
+        if self._process.wait(timeout_s) is None:
             return False
         self._reader.join(1.0)  # a process it started may still hold the pipe
         return True
@@ -114,8 +97,14 @@ class NodeProcess:
 class NodeProcesses:
     """The node processes, as a context manager: all of them end with it, after errors too."""
 
-    def __init__(self, sink: Callable[[str, str], None], kill_at_once: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        server: ForkServer,
+        sink: Callable[[str, str], None],
+        kill_at_once: Callable[[], bool],
+    ) -> None:
         """Send output to sink; when kill_at_once() is true, stop() kills without waiting."""
+        self._server = server
         self.children: list[NodeProcess] = []
         self._sink = sink
         self._kill_at_once = kill_at_once
@@ -127,7 +116,7 @@ class NodeProcesses:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         stopped = self.children
         self.stop()
-        failed = [child for child in stopped if child.process.returncode != 0]
+        failed = [child for child in stopped if child.exit_code != 0]
         if failed and kind is None:
             raise GraphError(_exit_message(failed[0]))
 
@@ -139,10 +128,10 @@ class NodeProcesses:
         """
         for name, values in parameters.items():
             path = Path(self._files.name) / f"{name.replace('/', '.')}.yaml"
-            path.write_text(parameters_yaml(values), encoding="utf-8")
+            path.write_text(parameters_yaml({**values, **NO_EXTRA_SERVICES}), encoding="utf-8")
             args = ["--ros-args", "--disable-external-lib-logs", "--params-file", str(path)]
             args += extra_args.get(name.rpartition("/")[2], [])
-            self.children.append(NodeProcess(name, args, self._sink))
+            self.children.append(NodeProcess(self._server, name, args, self._sink))
 
     def remove_parameter_files(self) -> None:
         """Remove the parameter files; call it when every node has read its own."""
@@ -150,12 +139,12 @@ class NodeProcesses:
 
     def is_running(self, name: str) -> bool:
         """Whether a node of that name runs."""
-        return any(child.is_alive for child in self.children if child.name == name)
+        return any(child.exit_code is None for child in self.children if child.name == name)
 
     def check(self) -> None:
         """Raise GraphError for a node that has ended, with its last line of output."""
         for child in self.children:
-            if not child.is_alive:
+            if child.exit_code is not None:
                 child.wait_for_exit(1.0)  # it has ended: this reads its last lines
                 raise GraphError(_exit_message(child))
 

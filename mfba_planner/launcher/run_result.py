@@ -10,9 +10,6 @@ from pathlib import Path
 from ..core.errors import MfbaError
 from ..core.geometry import distance
 from ..evaluation.metrics import Result, evaluate
-from ..recording.decisions_without_inputs import print_omissions
-from ..recording.fleet_topics import NO_NAMESPACE
-from ..recording.read_episode import read_recording
 from ..simulation.episode import Episode, Outcome
 from .run_state import Run
 
@@ -55,6 +52,10 @@ def finish_run(run: Run, episode: Episode | None, failure: str = "") -> RunResul
     directory = run.directory
     left_out = ""
     if episode is None:
+        from ..recording.decisions_without_inputs import print_omissions
+        from ..recording.fleet_topics import NO_NAMESPACE
+        from ..recording.read_episode import read_recording
+
         recording = read_recording(directory.bag)
         print_omissions(directory.bag, recording.omitted)
         episode, left_out = (

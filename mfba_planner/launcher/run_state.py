@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
+from importlib import import_module
+from threading import Thread
 
 from ..simulation.fleet import Fleet
 from ..simulation.world import World
@@ -45,6 +48,15 @@ class Run:
         if self._started_at is not None:
             self.wall_s = time.monotonic() - self._started_at
 
+    def prepare_results(self) -> None:
+        """Import what draws the picture in a thread, while the caller waits for other processes.
+
+        An import that fails does so again, and is reported, where the picture is drawn.
+        """
+        if self.request.picture:
+            name = "fleet_figure" if self.request.config.scenario.robots else "run_figure"
+            Thread(target=_try_import, args=(f"mfba_planner.report.{name}",), daemon=True).start()
+
     def should_continue(self, world: World | Fleet) -> bool:
         """Show the progress; return whether the run continues. For drivers in this process."""
         self.start()
@@ -68,3 +80,8 @@ class Run:
             f"{(tick - before) / (now - then):.0f} ticks/s" if now > then else "",
         ]
         self.console.show_progress(", ".join(field for field in fields if field))
+
+
+def _try_import(name: str) -> None:
+    with suppress(Exception):
+        import_module(name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 
 from ..core.errors import ConfigError
 from ..core.option_specs import did_you_mean
@@ -12,13 +13,7 @@ from ..core.planner_types import PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..swarm.bat_swarm import Algorithm
 from .algorithm_1 import Algorithm1
-from .peers.apf import PotentialField
-from .peers.dwa import DynamicWindow
-from .peers.orca import Orca
-from .peers.straight_line import Straight
-from .peers.vfh import VectorFieldHistogram
 from .planner_params import PlannerParams
-from .predictive_planner import Predictive
 
 Factory = Callable[[PlannerParams, SensorParams, int], PathPlanner]
 
@@ -34,16 +29,17 @@ def _with(algorithm: Algorithm) -> Factory:
     return planner
 
 
-PLANNERS: dict[str, Factory] = {
+# Modules below this package are imported when their planner is asked for.
+PLANNERS: dict[str, Factory | str] = {
     "paper": _paper,
     "ba": _with(Algorithm.BA),
     "mfba": _with(Algorithm.MFBA),
-    "straight": Straight,
-    "predictive": Predictive,
-    "apf": PotentialField,
-    "vfh": VectorFieldHistogram,
-    "dwa": DynamicWindow,
-    "orca": Orca,
+    "straight": "peers.straight_line:Straight",
+    "predictive": "predictive_planner:Predictive",
+    "apf": "peers.apf:PotentialField",
+    "vfh": "peers.vfh:VectorFieldHistogram",
+    "dwa": "peers.dwa:DynamicWindow",
+    "orca": "peers.orca:Orca",
 }
 
 
@@ -65,7 +61,11 @@ def find_factory(name: str) -> Factory:
     factory = PLANNERS.get(name)
     if factory is None:
         raise ConfigError(f"planner {name!r}: unknown; {did_you_mean(name, list(PLANNERS))}")
-    return factory
+    if not isinstance(factory, str):
+        return factory
+    module, _, kind = factory.partition(":")
+    found: Factory = getattr(import_module(f"{__package__}.{module}"), kind)
+    return found
 
 
 def preset_of(factory: Factory, params: PlannerParams) -> PlannerParams:

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..core.errors import BagError
 from ..core.option_specs import did_you_mean
-from .bag_reader import BagReader, DecodedMessage
+
+if TYPE_CHECKING:
+    from .bag_reader import BagReader, DecodedMessage
 
 NO_NAMESPACE = ""
 

@@ -6,18 +6,19 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator, Sequence
-
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING
 
 from mfba_planner.evaluation.metrics import Result
 from mfba_planner.simulation.episode import Episode, Outcome
 
 from . import format_values
-from .terminal_output import print_encodable
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
 
 _ROOM_FOR_REMARKS = 60  # columns
+_MARGIN = 2  # columns at the right of the last one
 Row = tuple[str, str, str]
 
 
@@ -79,6 +80,9 @@ def result_table(
     episode: Episode, result: Result, ticks_per_s: float | None = None, *, remarks: bool = True
 ) -> Table:
     """The result as a rich table, titled with scenario, algorithm, seed and driver."""
+    from rich.table import Table
+    from rich.text import Text
+
     title = Text(format_values.run_title(episode), style="bold")
     table = Table(title=title, title_justify="left", box=None, show_header=False, padding=(0, 2))
     table.add_column(style="dim", no_wrap=True)
@@ -96,6 +100,16 @@ def result_text(
     episode: Episode, result: Result, ticks_per_s: float | None = None, width: int = 80
 ) -> str:
     """The table as plain text without colour, for logs; at most width columns."""
+    rows = [*result_rows(episode, result, ticks_per_s)]
+    names, figures = (max(len(row[column]) for row in rows) for column in (0, 1))
+    lines = [format_values.run_title(episode)]
+    lines += [f"  {name:<{names}}    {figure:<{figures}}    {note}" for name, figure, note in rows]
+    plain = all(line.isascii() and line.isprintable() for line in lines)
+    if plain and max(map(len, lines)) + _MARGIN <= width:
+        return "".join(f"{line.rstrip()}\n" for line in lines)
+    # Too narrow, or characters of other widths.
+    from rich.console import Console
+
     sink = io.StringIO()
     console = Console(file=sink, width=width, color_system=None)
     print_result(console, episode, result, ticks_per_s)
@@ -106,6 +120,8 @@ def print_result(
     console: Console, episode: Episode, result: Result, ticks_per_s: float | None = None
 ) -> None:
     """Print the table with the console's width, colours and encoding."""
+    from .terminal_output import print_encodable
+
     remarks = console.width >= _ROOM_FOR_REMARKS
     table = result_table(episode, result, ticks_per_s, remarks=remarks)
     print_encodable(console, lambda encodable: encodable.print(table))

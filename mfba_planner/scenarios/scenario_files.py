@@ -14,6 +14,7 @@ from ..core.option_specs import did_you_mean
 from ..core.shipped_files import scenario_names, scenario_path
 from ..simulation.scenario import Scenario
 from .scenario_json import EXAMPLE, UnusualError, as_written
+from .short_form import completed
 from .text_files import read_text
 from .trajectory_file import with_trajectory_files
 
@@ -55,7 +56,7 @@ def parse_scenario(text: str, origin: str, directory: Path = Path()) -> Scenario
     try:
         data = with_trajectory_files(data, directory)
         with suppress(UnusualError):
-            return as_written(data)
+            return as_written(completed(data))
         from .yaml_schema import checked
 
         return checked(data, directory)

@@ -95,7 +95,7 @@ class UnusualError(Exception):
 
 
 def as_written(data: dict[str, Any]) -> Scenario:
-    """The scenario from data that scenario_to_dict wrote, without the slow import of yaml_schema.
+    """The scenario from data as scenario_to_dict writes it, without the slow yaml_schema.
 
     Raises UnusualError for any other data; yaml_schema.checked accepts all that this accepts.
     """
@@ -239,9 +239,10 @@ def _point(data: Any) -> Point:
 
 
 def _number(value: Any) -> float:
-    if type(value) is not float or not -LIMIT <= value <= LIMIT:  # NaN is neither
+    # NaN is in no range; bool is a kind of int.
+    if type(value) not in (float, int) or not -LIMIT <= value <= LIMIT:
         raise UnusualError
-    return value
+    return float(value)
 
 
 def _not_negative(value: Any) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -54,6 +54,8 @@ from .tick_records import (
     read_tick_messages,
 )
 
+Progress = Callable[[int, int], None]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
@@ -88,10 +90,15 @@ def verify(path: str | Path, *, allow_modules: bool = False) -> Report:
 
 
 def verify_each(
-    path: str | Path, robots: Sequence[str] = (), *, allow_modules: bool = False
+    path: str | Path,
+    robots: Sequence[str] = (),
+    *,
+    allow_modules: bool = False,
+    progress: Progress = lambda done, total: None,
 ) -> dict[str, Report]:
     """Verify a bag of mfba: the decisions of every robot, or of the robots named.
 
+    progress is called with the ticks that are done and all ticks, of each robot in turn.
     Raises BagError for a bag that cannot be checked, for an unknown robot, and for an optimiser
     MODULE:NAME unless allow_modules: a bag must not choose what is imported.
     """
@@ -115,11 +122,11 @@ def verify_each(
         tick_records = join_ticks(
             messages.pop(name), tick_ns, setup.odom_frame, inputs=_inputs(setup)
         )
-        found[name] = _check(setup, tick_records)
+        found[name] = _check(setup, tick_records, progress)
     return found
 
 
-def _check(setup: Setup, tick_records: TickRecords) -> Report:
+def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Report:
     faults, notes = [*tick_records.faults], [*tick_records.notes]
     read_odom = partial(robot_pose, frame=setup.odom_frame)
     read_sectors = partial(sector_ranges, frame=setup.odom_frame)
@@ -133,7 +140,8 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
     pose = Pose2D(0.0, 0.0)
     recorded, decided = [], []
     unchecked, goal_id = 0, ""
-    for tick in tick_records.ticks:
+    for count, tick in enumerate(tick_records.ticks):
+        progress(count, len(tick_records.ticks))
         if DECISION not in tick.messages or tick.stamp_ns in tick_records.omitted_stamps:
             continue  # join_ticks has reported it if needed
         if SECTORS not in tick.messages:

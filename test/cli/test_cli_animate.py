@@ -15,6 +15,7 @@ from waiting import wait_until
 
 from mfba_planner import cli
 from mfba_planner.cli import animate
+from mfba_planner.cli.support import progress_bar
 from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.report.result_json import result_to_dict, write_result
 from mfba_planner.scenarios.scenario_files import load_scenario
@@ -146,9 +147,9 @@ def test_ctrl_c_leaves_nothing(result: Path) -> None:
 def test_a_terminal_sees_progress_when_it_takes_long(
     capsys: Capture, result: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(animate, "_QUIET_S", 0.0)
+    monkeypatch.setattr(progress_bar, "QUIET_S", 0.0)
     assert animated(capsys, result, "a.webp", *QUICK) == (0, "wrote a.webp\n", "")
     monkeypatch.setenv("FORCE_COLOR", "1")
     assert "drawing" in animated(capsys, result, "b.webp", *QUICK)[2]
-    monkeypatch.setattr(animate, "_QUIET_S", 1e9)
+    monkeypatch.setattr(progress_bar, "QUIET_S", 1e9)
     assert "drawing" not in animated(capsys, result, "c.webp", *QUICK)[2]

@@ -84,12 +84,12 @@ class Program:
     def node(self, name: str) -> int:
         """The PID of a node, NODE or NAMESPACE/NODE."""
         namespace, _, program = name.rpartition("/")
-        required = [f"entry_points.{program}()", f"__ns:=/{namespace}\0" if namespace else ""]
-        found = [
-            pid
-            for pid in self.processes()
-            if all(text in _read(pid, "cmdline") for text in required)
-        ]
+        required = [f"__ns:=/{namespace}"] if namespace else []
+        found = []
+        for pid in self.processes():
+            words = _read(pid, "cmdline").rstrip("\0").split("\0")
+            if words[0] == program and all(word in words for word in required):
+                found.append(pid)
         assert len(found) == 1, f"{name}: {found}"
         return found[0]
 

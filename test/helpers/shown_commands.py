@@ -71,6 +71,8 @@ REDUCED = {
         "python bench/static_map.py --worlds 1 --only fast-20"
     ),
     "python bench/tracking.py --memory 100000": "python bench/tracking.py --memory 20",
+    "python bench/startup.py --rounds 3": "python bench/startup.py --rounds 1 --only help",
+    "python bench/startup.py --imports verify": "python bench/startup.py --imports verify",
     "python bench/fleet.py": "python bench/fleet.py --seeds 1 --robots 3 --radius 3",
 }
 # Lines of a page with the name of the file for a block of YAML.

@@ -17,14 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.context import Context
 from rclpy.node import Node
-from waiting import wait_until
 
 from mfba_planner.core.errors import ConfigError, GraphError, OutputError
 from mfba_planner.core.option_specs import flatten
 from mfba_planner.core.robot_base import Drive
-from mfba_planner.launcher import node_processes
 from mfba_planner.launcher.console import RunConsole
-from mfba_planner.launcher.node_processes import NodeProcess, NodeProcesses, parameters_yaml
+from mfba_planner.launcher.node_processes import parameters_yaml
 from mfba_planner.launcher.ros_domain import (
     DOMAINS,
     claim_domain,
@@ -246,94 +244,6 @@ def test_a_domain_that_another_program_uses_is_skipped() -> None:
         context.try_shutdown()
         context.destroy()
     assert domain in free_domains()
-
-
-PROGRAMS = {
-    "prints": "print('one'); print('two', end='', flush=True); sys.exit(3)",
-    "ignores_sigterm": (
-        "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('up', flush=True);"
-        "signal.pause()"
-    ),
-    "waits": "import signal; print('up', flush=True); signal.pause()",
-    "prints_bytes": "sys.stdout.buffer.write(b'\\xff\\xfe ok\\n')",
-}
-
-
-@pytest.fixture
-def programs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Child programs that start faster than nodes."""
-    boot = "import sys\nprograms = {programs!r}\nexec(programs[{program!r}])"
-    monkeypatch.setattr(
-        node_processes,
-        "_BOOT",
-        boot.replace("{programs!r}", repr(PROGRAMS).replace("{", "{{").replace("}", "}}")),
-    )
-
-
-class Lines:
-    """A sink that stores its lines."""
-
-    def __init__(self) -> None:
-        self.all: list[tuple[str, str]] = []
-
-    def __call__(self, node: str, text: str) -> None:
-        self.all.append((node, text))
-
-
-@pytest.mark.usefixtures("programs")
-def test_all_output_and_the_exit_of_a_node_process() -> None:
-    lines = Lines()
-    child = NodeProcess("prints", [], lines)
-    assert child.wait_for_exit(10.0)
-    assert lines.all == [("prints", "one"), ("prints", "two")]
-    assert child.describe_exit() == "exit code 3"
-    garbled = NodeProcess("prints_bytes", [], lines)
-    assert garbled.wait_for_exit(10.0)
-    assert lines.all[-1] == ("prints_bytes", "\ufffd\ufffd ok")
-
-
-@pytest.mark.usefixtures("programs")
-def test_stop_kills_processes_that_ignore_sigterm(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mfba_planner.launcher.node_processes.GRACE_S", 0.2)
-    lines = Lines()
-    node_processes = NodeProcesses(lines, lambda: False)
-    node_processes.start({"ignores_sigterm": {}, "waits": {}}, {})
-    children = [*node_processes.children]
-    wait_until(lambda: len(lines.all) == 2, timeout_s=10.0)
-    with pytest.raises(RuntimeError, match="inside"), node_processes:
-        raise RuntimeError("inside")
-    assert [child.describe_exit() for child in children] == [
-        "killed by SIGKILL",
-        "killed by SIGTERM",
-    ]
-
-
-@pytest.mark.usefixtures("programs")
-def test_stop_kills_without_waiting_when_urgent() -> None:
-    lines, is_urgent = Lines(), threading.Event()
-    node_processes = NodeProcesses(lines, is_urgent.is_set)
-    node_processes.start({"ignores_sigterm": {}}, {})
-    wait_until(lambda: bool(lines.all), timeout_s=10.0)
-    children = [*node_processes.children]
-    is_urgent.set()
-    node_processes.stop()
-    assert children[0].describe_exit() == "killed by SIGKILL"
-
-
-@pytest.mark.usefixtures("programs")
-def test_an_ended_process_and_a_bad_exit_code_are_errors() -> None:
-    with pytest.raises(GraphError, match=r"^prints ended \(exit code 3\); last line: two$"):
-        _run_one_process("prints", check=True)
-    with pytest.raises(GraphError, match=r"^prints ended \(exit code 3\)"):
-        _run_one_process("prints", check=False)
-
-
-def _run_one_process(name: str, check: bool) -> None:
-    with NodeProcesses(Lines(), lambda: False) as node_processes:
-        node_processes.start({name: {}}, {})
-        wait_until(lambda: not node_processes.is_running(name), timeout_s=10.0)
-        if check:
-            node_processes.check()
 
 
 def test_lines_of_several_threads_stay_whole(

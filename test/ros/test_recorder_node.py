@@ -12,8 +12,8 @@ from edited_bags import record as record_run
 from geometry_msgs.msg import TwistStamped
 from launched_programs import Program
 from rcl_interfaces.srv import ListParameters
-from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import qos_profile_sensor_data
+from rclpy.task import Future
 from ros_graph import Graph
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
@@ -168,15 +168,18 @@ def test_a_parameter_client_that_gets_no_response_is_replaced(
 ) -> None:
     """As when the server has never discovered it."""
     monkeypatch.setattr(parameter_client, "RENEW_S", 0.3)
-    made: list[AsyncParameterClient] = []
+    made: list[Any] = []
+    create = Recorder.create_client
 
-    class FirstIsDeaf(AsyncParameterClient):
-        def list_parameters(self, *args: Any, **kwargs: Any) -> Any:
-            if self not in made:
-                made.append(self)
-            return None if self is made[0] else super().list_parameters(*args, **kwargs)
+    def create_client(self: Recorder, kind: Any, name: str) -> Any:
+        client = create(self, kind, name)
+        if kind is ListParameters:
+            made.append(client)
+            if client is made[0]:
+                monkeypatch.setattr(client, "call_async", lambda _: Future())
+        return client
 
-    monkeypatch.setattr(parameter_client, "AsyncParameterClient", FirstIsDeaf)
+    monkeypatch.setattr(Recorder, "create_client", create_client)
     graph.start(VirtualSensor, {})
     recorder = record(graph, tmp_path / "bag", nodes="virtual_sensor")
     graph.until(lambda: not recorder.missing())

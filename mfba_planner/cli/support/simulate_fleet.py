@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ...core.errors import ConfigError, MfbaError
@@ -11,7 +11,9 @@ from ...evaluation.metrics import Result, evaluate
 from ...report.fleet_table import fleet_text, why_no_success
 from ...scenarios.run_config import RunConfig
 from ...simulation.episode import Episode, Outcome
+from ...simulation.fleet import Fleet
 from ...simulation.run_episode import simulate_fleet
+from .progress_bar import simulation_progress
 
 _SEED_HEAD = "    seed  at the goal   longest     last  clearance  collisions"
 _SEED_ROW = "{:>8}  {:>4} of {:<4}  {:>6.3f} m  {:>5.2f} s  {:>7.3f} m  {:>10}"
@@ -25,7 +27,8 @@ def simulate(config: RunConfig, seeds: int, out: Path | None) -> int:
             f"{len(config.scenario.robots)}; leave it out"
         )
     if seeds == 1:
-        results = _results(config, config.seed)
+        with simulation_progress() as go_on:
+            results = _results(config, config.seed, go_on)
         print(fleet_text(config.scenario.robot_names, results), end="")
         if why := why_no_success(results):
             raise MfbaError(why)
@@ -44,9 +47,11 @@ def simulate(config: RunConfig, seeds: int, out: Path | None) -> int:
     return 0
 
 
-def _results(config: RunConfig, seed: int) -> list[Result]:
+def _results(
+    config: RunConfig, seed: int, go_on: Callable[[Fleet], bool] = lambda _: True
+) -> list[Result]:
     done: Sequence[Episode] = simulate_fleet(
-        config.scenario, planner=config.planner, sensor=config.sensor, seed=seed
+        config.scenario, planner=config.planner, sensor=config.sensor, seed=seed, go_on=go_on
     )
     return [evaluate(episode) for episode in done]
 

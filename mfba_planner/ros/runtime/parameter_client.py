@@ -8,8 +8,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.client import Client
 from rclpy.parameter import parameter_value_to_python
-from rclpy.parameter_client import AsyncParameterClient
 
 from ..interface import parameters
 from .base_node import GraphNode
@@ -22,7 +23,11 @@ NodeParameters = dict[str, dict[str, Any]]  # by node, by parameter
 
 
 class ParameterClient:
-    """Requests every node's parameters until it responds; then calls on_done(values) once."""
+    """Requests every node's parameters until it responds; then calls on_done(values) once.
+
+    With the two clients that this takes: rclpy's AsyncParameterClient has six per node, of which
+    every node of the graph is told.
+    """
 
     def __init__(
         self, node: GraphNode, nodes: set[str], on_done: Callable[[NodeParameters], None]
@@ -30,10 +35,9 @@ class ParameterClient:
         """Start to send requests while the node spins."""
         self._node = node
         self._on_done = on_done
-        self._clients: dict[str, AsyncParameterClient] = {}
+        self._clients: dict[str, tuple[Client, Client]] = {}  # of names, of values
         self._requested_s: dict[str, float] = {}
         self._created_s: dict[str, float] = {}
-        self._own: dict[str, list[Any]] = {}  # service clients, by node
         self._nodes = nodes
         self.values: NodeParameters = {}
         if nodes:
@@ -49,37 +53,39 @@ class ParameterClient:
         for name in self.pending:
             if now - self._created_s.get(name, float("-inf")) >= RENEW_S:
                 self._create(name, now)
-            client = self._clients[name]
+            clients = self._clients[name]
             waited = now - self._requested_s.get(name, float("-inf"))
-            if waited >= RETRY_S and client.services_are_ready():
+            if waited >= RETRY_S and all(client.service_is_ready() for client in clients):
                 self._requested_s[name] = now
-                client.list_parameters(callback=partial(self._on_names, name))
+                request = clients[0].call_async(ListParameters.Request())
+                request.add_done_callback(partial(self._on_names, name))
         if not self.pending:
             self._node.destroy_timer(self._timer)
-            for name in list(self._own):
+            for name in list(self._clients):
                 self._destroy(name)
             self._on_done(self.values)
 
     def _create(self, name: str, now: float) -> None:
         """Create the client of a node, or replace it."""
         self._destroy(name)
-        before = set(self._node.clients)
-        self._clients[name] = AsyncParameterClient(self._node, name)
-        self._own[name] = [client for client in self._node.clients if client not in before]
+        self._clients[name] = (
+            self._node.create_client(ListParameters, f"{name}/list_parameters"),
+            self._node.create_client(GetParameters, f"{name}/get_parameters"),
+        )
         self._created_s[name] = now
         self._requested_s.pop(name, None)
 
     def _destroy(self, name: str) -> None:
-        """There are six per node, and an executor waits for each of them at every spin."""
-        self._clients.pop(name, None)
-        for client in self._own.pop(name, []):
+        """Destroy the clients of a node: an executor waits for each of them at every spin."""
+        for client in self._clients.pop(name, ()):
             self._node.destroy_client(client)
 
     def _on_names(self, node: str, future: Any) -> None:
         names = list(future.result().result.names)
         if node not in self._clients:
             return  # a late response: the values are read
-        self._clients[node].get_parameters(names, callback=partial(self._on_values, node, names))
+        values = self._clients[node][1].call_async(GetParameters.Request(names=names))
+        values.add_done_callback(partial(self._on_values, node, names))
 
     def _on_values(self, node: str, names: list[str], future: Any) -> None:
         values = map(parameter_value_to_python, future.result().values)

@@ -80,3 +80,5 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
             if node is not None:
                 node.destroy_node()
             rclpy.try_shutdown()
+            # The participant and its shared memory, without waiting for the interpreter's end.
+            rclpy.get_default_context().destroy()
