@@ -21,7 +21,6 @@ from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions_with_sectors import DECISION, SECTORS, robots_with_decisions
-from ..recording.file_integrity import check_data
 from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.from_messages import (
     goal_point,
@@ -91,8 +90,7 @@ def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResu
     topics must be named, for unknown lidar extrinsics, and where known_map finds no map.
     """
     with BagReader(path) as reader:
-        for file in reader.file_paths:
-            check_data(file)
+        reader.check_data()
         scan = _topic_name(reader, SCAN, params.scan, "--scan")
         odom = _topic_name(reader, ODOMETRY, params.odom, "--odom")
         faults: list[str] = []

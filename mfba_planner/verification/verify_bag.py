@@ -20,7 +20,6 @@ from ..perception.sense_segments import sense_circles_and_segments
 from ..perception.sensory_vector import sensory_vector
 from ..planning.planner_factory import make_planner
 from ..recording.bag_reader import BagReader
-from ..recording.file_integrity import check_data
 from ..recording.fleet_topics import NO_NAMESPACE, select_robots
 from ..recording.from_messages import (
     body_velocity,
@@ -96,8 +95,7 @@ def verify_each(
     MODULE:NAME unless allow_modules: a bag must not choose what is imported.
     """
     with BagReader(path) as reader:
-        for file in reader.file_paths:
-            check_data(file)
+        reader.check_data()
         setups = read_setups(reader).by_robot
         names = select_robots(reader.path, list(setups), robots)
         for name in names:
