@@ -15,7 +15,7 @@ from ..core.random_streams import stream
 from ..optimizers.registry import NONE, optimize, require_optimizer
 from ..perception.known_map import KnownMap
 from ..perception.obstacle_memory import ObstacleMemory
-from ..perception.obstacle_tracker import Tracker
+from ..perception.obstacle_tracker import Track, Tracker
 from ..perception.scan_coverage import ScanCoverage
 from ..perception.sensory_vector import SensorParams, sense_circles
 from ..perception.static_map import StaticMap
@@ -304,6 +304,10 @@ class Predictive(BasePlanner):
             self.options.headings, self.options.reach_m, self.options.search_m, self.seed,
             self._known_map,
         )  # fmt: skip
+
+    def tracks(self) -> tuple[Track, ...]:
+        """The tracked obstacles, as of the last scan."""
+        return self._tracker.tracks
 
     def set_known_map(self, known_map: KnownMap | None) -> None:
         """Take a map that is known before the drive; another one than before: forget()."""

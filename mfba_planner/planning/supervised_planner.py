@@ -18,6 +18,7 @@ from .speed_limit import allowed_speed_share
 
 if TYPE_CHECKING:  # the paper's planner has no map and must not load it
     from ..perception.known_map import KnownMap
+    from ..perception.obstacle_tracker import Track
     from ..perception.static_map import StaticMap
 
 TRAIL_STEP_M = 0.05  # least distance of two remembered positions
@@ -49,6 +50,15 @@ class HasLocalMap(Protocol):
 
     def local_map(self) -> StaticMap:
         """The map, as of its last decision; another one after a reset."""
+        ...
+
+
+@runtime_checkable
+class HasTracks(Protocol):
+    """A planner that tracks obstacles."""
+
+    def tracks(self) -> tuple[Track, ...]:
+        """All tracks, as of its last decision."""
         ...
 
 
@@ -103,6 +113,11 @@ class SupervisedPlanner:
     def local_map(self) -> StaticMap | None:
         """The map of the wrapped planner, None if it keeps none."""
         return self.inner.local_map() if isinstance(self.inner, HasLocalMap) else None
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """The obstacles that the wrapped planner tracks, none if it does not."""
+        return self.inner.tracks() if isinstance(self.inner, HasTracks) else ()
 
     def set_known_map(self, known_map: KnownMap | None) -> None:
         """Give the map to the wrapped planner, if it takes one."""
