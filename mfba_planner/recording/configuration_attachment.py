@@ -30,13 +30,19 @@ def attach_configuration(writer: BagWriter, configuration: Mapping[str, Any]) ->
     writer.attach(ATTACHMENT_NAME, MEDIA_TYPE, text.encode())
 
 
+def has_configuration(reader: BagReader) -> bool:
+    """Whether a bag holds a configuration."""
+    return any(index.name == ATTACHMENT_NAME for index in reader.attachments)
+
+
 def read_configuration(reader: BagReader) -> dict[str, Any]:
     """The configuration in a bag. Raises BagError if missing or of an unknown version."""
     data = reader.attachment(ATTACHMENT_NAME)
     if data is None:
         raise BagError(
             f"{reader.path}: has no {ATTACHMENT_NAME}, so it was not recorded by mfba; "
-            "give a bag that `mfba run` recorded"
+            "give the parameters of its nodes with `mfba verify --params-file FILE`, or use "
+            "`mfba decide`"
         )
     try:
         content = json.loads(data)

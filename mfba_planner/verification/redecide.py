@@ -19,6 +19,7 @@ from ..perception.no_return import NoReturn
 from ..perception.obstacle_tracker import Track
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams
+from ..perception.static_map import StaticMap
 from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
@@ -86,7 +87,9 @@ def is_foreign(reader: BagReader) -> bool:
     """
     written = {name: topic for name, topic in reader.topics.items() if topic.message_count}
     ours = (
-        SECTORS in written or DECISION in written or robots_with_decisions(reader) != [NO_NAMESPACE]
+        SECTORS in written
+        or DECISION in written
+        or robots_with_decisions(reader) != [NO_NAMESPACE]
     )
     return not ours and {ODOMETRY, SCAN} <= {topic.type_name for topic in written.values()}
 
@@ -113,6 +116,7 @@ class DecidedScan(NamedTuple):
 
     decision: Decision
     scan: Scan | None
+    log_time_ns: int
 
 
 class RecordingDecider:
@@ -144,6 +148,9 @@ class RecordingDecider:
         self._scan_yaw = _ScanYaw(reader, params, self.base, self._topics(TRANSFORMS, TF_STATIC))
         planner = replace(params.planner, robot_radius_m=params.robot_radius_m)
         self._planner = make_planner(planner, params.sensor, params.seed)
+        self.planner = self._planner.params
+        self.goal_id = 0
+        self._goal: Point | None = None
         self._pose = Pose2D(0.0, 0.0)
         if params.planner.reads_known_map:
             self._planner.set_known_map(self._known_map())
@@ -152,6 +159,16 @@ class RecordingDecider:
     def tracks(self) -> tuple[Track, ...]:
         """The obstacles that the planner tracks since its last decision, () if it does not."""
         return self._planner.tracks
+
+    @property
+    def local_map(self) -> StaticMap | None:
+        """The planner's map, None if it keeps none."""
+        return self._planner.local_map
+
+    @property
+    def scan_yaw_rad(self) -> float:
+        """The yaw of the lidar of the last scan on the robot."""
+        return self._scan_yaw.last_rad
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -238,8 +255,10 @@ class RecordingDecider:
         remedy = "give one with --goal X Y" + (f", in metres in {self.frame!r}" if refusal else "")
         if others:
             remedy += f", or one of {', '.join(others)} with --goal-topic"
-        problem = f"no {GOAL_TOPIC} can be used: {refusal}" if refusal else (
-            f"no {GOAL_TOPIC} was recorded" + (" for this robot" if others else "")
+        problem = (
+            f"no {GOAL_TOPIC} can be used: {refusal}"
+            if refusal
+            else (f"no {GOAL_TOPIC} was recorded" + (" for this robot" if others else ""))
         )
         raise BagError(f"{self._reader.path}: {problem}; {remedy}")
 
@@ -271,6 +290,9 @@ class RecordingDecider:
         if isinstance(ranges, str):
             self._counts["scans that the sensor refuses"] += 1
         goal = next((g for t, g in reversed(self.goals) if t <= log_time_ns), None)
+        if goal != self._goal:
+            self._goal, self.goal_id = goal, self.goal_id + 1
+            self._planner.reset()  # as the node does
         observation = observe(stamp, pose, ranges, goal, self._pose, max(stamp - pose_stamp, 0))
         self._pose = observation.pose
         seen = None
@@ -280,7 +302,7 @@ class RecordingDecider:
             if self._params.planner.reads_scan:
                 observation = replace(observation, scan=seen)
         decision = self._planner.plan(observation)
-        return DecidedScan(decision, seen)
+        return DecidedScan(decision, seen, log_time_ns)
 
     def _laser_scan(self, scan: Any) -> Scan:
         return laser_scan(scan, no_return=self._params.scan_no_return)
@@ -307,6 +329,7 @@ class _ScanYaw:
         self._path, self._frames = reader.path, StaticFrames(reader, transforms)
         self._base = base
         self._yaws: dict[str, float] = {}
+        self.last_rad = params.scan_yaw_rad or 0.0
 
     def yaw_rad(self, scan: Any) -> float:
         """Yaw of the frame of a scan. Raises BagError if it is unknown."""
@@ -329,4 +352,5 @@ class _ScanYaw:
                     f"/tf_static: {frame} is rotated by {yaw:.4g} rad in {self._base}, "
                     f"{offset_m:.4g} m from its origin: --robot-radius must include that"
                 )
-        return self._yaws[frame]
+        self.last_rad = self._yaws[frame]
+        return self.last_rad

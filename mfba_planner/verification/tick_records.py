@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -41,6 +41,7 @@ class TickRecords:
     known_map: KnownMap | None = None  # the first that the planner did not refuse
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    began_late: bool = False  # whether the planner ran before the recording began
     omitted_stamps: frozenset[int] = (
         frozenset()
     )  # stamps of decisions after the end of their inputs
@@ -84,23 +85,36 @@ def join_ticks(
             by_topic[message.topic].append(message.message)
             positions[message.topic].append(index)
     ticks: dict[int, Tick] = {}
+    begun_ns = _begun_ns(by_topic)
     for topic in (*STAMPED, SCAN):
         # In real time a later decision on a stamp only reports stale inputs.
         must_match = bool(tick_ns) or topic not in (DECISION, STEP)
-        _join_stamped(records, ticks, topic, by_topic[topic], must_match=must_match)
+        _join_stamped(records, ticks, topic, by_topic[topic], begun_ns, must_match=must_match)
     # A blind sensor publishes no sensory vector.
-    sectors = [
-        item for item in zip(positions[SECTORS], by_topic[SECTORS]) if ranges_of(item[1])
-    ]
+    sectors = [item for item in zip(positions[SECTORS], by_topic[SECTORS]) if ranges_of(item[1])]
     steps, twists, vectors = (
         list(zip(positions[name], by_topic[name])) for name in (STEP, TWIST, VECTOR)
     )
-    _join_unstamped(records, ticks, SECTORS, sectors, VECTOR, vectors)
-    _join_unstamped(records, ticks, STEP, steps, TWIST, twists, must_match=bool(tick_ns))
+    for stamped_topic, stamped, topic, unstamped in (
+        (SECTORS, sectors, VECTOR, vectors), (STEP, steps, TWIST, twists)
+    ):  # fmt: skip
+        _join_unstamped(
+            records,
+            ticks,
+            stamped_topic,
+            stamped,
+            topic,
+            unstamped,
+            ragged=bool(begun_ns),
+            must_match=bool(tick_ns),
+        )
     records.ticks = [ticks[stamp] for stamp in sorted(ticks)]
+    records.began_late = bool(begun_ns) or bool(tick_ns and records.ticks[0].stamp_ns > tick_ns)
     _omit_decisions(records, inputs)
     if tick_ns:
-        _check_gaps(records, tick_ns, (*STAMPED, *([SCAN] if by_topic[SCAN] else []), TWIST))
+        also = [SCAN] if by_topic[SCAN] else []
+        also += [] if begun_ns else [TWIST]
+        _check_gaps(records, tick_ns, (*STAMPED, *also))
     return records
 
 
@@ -118,18 +132,29 @@ def _known_map(message: Any, frame: str) -> KnownMap | None:
         return None
 
 
+def _begun_ns(by_topic: Mapping[str, Sequence[Any]]) -> int:
+    """The stamp at which the last of the stamped topics began, ns.
+
+    A recorder that has just found a topic may write its first messages in another sequence.
+    """
+    stamped = (by_topic[name] for name in STAMPED)
+    firsts = [stamp_ns(messages[0].header.stamp) for messages in stamped if messages]
+    return max(firsts) if len(set(firsts)) > 1 else 0
+
+
 def _join_stamped(
     records: TickRecords,
     ticks: dict[int, Tick],
     topic: str,
     messages: list[Any],
+    begun_ns: int = 0,
     *,
     must_match: bool = True,
 ) -> None:
     latest_ns, repeated = -1, 0
     for message in messages:
         stamp = stamp_ns(message.header.stamp)
-        if stamp < latest_ns:
+        if begun_ns <= stamp < latest_ns:
             records.faults.append(f"{topic}: stamp {stamp} ns comes after {latest_ns} ns")
         latest_ns = max(latest_ns, stamp)
         stored = ticks.setdefault(stamp, Tick(stamp_ns=stamp)).messages
@@ -160,12 +185,14 @@ def _join_unstamped(
     topic: str,
     unstamped: list[tuple[int, Any]],
     *,
-    must_match: bool = True,
+    ragged: bool,
+    must_match: bool,
 ) -> None:
     """Join messages without stamp: each gets the stamp of the message it followed.
 
-    Both are given with their positions in the bag. A recorder that found one topic later than the
-    other, or a node that was killed between the two, may have left some at the ends unpaired.
+    Both are given with their positions in the bag. A node that was killed between the two may have
+    left the last one unpaired. Where the recorder has found one topic later than the other, or
+    any topics one after another (`ragged`), what belongs together is not known.
     """
     if not stamped or not unstamped:
         return
@@ -173,19 +200,18 @@ def _join_unstamped(
         messages = [message for _, message in unstamped]
         _join_stamped(records, ticks, topic, messages, must_match=must_match)
         return
-    before = [item for item in stamped if item[0] < unstamped[0][0]]
-    skipped = max(0, len(before) - 1)
-    early = 0 if before else sum(item[0] < stamped[0][0] for item in unstamped)
-    if skipped or early:
-        what = f"{skipped or early} messages on {stamped_topic if skipped else topic}"
-        later = topic if skipped else stamped_topic
-        records.notes.append(f"{later} began later than {what}, which are unpaired")
-        stamped, unstamped = stamped[skipped:], unstamped[early:]
+    before = sum(position < unstamped[0][0] for position, _ in stamped)
+    if ragged or before != 1:
+        records.notes.append(
+            f"{topic}: has no stamps, and not all of it was recorded; it is not checked"
+        )
+        return
     surplus = len(stamped) - len(unstamped)
     if surplus:
         text = f"{topic}: {len(unstamped)} messages for {len(stamped)} on {stamped_topic}"
         if surplus != (1 if stamped[-1][0] > unstamped[-1][0] else -1):
-            records.faults.append(text)
+            # In real time a message may be lost, and which one is not known.
+            (records.faults if must_match else records.notes).append(text)
             return
         records.notes.append(f"{text}, and the last one is unpaired (was a node killed?)")
     for (_, message), (_, other) in zip(stamped, unstamped):

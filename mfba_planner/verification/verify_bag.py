@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sense_segments import sense_circles_and_segments
 from ..perception.sensory_vector import sensory_vector
 from ..planning.planner_factory import make_planner
+from ..planning.planner_params import Method
 from ..recording.bag_reader import BagReader
 from ..recording.fleet_topics import NO_NAMESPACE, select_robots
 from ..recording.from_messages import (
@@ -35,7 +37,7 @@ from ..recording.from_messages import (
 from ..recording.from_messages import decision as read_decision
 from ..recording.run_parameters import Nodes, read_setup, read_setups
 from ..recording.run_setup import Setup
-from ..simulation.decision_digest import digest
+from ..simulation.decision_digest import canonical, digest
 from ..simulation.recorded_motion import is_present
 from ..simulation.scenario_map import with_known_map
 from .compare_decisions import Divergence, first_divergence
@@ -52,6 +54,13 @@ from .tick_records import (
     TickRecords,
     join_ticks,
     read_tick_messages,
+)
+
+
+_BEFORE = "what the planner perceived before the recording began is not in the bag"
+_NOT_PERCEIVED = (
+    f"{{count}} can be checked: {_BEFORE}; start the recorder before the planner, or send a new "
+    "goal while it records"
 )
 
 
@@ -184,6 +193,14 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
         faults += _contradictions(setup, tick, decision)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
+    if tick_records.began_late and setup.planner.method is not Method.PAPER:
+        first = _first_without_memory(recorded, decided)
+        if first == len(recorded) > 0:
+            faults.append(_NOT_PERCEIVED.format(count=f"none of its {first} decisions"))
+            recorded, decided = [], []
+        elif first:
+            notes.append(f"left out the first {first} decisions: {_BEFORE}")
+            recorded, decided = recorded[first:], decided[first:]
     return Report(
         setup=setup,
         recorded=tuple(recorded),
@@ -192,6 +209,13 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
         faults=tuple(faults),
         notes=tuple(notes),
     )
+
+
+def _first_without_memory(recorded: Sequence[Decision], decided: Sequence[Decision]) -> int:
+    """The index from which on all decisions are equal, their number if the last one is not."""
+    pairs = reversed(list(zip(recorded, decided)))
+    equal = takewhile(lambda pair: canonical(0, pair[0]) == canonical(0, pair[1]), pairs)
+    return len(recorded) - sum(1 for _ in equal)
 
 
 def _inputs(setup: Setup) -> list[str]:
