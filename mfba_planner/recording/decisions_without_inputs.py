@@ -28,7 +28,7 @@ def omission_text(stamps: Collection[int], topics: Collection[str]) -> str:
 
 
 def ragged_begin_text(stamps: Collection[int], topics: Collection[str]) -> str:
-    """The note about decisions with these stamps, in ns, before the first message of the topics."""
+    """The note about decisions with these stamps, in ns, before the topics' first message."""
     first = "decision" if len(stamps) == 1 else f"{len(stamps)} decisions"
     return (
         f"left out the first {first}, up to stamp {max(stamps)} ns: "

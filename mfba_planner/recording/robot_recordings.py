@@ -113,7 +113,7 @@ def read_trip(reader: BagReader, robot: str) -> Trip:
     """The trip of a robot: its first pose, and its last goal. Raises BagError."""
     start: Pose2D | None = None
     goal: Point | None = None
-    stamps = []
+    first_ns = last_ns = 0
     for _, message in messages_by_robot(reader, [robot], [DECISION]):
         try:
             found = decision(message.message, ())
@@ -122,10 +122,9 @@ def read_trip(reader: BagReader, robot: str) -> Trip:
         if start is None and all(map(math.isfinite, found.pose)):
             start = found.pose
         goal = found.goal or goal
-        stamps[1:] = [found.stamp_ns] if stamps else []
-        stamps = stamps or [found.stamp_ns]
+        first_ns, last_ns = first_ns or found.stamp_ns, found.stamp_ns
     start = start or Pose2D(0.0, 0.0)
-    return Trip(start, apart(start, goal), stamps[0], stamps[-1])
+    return Trip(start, apart(start, goal), first_ns, last_ns)
 
 
 def apart(start: Pose2D, goal: Point | None) -> Point:

@@ -42,7 +42,8 @@ def read_setups(reader: BagReader, given: Nodes | None = None) -> Setups:
     Without world_sim they are those of real robots: the scenario is the trip that was recorded.
     """
     configuration = read_configuration(reader) if given is None else {"nodes": given}
-    nodes, facts = configuration.get("nodes", {}), configuration.get("run", {})
+    nodes: Any = configuration.get("nodes", {})
+    facts: Any = configuration.get("run", {})
     try:
         if WORLD_SIM not in nodes:
             setups = robot_setups(reader, nodes, facts)

@@ -79,7 +79,7 @@ class Setup(NamedTuple):
         return world.outcome() or Outcome.INTERRUPTED
 
 
-def node_options(defaults: T, values: dict[str, Any]) -> T:
+def node_options(defaults: T, values: Mapping[str, Any]) -> T:
     """The options of one dataclass, from all parameters of a node."""
     names = flatten(defaults)
     then = {name: value for name, value in BEHAVIOUR_THEN.items() if name in names}

@@ -25,7 +25,8 @@ from .view_bounds import choose_view
 def draw_run(episode: Episode, path: Path, perceived: Sequence[Perceived] = ()) -> None:
     """Write the picture of a run as PNG; the same episode gives the same bytes.
 
-    perceived: what a real robot perceived, which is drawn with what its planner wanted. Raises OutputError when path exists already or cannot be written.
+    perceived: what a real robot perceived; it is drawn with what its planner wanted. Raises
+    OutputError when path exists already or cannot be written.
     """
     write_new(path, png_bytes(episode, perceived))
 

@@ -23,6 +23,7 @@ from ..perception.static_map import StaticMap
 from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
+from ..recording.configuration_attachment import has_configuration
 from ..recording.decisions_with_sectors import DECISION, SECTORS, robots_with_decisions
 from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.from_messages import (
@@ -81,7 +82,7 @@ class RedecideResult:
 
 
 def is_foreign(reader: BagReader) -> bool:
-    """Whether a bag has scans and odometry, but no decisions and no sectors.
+    """Whether a bag has no configuration, no decisions and no sectors of ours.
 
     A topic without messages counts as not recorded.
     """
@@ -91,7 +92,7 @@ def is_foreign(reader: BagReader) -> bool:
         or DECISION in written
         or robots_with_decisions(reader) != [NO_NAMESPACE]
     )
-    return not ours and {ODOMETRY, SCAN} <= {topic.type_name for topic in written.values()}
+    return not ours and not has_configuration(reader)
 
 
 def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResult:

@@ -95,25 +95,27 @@ def join_ticks(
     steps, twists, vectors = (
         list(zip(positions[name], by_topic[name])) for name in (STEP, TWIST, VECTOR)
     )
+    records.began_late = bool(begun_ns) or bool(tick_ns and min(ticks) > tick_ns)
+    not_joined = set()
     for stamped_topic, stamped, topic, unstamped in (
         (SECTORS, sectors, VECTOR, vectors), (STEP, steps, TWIST, twists)
     ):  # fmt: skip
+        # In real time nothing tells whether the first messages were recorded.
+        may_lack_first = records.began_late or not tick_ns
+        if begun_ns or (may_lack_first and not _alternate(stamped, unstamped)):
+            not_joined.add(topic)
+            records.notes.append(
+                f"{topic}: has no stamps, and not all of it was recorded; it is not checked"
+            )
+            continue
         _join_unstamped(
-            records,
-            ticks,
-            stamped_topic,
-            stamped,
-            topic,
-            unstamped,
-            ragged=bool(begun_ns),
-            must_match=bool(tick_ns),
+            records, ticks, stamped_topic, stamped, topic, unstamped, must_match=bool(tick_ns)
         )
     records.ticks = [ticks[stamp] for stamp in sorted(ticks)]
-    records.began_late = bool(begun_ns) or bool(tick_ns and records.ticks[0].stamp_ns > tick_ns)
     _omit_decisions(records, inputs)
     if tick_ns:
         also = [SCAN] if by_topic[SCAN] else []
-        also += [] if begun_ns else [TWIST]
+        also += [] if TWIST in not_joined else [TWIST]
         _check_gaps(records, tick_ns, (*STAMPED, *also))
     return records
 
@@ -177,6 +179,11 @@ def _content(topic: str, message: Any) -> str:
     return str(message)
 
 
+def _alternate(stamped: list[tuple[int, Any]], unstamped: list[tuple[int, Any]]) -> bool:
+    """Whether the first message without stamp follows the first stamped one; also without any."""
+    return not unstamped or sum(position < unstamped[0][0] for position, _ in stamped) == 1
+
+
 def _join_unstamped(
     records: TickRecords,
     ticks: dict[int, Tick],
@@ -185,26 +192,18 @@ def _join_unstamped(
     topic: str,
     unstamped: list[tuple[int, Any]],
     *,
-    ragged: bool,
     must_match: bool,
 ) -> None:
     """Join messages without stamp: each gets the stamp of the message it followed.
 
     Both are given with their positions in the bag. A node that was killed between the two may have
-    left the last one unpaired. Where the recorder has found one topic later than the other, or
-    any topics one after another (`ragged`), what belongs together is not known.
+    left the last one unpaired.
     """
     if not stamped or not unstamped:
         return
     if hasattr(unstamped[0][1], "header"):
         messages = [message for _, message in unstamped]
         _join_stamped(records, ticks, topic, messages, must_match=must_match)
-        return
-    before = sum(position < unstamped[0][0] for position, _ in stamped)
-    if ragged or before != 1:
-        records.notes.append(
-            f"{topic}: has no stamps, and not all of it was recorded; it is not checked"
-        )
         return
     surplus = len(stamped) - len(unstamped)
     if surplus:

@@ -56,7 +56,6 @@ from .tick_records import (
     read_tick_messages,
 )
 
-
 _BEFORE = "what the planner perceived before the recording began is not in the bag"
 _NOT_PERCEIVED = (
     f"{{count}} can be checked: {_BEFORE}; start the recorder before the planner, or send a new "
@@ -144,7 +143,8 @@ def _check(setup: Setup, tick_records: TickRecords) -> Report:
     goals = deque(tick_records.goals)
     goal: Point | None = None
     pose = Pose2D(0.0, 0.0)
-    recorded, decided = [], []
+    recorded: list[Decision] = []
+    decided: list[Decision] = []
     unchecked, goal_id = 0, ""
     for tick in tick_records.ticks:
         if DECISION not in tick.messages or tick.stamp_ns in tick_records.omitted_stamps:

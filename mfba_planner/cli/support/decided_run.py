@@ -48,7 +48,7 @@ class DecidedRun:
         reader: BagReader,
         out: Path | None,
     ) -> None:
-        """Create the directory, if one is wanted. Raises OutputError, and ConfigError without ROS."""
+        """Nothing is read or written yet; `out` is the directory to create, None for none."""
         self._decider, self._params, self._out = decider, params, out
         self._reader, self._name = reader, reader.path.stem
         self._modes: Counter[str] = Counter()
