@@ -15,7 +15,7 @@ from ..core.random_streams import stream
 from ..optimizers.registry import NONE, optimize, require_optimizer
 from ..perception.known_map import KnownMap
 from ..perception.obstacle_memory import ObstacleMemory
-from ..perception.obstacle_tracker import Track, Tracker
+from ..perception.obstacle_tracker import Tracker
 from ..perception.scan_coverage import ScanCoverage
 from ..perception.sensory_vector import SensorParams, sense_circles
 from ..perception.static_map import StaticMap
@@ -298,16 +298,12 @@ class Predictive(BasePlanner):
         self._coverage = ScanCoverage(self.options.headings, self.options.coverage_s)
         self._changes = SectorChanges()
         self._memory = ObstacleMemory(self.options.memory)
-        self._tracker = Tracker(self.options.tracking)
+        self.tracker = Tracker(self.options.tracking)
         self._map_planning = MapPlanning(
             self.params, self.options.map, self.options.route, self.options.risk,
             self.options.headings, self.options.reach_m, self.options.search_m, self.seed,
             self._known_map,
         )  # fmt: skip
-
-    def tracks(self) -> tuple[Track, ...]:
-        """The tracked obstacles, as of the last scan."""
-        return self._tracker.tracks
 
     def set_known_map(self, known_map: KnownMap | None) -> None:
         """Take a map that is known before the drive; another one than before: forget()."""
@@ -323,10 +319,10 @@ class Predictive(BasePlanner):
             known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
             return predicted_circles(known, (obs.pose_ns - stamp_ns) * NANO)
         if obs.scan is not None:
-            self._tracker.update(stamp_ns, pose, obs.scan)
+            self.tracker.update(stamp_ns, pose, obs.scan)
             self._coverage.update(stamp_ns, obs.scan)
-            self._map_planning.update(stamp_ns, pose, self._tracker)
-            return self._tracker.circles(obs.pose_ns, self.params.robot_radius_m)
+            self._map_planning.update(stamp_ns, pose, self.tracker)
+            return self.tracker.circles(obs.pose_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
     def _drive_rollout(self, obs: Observation) -> DriveRollout | None:

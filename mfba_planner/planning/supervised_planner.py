@@ -18,7 +18,7 @@ from .speed_limit import allowed_speed_share
 
 if TYPE_CHECKING:  # the paper's planner has no map and must not load it
     from ..perception.known_map import KnownMap
-    from ..perception.obstacle_tracker import Track
+    from ..perception.obstacle_tracker import Track, Tracker
     from ..perception.static_map import StaticMap
 
 TRAIL_STEP_M = 0.05  # least distance of two remembered positions
@@ -54,12 +54,10 @@ class HasLocalMap(Protocol):
 
 
 @runtime_checkable
-class HasTracks(Protocol):
+class HasTracker(Protocol):
     """A planner that tracks obstacles."""
 
-    def tracks(self) -> tuple[Track, ...]:
-        """All tracks, as of its last decision."""
-        ...
+    tracker: Tracker
 
 
 @runtime_checkable
@@ -117,7 +115,7 @@ class SupervisedPlanner:
     @property
     def tracks(self) -> tuple[Track, ...]:
         """The obstacles that the wrapped planner tracks, none if it does not."""
-        return self.inner.tracks() if isinstance(self.inner, HasTracks) else ()
+        return self.inner.tracker.tracks if isinstance(self.inner, HasTracker) else ()
 
     def set_known_map(self, known_map: KnownMap | None) -> None:
         """Give the map to the wrapped planner, if it takes one."""

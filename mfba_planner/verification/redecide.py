@@ -296,14 +296,14 @@ class RecordingDecider:
             self._planner.reset()  # as the node does
         observation = observe(stamp, pose, ranges, goal, self._pose, max(stamp - pose_stamp, 0))
         self._pose = observation.pose
-        seen = None
+        sensed = None
         if not observation.refused:
             yaw = observation.pose.yaw + self._scan_yaw.yaw_rad(scan)
-            seen = aligned(self._laser_scan(scan), yaw)
+            sensed = aligned(self._laser_scan(scan), yaw)
             if self._params.planner.reads_scan:
-                observation = replace(observation, scan=seen)
+                observation = replace(observation, scan=sensed)
         decision = self._planner.plan(observation)
-        return DecidedScan(decision, seen, log_time_ns)
+        return DecidedScan(decision, sensed, log_time_ns)
 
     def _laser_scan(self, scan: Any) -> Scan:
         return laser_scan(scan, no_return=self._params.scan_no_return)

@@ -117,10 +117,10 @@ class DecidedRun:
         if self._out is None or self._bag is None:
             return
         self._ticks.add(decision)
-        self._perceived.add(self._seen(step) if self._perceived.takes_next else None)
+        self._perceived.add(self._perceive(step) if self._perceived.takes_next else None)
         self._bag.add(decision, step.log_time_ns, decider.goal_id, decider.local_map)
 
-    def _seen(self, step: DecidedScan) -> Perceived | None:
+    def _perceive(self, step: DecidedScan) -> Perceived | None:
         if step.scan is None:
             return None
         tracks = (
