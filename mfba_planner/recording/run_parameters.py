@@ -49,7 +49,8 @@ def read_setups(reader: BagReader, given: Nodes | None = None) -> Setups:
             setups = robot_setups(reader, nodes, facts)
             first = next(iter(setups.values()))
             return Setups(first.scenario, first.seed, setups)
-        world, facts = nodes[WORLD_SIM], configuration["run"]
+        world = nodes[WORLD_SIM]
+        facts = configuration["run"]
         scenario = load_scenario(world["scenario_json"])
         names = scenario.robot_names
         starts = [[Pose2D(*member.start_m)] for member in scenario.robots]
