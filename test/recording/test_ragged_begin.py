@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 from edited_bags import Edit, one_changed, record, rewrite
 from recorded_bags import FOREIGN
+from rosbags.rosbag2 import StoragePlugin, Writer
 from test_decisions_without_inputs import DECISION, ODOM, SECTORS, STEP, TWIST, VECTOR
 
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError
+from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.read_episode import read_episode, summarize
 from mfba_planner.verification.verify_bag import verify
 
@@ -86,6 +88,43 @@ def test_what_has_no_input_yet_is_left_out_and_named(
     assert (f"the first {vanished} sectors have no decision" in note) == bool(vanished)
     assert cli.main(["digest", str(late)]) == 0
     assert cli.main(["report", str(late), "--out", str(tmp_path / "page.html")]) == 0
+
+
+def test_the_latched_parameters_are_the_configuration_of_a_bag_without_attachment(
+    bag: Path, tmp_path: Path
+) -> None:
+    """As `ros2 bag record` and `ros2 bag convert` leave it; storage is sqlite3 in the second."""
+    bare = rewrite(bag, tmp_path / "bare", lambda m: m, configure=lambda _: None)
+    unnamed = rewrite(bag, tmp_path / "unnamed", lambda m: m, configure=without_nodes)
+    converted = tmp_path / "converted"
+    with (
+        BagReader(bag) as reader,
+        Writer(converted, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer,
+    ):
+        connections = {
+            name: writer.add_connection(
+                name,
+                topic.type_name,
+                msgdef=reader.definitions[topic.type_name].text,
+                rihs01=topic.type_hash,
+                serialization_format="cdr",
+            )
+            for name, topic in reader.topics.items()
+        }
+        for message in reader.messages():
+            writer.write(connections[message.topic], message.log_time_ns, message.data)
+    whole = verify(bag)
+    for path in (bare, unnamed, converted):
+        report = verify(path)
+        assert report.is_identical
+        assert report.digest == whole.digest
+        assert report.setup.scenario == whole.setup.scenario
+        assert report.setup.planner == whole.setup.planner
+
+
+def without_nodes(content: Any) -> Any:
+    """The configuration as a recorder writes it that was told of no node."""
+    return {**content, "nodes": {}}
 
 
 def test_commands_are_checked_where_all_was_recorded(bag: Path, tmp_path: Path) -> None:
