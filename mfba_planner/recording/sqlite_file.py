@@ -33,7 +33,10 @@ def open_file(path: Path, shown: Path, *, salvage: bool) -> SqliteFile:
             )
             if not salvage:
                 file.close()
-                raise BagError(f"{shown}: {text}; run `mfba recover` for the rest")
+                raise BagError(
+                    f"{shown}: {text}; run `sqlite3 {shown} 'pragma wal_checkpoint(truncate)'`, "
+                    "or `mfba recover` for the rest"
+                )
             file.damage.append(text)
     return file
 

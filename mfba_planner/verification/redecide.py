@@ -61,6 +61,8 @@ class RedecideParams:
     scan: str = ""
     odom: str = ""
     goal_topic: str = ""
+    odom_frame: str = ""  # required frame of the odometry; "": that of the first message
+    scan_frame: str = ""  # required frame of the scans; "": any
     planner: PlannerParams = field(default_factory=PlannerParams)
     sensor: SensorParams = field(default_factory=SensorParams)
     seed: int = 0
@@ -139,7 +141,8 @@ class RecordingDecider:
         self._reasons: Counter[str] = Counter()  # why it is
         self._ahead_s: list[float] = []  # scan stamps against odometry at the same log time
         first = next(m.message for m in reader.decoded([self.odom]))
-        self.frame, self.base = first.header.frame_id, first.child_frame_id
+        self.frame = params.odom_frame or first.header.frame_id
+        self.base = first.child_frame_id
         self._poses = RecordedPoses(
             self._rising(self.odom),
             partial(value_or_refusal, partial(robot_pose, frame=self.frame)),
@@ -170,6 +173,11 @@ class RecordingDecider:
     def scan_yaw_rad(self) -> float:
         """The yaw of the lidar of the last scan on the robot."""
         return self._scan_yaw.last_rad
+
+    @property
+    def has_one_mounting(self) -> bool:
+        """Whether all scans so far were of one mounting of a lidar, as parameters hold it."""
+        return self._scan_yaw.is_one
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -306,7 +314,7 @@ class RecordingDecider:
         return DecidedScan(decision, sensed, log_time_ns)
 
     def _laser_scan(self, scan: Any) -> Scan:
-        return laser_scan(scan, no_return=self._params.scan_no_return)
+        return laser_scan(scan, self._params.scan_frame, self._params.scan_no_return)
 
     def _measure(self, pose: Pose2D | RefusalReason, scan: Any) -> Ranges | RefusalReason:
         if isinstance(pose, str):
@@ -331,6 +339,11 @@ class _ScanYaw:
         self._base = base
         self._yaws: dict[str, float] = {}
         self.last_rad = params.scan_yaw_rad or 0.0
+
+    @property
+    def is_one(self) -> bool:
+        """Whether all scans so far had the same yaw."""
+        return len(set(self._yaws.values())) < 2
 
     def yaw_rad(self, scan: Any) -> float:
         """Yaw of the frame of a scan. Raises BagError if it is unknown."""

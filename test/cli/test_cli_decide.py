@@ -229,6 +229,17 @@ def test_without_ros_only_the_directory_is_refused(
     assert not (tmp_path / "run").exists()
 
 
+def test_scans_of_two_mountings_are_decided_and_named(tmp_path: Path, capsys: Capture) -> None:
+    rear = transform(START_NS, child="rear", yaw=math.pi)
+    turns = [
+        scan(START_NS + k * TICK_NS, wall(0), frame=("laser", "rear")[k % 2]) for k in range(1, 21)
+    ]
+    messages = [transform(START_NS), rear, goal(START_NS, 0.0, 5.0), *steps(odom), *turns]
+    path = write(tmp_path / "bag", messages)
+    assert decide(path, "--out", str(tmp_path / "run")) == 0
+    assert "several mountings of a lidar" in capsys.readouterr().out
+
+
 def test_a_failure_leaves_no_directory(tmp_path: Path) -> None:
     other = scan(START_NS + 30 * TICK_NS, wall(0), frame="unknown")
     path = write(tmp_path / "bag", [*drive(20), other])

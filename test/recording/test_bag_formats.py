@@ -2,6 +2,7 @@
 """Every ordinary bag opens: storages, compressions, splits, versions, ROS 1, foreign channels."""
 
 import json
+import re
 import shutil
 import sqlite3
 import sys
@@ -311,13 +312,36 @@ def test_a_truncated_sqlite_file_is_refused(tmp_path: Path) -> None:
         redecide_recording(path, ROBOT)
 
 
-def test_a_sqlite_journal_that_was_left_is_named(tmp_path: Path) -> None:
-    path = FORMATS["sqlite3 file"](tmp_path)
-    path.with_name(f"{path.name}-wal").write_bytes(b"x")
-    with pytest.raises(BagError, match=r"db3-wal holds messages .* run `mfba recover`"):
+def test_a_sqlite_journal_that_was_left_is_named_and_can_be_brought_in(tmp_path: Path) -> None:
+    source = FORMATS["sqlite3 file"](tmp_path)
+    path = tmp_path / "killed.db3"
+    connection = sqlite3.connect(source)
+    connection.execute("pragma journal_mode=wal")
+    connection.execute("insert into messages (topic_id, timestamp, data) select topic_id, "
+                       "timestamp + 10000000000, data from messages where id > 40")  # fmt: skip
+    connection.commit()
+    for suffix in ("", "-wal"):  # as the recorder leaves them when it is killed
+        shutil.copy(f"{source}{suffix}", f"{path}{suffix}")
+    connection.close()
+    remedy = f"sqlite3 {path} 'pragma wal_checkpoint(truncate)'"
+    with pytest.raises(BagError, match=re.escape(f"run `{remedy}`, or `mfba recover`")):
         BagReader(path)
-    (problem,) = recover(path, tmp_path / "recovered").problems
-    assert "-wal holds messages that are not in the file yet" in problem
+    report = recover(path, tmp_path / "recovered")
+    assert report.messages == 82
+    assert "-wal holds messages that are not in the file yet" in report.problems[0]
+    connection = sqlite3.connect(path)
+    connection.execute("pragma wal_checkpoint(truncate)")
+    connection.close()
+    with BagReader(path) as reader:
+        assert reader.message_count == 124
+
+
+def test_a_sqlite_file_of_another_name_is_read_after_it_was_renamed(tmp_path: Path) -> None:
+    path = FORMATS["sqlite3 file"](tmp_path)
+    other = path.rename(path.with_suffix(".sqlite"))
+    with pytest.raises(BagError, match=r"rename it so that it ends in \.db3"):
+        BagReader(other)
+    assert redecide_recording(other.rename(path), ROBOT).decided
 
 
 def test_several_recordings_in_one_directory_are_refused(tmp_path: Path) -> None:
@@ -325,6 +349,8 @@ def test_several_recordings_in_one_directory_are_refused(tmp_path: Path) -> None
     write_ros1(tmp_path / "b.bag", drive(2))
     with pytest.raises(BagError, match=r"holds several recordings, a.bag, b.bag; give one"):
         BagReader(tmp_path)
+    with BagReader(tmp_path / "b.bag") as reader:
+        assert reader.message_count == 6
 
 
 def test_messages_of_an_unknown_type_are_read_but_not_decoded(tmp_path: Path) -> None:

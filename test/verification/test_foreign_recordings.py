@@ -75,6 +75,16 @@ def test_odometry_in_map_takes_goals_in_map(tmp_path: Path) -> None:
     )
 
 
+def test_frames_that_are_required_refuse_others_as_in_the_nodes(tmp_path: Path) -> None:
+    messages = [MOUNT, GOAL, *steps(odom, on_wall)]
+    found = decided(tmp_path, messages, odom_frame="odom", scan_frame="laser")
+    assert not found.nothing
+    for name, changes in (("odom", {"odom_frame": "map"}), ("scan", {"scan_frame": "base_scan"})):
+        (tmp_path / name).mkdir()
+        other = decided(tmp_path / name, messages, goal=(5.0, 0.0), **changes)
+        assert f"because: refused input: {name} is in frame" in other.nothing
+
+
 def test_odometry_without_child_frame(tmp_path: Path) -> None:
     backwards = transform(START_NS, yaw=math.pi)
     messages = [backwards, GOAL, *steps(lambda t: odom(t, child=""), lambda t: scan(t, wall(0)))]

@@ -100,6 +100,11 @@ class DecidedRun:
         print(f"decided: {count} decisions, digest {self._digest.hexdigest()}")
         if self._out is None or self._metrics is None or self._last is None:
             return
+        if not self._decider.has_one_mounting:
+            print(
+                "note: the scans are of several mountings of a lidar, and parameters hold one: "
+                "`mfba verify` of this run will find other decisions"
+            )
         episode = self._setup().episode(tuple(self._ticks.items))
         names = self._write(self._out, episode, self._metrics.result(episode.outcome))
         print(f"wrote {self._out}: {', '.join(['bag', *names])}")

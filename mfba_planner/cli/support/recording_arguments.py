@@ -107,6 +107,8 @@ def redecide_params(
         goal_topic=parsed.goal_topic or "",
         scan=parsed.scan or "",
         odom=parsed.odom or "",
+        odom_frame=str(both.get("odom_frame", "")),
+        scan_frame=str(both.get("scan_frame", "")),
         planner=planner,
         sensor=sensor,
         seed=_first(parsed.seed, both.get("seed")) or 0,
