@@ -175,7 +175,7 @@ class RecordingDecider:
         return self._scan_yaw.last_rad
 
     @property
-    def has_one_mounting(self) -> bool:
+    def has_same_extrinsics(self) -> bool:
         """Whether all scans so far were of one mounting of a lidar, as parameters hold it."""
         return self._scan_yaw.is_one
 

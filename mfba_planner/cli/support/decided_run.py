@@ -100,7 +100,7 @@ class DecidedRun:
         print(f"decided: {count} decisions, digest {self._digest.hexdigest()}")
         if self._out is None or self._metrics is None or self._last is None:
             return
-        if not self._decider.has_one_mounting:
+        if not self._decider.has_same_extrinsics:
             print(
                 "note: the scans are of several mountings of a lidar, and parameters hold one: "
                 "`mfba verify` of this run will find other decisions"
