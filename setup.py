@@ -61,6 +61,7 @@ setup(
     ],
     # Not tests_require: with it `colcon test` runs no test and stays green.
     extras_require={
+        "bags": ["rosbags>=0.11"],
         "dask": ["distributed>=2024.1"],
         "docs": [
             "furo>=2024.8",
@@ -82,7 +83,7 @@ setup(
             "pytest-cov>=6",
             "pytest-xdist>=3.6",
             "rerun-sdk>=0.29",
-            "rosbags>=0.10",
+            "rosbags>=0.11",
             "selenium>=4.25",
             "small-mcap>=0.10",
         ],

@@ -45,7 +45,7 @@ OUTSIDE: dict[str, set[str]] = {
     "scenarios": {"PIL", "numpy", "pydantic", "yaml"},
     "evaluation": {"distributed", "numpy", "pyarrow", "scipy"},
     "paper": {"numpy", "scipy"},
-    "recording": {"mcap", "mcap_ros2", "numpy", "yaml", "zstandard"},
+    "recording": {"mcap", "mcap_ros2", "numpy", "rosbags", "yaml", "zstandard"},
     "verification": set(),
     "report": {"PIL", "matplotlib", "numpy", "rerun", "rich"},
     "ros": {"numpy"} | ROS,

@@ -17,6 +17,7 @@ COMMANDS = {
     "info": "contents of a bag, and the result of its run",
     "digest": "decision digest of a bag or a result",
     "verify": "recompute the decisions of a bag, and compare bit for bit",
+    "decide": "decide anew on the scans and odometry of any recording, and show it",
     "diff": "first difference between the decisions of two bags",
     "export": "write a bag's ticks and decisions as one table, CSV or Parquet",
     "recover": "copy the intact messages of a broken bag into a new one",

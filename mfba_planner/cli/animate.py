@@ -58,7 +58,7 @@ def main(args: list[str]) -> int:
         fps=found.fps, speed=found.speed, width_px=found.width, max_bytes=found.max_bytes
     )
     with new_file(found.out) as file:
-        runs, roster, _ = named_episodes([found.path], found.robots)
+        runs, roster, *_ = named_episodes([found.path], found.robots)
         with progress_bar("drawing") as progress:
             data = animation_bytes(runs, roster, suffix, options, progress)
         file.write(data)

@@ -8,6 +8,7 @@ from pathlib import Path
 from ..core.argument_parser import Parser
 from ..core.output_files import bag_in
 from ..recording.decisions_without_inputs import print_omissions
+from ..recording.perceived import read_perceived
 from ..recording.read_episode import read_recording
 
 
@@ -26,7 +27,7 @@ def main(args: list[str]) -> int:
         from ..report.run_figure import draw_run
 
         (episode,) = runs.values()
-        draw_run(episode, parsed.png)
+        draw_run(episode, parsed.png, read_perceived(bag, runs).get(next(iter(runs)), ()))
     else:
         from ..report.fleet_figure import draw_fleet
 

@@ -33,6 +33,6 @@ def main(args: list[str]) -> int:
     check_size(len(parsed.paths))
     refuse_existing(parsed.out)
     named = named_episodes(parsed.paths, parsed.robots)
-    write_page(named.runs, parsed.out, named.fleet_names, named.maps)
+    write_page(named.runs, parsed.out, named.fleet_names, named.maps, named.perceived)
     print(f"wrote {parsed.out}")
     return 0

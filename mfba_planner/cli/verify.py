@@ -13,14 +13,16 @@ from ..core.errors import BagError, ConfigError
 from ..core.output_files import bag_in
 from ..launcher.set_option import add_set_argument, with_settings
 from ..recording.bag_reader import BagReader
+from ..recording.configuration_attachment import has_configuration
 from ..recording.fleet_topics import NO_NAMESPACE, with_robot_name
 from ..recording.read_episode import read_recording
+from ..recording.run_parameters import Nodes
 from ..simulation.episode import Episode, Outcome, stamp_of
 from ..simulation.run_episode import simulate, simulate_fleet
 from ..verification.compare_decisions import Divergence, first_divergence, side_by_side
 from ..verification.redecide import is_foreign
 from ..verification.verify_bag import Report, verify_each
-from .support import verify_foreign_bag
+from .support import recording_arguments, verify_foreign_bag
 from .support.progress_bar import progress_bar
 from .support.verify_foreign_bag import print_remarks
 
@@ -44,6 +46,7 @@ def main(args: list[str]) -> int:
         "--picture", type=Path, metavar="PNG", help="with --set: file to create, with both trails"
     )
     verify_foreign_bag.add_arguments(parser)
+    recording_arguments.add_params_file(parser)
     parsed = parser.parse(args)
     bag = bag_in(parsed.bag)
     with BagReader(bag) as reader:
@@ -52,9 +55,10 @@ def main(args: list[str]) -> int:
     verify_foreign_bag.refuse_arguments(bag, parsed)
     if parsed.picture and not parsed.settings:
         raise ConfigError("--picture: there is one trail only; give --set NAME=VALUE as well")
+    given = _given(bag, parsed)
     with progress_bar("deciding again") as show:
         reports = verify_each(
-            bag, parsed.robots, allow_modules=parsed.allow_modules, progress=show
+            bag, parsed.robots, allow_modules=parsed.allow_modules, given=given, progress=show
         )
     for robot, report in reports.items():
         _print_report(robot, report)
@@ -73,6 +77,19 @@ def main(args: list[str]) -> int:
             else:
                 _compare_closed_loop(bag, robot, recorded, simulated)
     return 0
+
+
+def _given(bag: Path, parsed: argparse.Namespace) -> Nodes | None:
+    """The parameters of --params-file, None where the bag has its own. Raises ConfigError."""
+    if parsed.params_file is None:
+        return None
+    with BagReader(bag) as reader:
+        if has_configuration(reader):
+            raise ConfigError(
+                f"--params-file {parsed.params_file}: {bag} contains its parameters already; "
+                "leave it out"
+            )
+    return recording_arguments.given_parameters(parsed)
 
 
 def _print_report(robot: str, report: Report) -> None:

@@ -23,7 +23,7 @@ def main(args: list[str]) -> int:
         help="write this file instead of opening the viewer; open it with `rerun RRD`",
     )
     parsed = parser.parse(args)
-    runs, fleet_names, maps = named_episodes(parsed.paths, parsed.robots)
+    runs, fleet_names, maps, _ = named_episodes(parsed.paths, parsed.robots)
     from ..report.rerun_viewer import save, show
 
     if parsed.save is None:

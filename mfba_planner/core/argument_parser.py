@@ -23,7 +23,12 @@ class Parser(argparse.ArgumentParser):
 
     def add_bag(self, name: str = "bag") -> None:
         """Add the argument for a bag to read; outputs.bag_in finds it in a run directory."""
-        self.add_argument(name, type=Path, metavar="BAG", help="run or bag directory, or .mcap")
+        self.add_argument(
+            name,
+            type=Path,
+            metavar="BAG",
+            help="run or bag directory, or .mcap, .db3 or .bag file",
+        )
 
     def add_robots(self) -> None:
         """Add --robot, which selects robots of a fleet's bag."""

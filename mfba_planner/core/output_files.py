@@ -30,7 +30,12 @@ def refuse_existing(path: Path) -> Path:
 def bag_in(path: Path) -> Path:
     """The bag of a run directory; any other path is returned as the bag itself."""
     bag = path / "bag"
-    return bag if bag.is_dir() and not any(path.glob("*.mcap")) else path
+    if not os.path.isdir(bag):
+        return path
+    is_bag = (path / "metadata.yaml").exists() or any(
+        any(path.glob(pattern)) for pattern in ("*.mcap*", "*.db3*")
+    )
+    return path if is_bag else bag
 
 
 def write_new(path: Path, data: bytes) -> None:

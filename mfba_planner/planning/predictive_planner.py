@@ -304,7 +304,7 @@ class Predictive(BasePlanner):
         self._coverage = ScanCoverage(self.options.headings, self.options.coverage_s)
         self._changes = SectorChanges()
         self._memory = ObstacleMemory(self.options.memory)
-        self._tracker = Tracker(self.options.tracking)
+        self.tracker = Tracker(self.options.tracking)
         self._dead_reckoning = DeadReckoning(self.params.tick_ns)
         self._map_planning = MapPlanning(
             self.params, self.options.map, self.options.route, self.options.risk,
@@ -326,10 +326,10 @@ class Predictive(BasePlanner):
             known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
             return predicted_circles(known, (obs.pose_ns - stamp_ns) * NANO)
         if obs.scan is not None:
-            self._tracker.update(stamp_ns, pose, obs.scan)
+            self.tracker.update(stamp_ns, pose, obs.scan)
             self._coverage.update(stamp_ns, obs.scan)
-            self._map_planning.update(stamp_ns, pose, self._tracker)
-            return self._tracker.circles(obs.pose_ns, self.params.robot_radius_m)
+            self._map_planning.update(stamp_ns, pose, self.tracker)
+            return self.tracker.circles(obs.pose_ns, self.params.robot_radius_m)
         return circles_from_sectors(pose.position, obs.ranges_m, self.options.sector_radius_m)
 
     def _beside_the_scan(self, obs: Observation) -> Observation:
@@ -337,7 +337,7 @@ class Predictive(BasePlanner):
         if obs.scan is None or obs.circles is not None or obs.sensed is None:
             return obs
         now = obs.pose_ns, obs.pose
-        error, variance = self._tracker.pose_error, self._tracker.pose_variance
+        error, variance = self.tracker.pose_error, self.tracker.pose_variance
         return replace(obs, pose=self._dead_reckoning.pose(obs.sensed, now, error, variance))
 
     def _drive_rollout(self, obs: Observation) -> DriveRollout | None:

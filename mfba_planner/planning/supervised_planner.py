@@ -18,6 +18,7 @@ from .speed_limit import allowed_speed_share
 
 if TYPE_CHECKING:  # the paper's planner has no map and must not load it
     from ..perception.known_map import KnownMap
+    from ..perception.obstacle_tracker import Track, Tracker
     from ..perception.static_map import StaticMap
 
 TRAIL_STEP_M = 0.05  # least distance of two remembered positions
@@ -50,6 +51,13 @@ class HasLocalMap(Protocol):
     def local_map(self) -> StaticMap:
         """The map, as of its last decision; another one after a reset."""
         ...
+
+
+@runtime_checkable
+class HasTracker(Protocol):
+    """A planner that tracks obstacles."""
+
+    tracker: Tracker
 
 
 @runtime_checkable
@@ -103,6 +111,11 @@ class SupervisedPlanner:
     def local_map(self) -> StaticMap | None:
         """The map of the wrapped planner, None if it keeps none."""
         return self.inner.local_map() if isinstance(self.inner, HasLocalMap) else None
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """The obstacles that the wrapped planner tracks, none if it does not."""
+        return self.inner.tracker.tracks if isinstance(self.inner, HasTracker) else ()
 
     def set_known_map(self, known_map: KnownMap | None) -> None:
         """Give the map to the wrapped planner, if it takes one."""

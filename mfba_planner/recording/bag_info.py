@@ -27,6 +27,8 @@ class BagInfo:
     attachments: tuple[tuple[str, str, int], ...]  # name, media type, bytes
     metadata_names: tuple[str, ...]
     problems: tuple[str, ...]
+    kind: str = ""
+    left_out: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -58,6 +60,8 @@ def _describe(reader: BagReader) -> BagInfo:
             attachments=tuple((a.name, a.media_type, a.data_size) for a in reader.attachments),
             metadata_names=tuple(name for name, _ in reader.metadata_records()),
             problems=tuple(reader.problems),
+            kind=reader.kind,
+            left_out=tuple(reader.left_out),
         )
 
 
@@ -67,6 +71,7 @@ def format_info(info: BagInfo) -> str:
         f"Bag:         {info.path}",
         f"Files:       {', '.join(file.name for file in info.files)}",
         f"Size:        {_size(info.size_bytes)}",
+        f"Format:      {info.kind}",
         f"ROS distro:  {info.ros_distro}",
         f"Complete:    {'yes' if info.complete else f'no; run `mfba recover {info.path}`'}",
         *(f"  problem:   {problem}" for problem in info.problems),
@@ -87,6 +92,7 @@ def format_info(info: BagInfo) -> str:
             f"Topic:       {topic.name:<{name_width}}  {topic.type_name:<{type_width}}  "
             f"{topic.message_count:>8}  {offered}".rstrip()
         )
+    lines += [f"Left out:    {text}" for text in info.left_out]
     lines += [
         f"Attachment:  {name} ({media_type}, {_size(size)})"
         for name, media_type, size in info.attachments

@@ -19,6 +19,7 @@ RECORD_KEY = "serialized_metadata"
 ROS_DISTRO = "jazzy"
 VERSION = 9
 NO_TIME_NS = 2**63 - 1  # rosbag2 writes this as the start of a bag without messages
+ZSTD = "zstd"
 _ROOT = "rosbag2_bagfile_information"
 
 
@@ -134,20 +135,15 @@ def _unreadable(source: str, error: Exception) -> BagError:
 
 
 def _parse(content: Mapping[str, Any], source: str) -> BagMetadata:
-    storage = content["storage_identifier"]
-    if storage != "mcap":
+    # Which storage the files are of, and how each is compressed, their first bytes tell.
+    compression = str(content.get("compression_format") or ZSTD).lower()
+    if compression != ZSTD:
         raise BagError(
-            f"{source}: storage {storage!r}, only mcap can be read; "
-            "convert the bag with `rosbags-convert --dst-storage mcap`"
-        )
-    mode = str(content.get("compression_mode") or "none").lower()
-    if mode != "none":
-        raise BagError(
-            f"{source}: compressed by {mode}, only MCAP's own chunk compression can be read; "
-            "convert the bag with `ros2 bag convert`"
+            f"{source}: compressed by {compression!r}, only {ZSTD} can be read; "
+            "record with --compression-format zstd, or without compression"
         )
     if not content["relative_file_paths"]:
-        raise BagError(f"{source}: lists no storage file; give the .mcap file itself")
+        raise BagError(f"{source}: lists no storage file; give the .mcap or .db3 file itself")
     # Before version 5 there are no per-file counts: the first file gets the whole bag's count.
     per_file = content.get("files") or [
         {"path": path, "message_count": content["message_count"] if i == 0 else 0}
@@ -155,7 +151,7 @@ def _parse(content: Mapping[str, Any], source: str) -> BagMetadata:
     ]
     by_path = {str(file["path"]): file for file in per_file}
     return BagMetadata(
-        topics=tuple(_topic(item, source) for item in content["topics_with_message_count"] or ()),
+        topics=tuple(_topic(item) for item in content["topics_with_message_count"] or ()),
         files=tuple(
             _file(str(path), by_path.get(str(path), {})) for path in content["relative_file_paths"]
         ),
@@ -163,14 +159,8 @@ def _parse(content: Mapping[str, Any], source: str) -> BagMetadata:
     )
 
 
-def _topic(item: Mapping[str, Any], source: str) -> BagTopic:
+def _topic(item: Mapping[str, Any]) -> BagTopic:
     topic = item["topic_metadata"]
-    encoding = topic["serialization_format"]
-    if encoding != "cdr":
-        raise BagError(
-            f"{source}: topic {topic['name']} is serialized as {encoding!r}, "
-            "only cdr can be read; convert the bag with `ros2 bag convert`"
-        )
     return BagTopic(
         name=str(topic["name"]),
         type_name=str(topic["type"]),

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The configuration of a run as an attachment of its bag: write and read it."""
+"""The configuration of a run as an attachment of its bag: write and read it.
+
+`ros2 bag record` stores no attachment, and `ros2 bag convert` drops it. The nodes therefore
+publish their parameters too, latched; these are the configuration of a bag without attachment.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,8 @@ if TYPE_CHECKING:  # reading a bag must not load the writer
 ATTACHMENT_NAME = "mfba_planner/configuration.json"
 MEDIA_TYPE = "application/json"
 SCHEMA_VERSION = 1
+PARAMETERS = "/parameters"
+_NODES, _STRING = ("planner", "virtual_sensor", "world_sim"), "std_msgs/msg/String"
 
 
 def attach_configuration(writer: BagWriter, configuration: Mapping[str, Any]) -> None:
@@ -30,13 +36,52 @@ def attach_configuration(writer: BagWriter, configuration: Mapping[str, Any]) ->
     writer.attach(ATTACHMENT_NAME, MEDIA_TYPE, text.encode())
 
 
+def has_configuration(reader: BagReader) -> bool:
+    """Whether a bag holds a configuration, as an attachment or on topics."""
+    is_attached = any(index.name == ATTACHMENT_NAME for index in reader.attachments)
+    return is_attached or bool(_parameter_topics(reader))
+
+
+def _parameter_topics(reader: BagReader) -> dict[str, str]:
+    """The name of a node with its namespace, by its topic of parameters; with messages only."""
+    return {
+        name: name.removesuffix(PARAMETERS).strip("/")
+        for name, topic in reader.topics.items()
+        if topic.type_name == _STRING
+        and topic.message_count
+        and name.removesuffix(PARAMETERS).rpartition("/")[2] in _NODES
+        and name.endswith(PARAMETERS)
+    }
+
+
+def _from_topics(reader: BagReader) -> dict[str, Any] | None:
+    """The configuration of the nodes' latched parameters, None where there are none."""
+    names = _parameter_topics(reader)
+    nodes: dict[str, Any] = {}
+    for message in reader.decoded(names) if names else ():
+        try:
+            values = json.loads(message.message.data)
+        except ValueError:
+            values = None
+        if not isinstance(values, dict):
+            raise BagError(
+                f"{reader.path}: {message.topic} is not JSON of an object; give the parameters "
+                "with `mfba verify --params-file FILE`"
+            )
+        nodes.setdefault(names[message.topic], values)  # as when the recording began
+    return {"nodes": nodes, "run": {}} if nodes else None
+
+
 def read_configuration(reader: BagReader) -> dict[str, Any]:
     """The configuration in a bag. Raises BagError if missing or of an unknown version."""
     data = reader.attachment(ATTACHMENT_NAME)
+    if data is None and (published := _from_topics(reader)):
+        return published
     if data is None:
         raise BagError(
             f"{reader.path}: has no {ATTACHMENT_NAME}, so it was not recorded by mfba; "
-            "give a bag that `mfba run` recorded"
+            "give the parameters of its nodes with `mfba verify --params-file FILE`, or use "
+            "`mfba decide`"
         )
     try:
         content = json.loads(data)
@@ -50,4 +95,6 @@ def read_configuration(reader: BagReader) -> dict[str, Any]:
             f"{reader.path}: {ATTACHMENT_NAME} has schema_version {version!r}, only "
             f"{SCHEMA_VERSION} can be read; use the mfba that recorded it"
         )
+    if not content.get("nodes") and (published := _from_topics(reader)):
+        content["nodes"] = published["nodes"]  # the recorder was told of no node
     return dict(content)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ..core.errors import BagError, InputError
 from ..core.planner_types import Decision, Ranges
 from .bag_reader import BagReader, DecodedMessage
-from .decisions_without_inputs import omission_text
+from .decisions_without_inputs import omission_text, ragged_begin_text, undecided_text
 from .fleet_topics import NO_NAMESPACE, messages_by_robot, robot_topic, with_robot_name
 from .from_messages import decision, sector_ranges, stamp_ns
 
@@ -46,9 +46,9 @@ def stream_decisions(
     """Yield each robot's decisions in bag sequence, one per stamp, in one pass.
 
     Of several decisions on a stamp the first is used: a later one only reports stale inputs.
-    Decisions after the last sectors are omitted; at the end a note about them is stored by robot
-    in the last argument. Raises BagError for a bag without decisions, for a malformed decision,
-    and if the sectors of a decision are missing before the last sectors.
+    Decisions before the first and after the last sectors are omitted; at the end a note about
+    them is stored by robot in the last argument. Raises BagError for a bag without decisions, for
+    a malformed decision, and if the sectors of a decision are missing in between.
     """
     require_decisions(reader, robots)
     pairs = {robot: _StampMatching() for robot in robots}
@@ -60,11 +60,20 @@ def stream_decisions(
         if len(pairs[robot].decisions) > MAX_WAITING:
             raise _missing_sectors(reader, robot, next(iter(pairs[robot].decisions)))
     for robot, matching in pairs.items():
+        early = [stamp for stamp in matching.decisions if matching.sectors_began_after(stamp)]
+        late = [stamp for stamp in matching.decisions if matching.sectors_ended_before(stamp)]
         for stamp in matching.decisions:
-            if not matching.sectors_ended_before(stamp):
+            if stamp not in early and stamp not in late:
                 raise _missing_sectors(reader, robot, stamp)
-        if matching.decisions:
-            omitted[robot] = omission_text(matching.decisions, [SECTORS])
+        notes = []
+        if early:
+            notes.append(ragged_begin_text(early, [SECTORS]))
+        elif count := matching.sectors_before_decisions:
+            notes.append(undecided_text(count))
+        if late:
+            notes.append(omission_text(late, [SECTORS]))
+        if notes:
+            omitted[robot] = "; ".join(notes)
 
 
 def _missing_sectors(reader: BagReader, robot: str, stamp: int) -> BagError:
@@ -80,7 +89,13 @@ class _StampMatching:
         self.decisions: OrderedDict[int, Any] = OrderedDict()
         self._matched: OrderedDict[int, None] = OrderedDict()
         self._unmatched = {SECTORS: self.sectors, DECISION: self.decisions}
-        self._last_sectors_ns = -1
+        self._first_sectors_ns = self._last_sectors_ns = -1
+        self._first_decision_ns: int | None = None
+        self.sectors_before_decisions = 0
+
+    def sectors_began_after(self, stamp: int) -> bool:
+        """Whether pairs were matched, but the first sectors are newer than this stamp."""
+        return bool(self._matched) and stamp < self._first_sectors_ns
 
     def sectors_ended_before(self, stamp: int) -> bool:
         """Whether pairs were matched, but the latest sectors are older than this stamp."""
@@ -90,7 +105,12 @@ class _StampMatching:
         """Add the next message; (decision, sectors) once both are present, else None."""
         stamp = stamp_ns(message.message.header.stamp)
         if message.topic == SECTORS:
+            if self._first_sectors_ns < 0:
+                self._first_sectors_ns = stamp
             self._last_sectors_ns = max(self._last_sectors_ns, stamp)
+        elif self._first_decision_ns is None:
+            self._first_decision_ns = stamp
+            self.sectors_before_decisions = sum(known < stamp for known in self.sectors)
         if stamp in self._matched:
             return None
         self._unmatched[message.topic].setdefault(stamp, message.message)

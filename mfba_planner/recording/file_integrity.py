@@ -19,11 +19,12 @@ _BLOCK_BYTES = 1 << 20
 _REMEDY = "copy it again from where it was recorded"
 
 
-def check_data(path: Path) -> bool:
+def check_data(path: Path, shown: Path | None = None) -> bool:
     """Compare the data section of a closed file with its CRC; False if the file has none.
 
-    Raises BagError on a mismatch. Holds one block in memory.
+    Raises BagError on a mismatch, which names the file `shown`. Holds one block in memory.
     """
+    name = shown or path
     with path.open("rb") as stream:
         size = stream.seek(0, os.SEEK_END)
         tail_bytes = _FOOTER.size + len(MAGIC)
@@ -34,7 +35,7 @@ def check_data(path: Path) -> bool:
         opcode, _, stored = _DATA_END.unpack(stream.read(_DATA_END.size))
         if opcode != Opcode.DATA_END:
             raise BagError(
-                f"{path}: its data section does not end at the position in its index; {_REMEDY}"
+                f"{name}: its data section does not end at the position in its index; {_REMEDY}"
             )
         if not stored:
             return False
@@ -45,7 +46,7 @@ def check_data(path: Path) -> bool:
             crc, left = zlib.crc32(block, crc), left - len(block)
     if crc != stored:
         raise BagError(
-            f"{path}: its data section has CRC {crc:08x}, not {stored:08x}: at least one bit "
+            f"{name}: its data section has CRC {crc:08x}, not {stored:08x}: at least one bit "
             f"has changed since the recording; {_REMEDY}"
         )
     return True

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -12,7 +14,10 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Channel, Metadata, MetadataIndex, Schema
 
 from . import mcap_records
-from .mcap_records import FRAME, Message, reading
+from .file_integrity import check_data
+from .mcap_records import FRAME, reading
+from .message_definitions import Definition
+from .storage_file import Span, StoredMessage, StoredTopic
 
 
 class Piece(NamedTuple):
@@ -27,11 +32,16 @@ class Piece(NamedTuple):
 
 @dataclass
 class McapFile:
-    """The index of one open file; `damage` describes what cannot be read."""
+    """The index of one open file; `damage` describes what cannot be read.
+
+    Messages name `path`; `source` is read, another file if that one was compressed.
+    """
 
     path: Path
     stream: BinaryIO
     size: int
+    source: Path
+    kind: str = "mcap"
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     counts: Counter[int] = field(default_factory=Counter)
@@ -42,7 +52,45 @@ class McapFile:
     bytes_lost: int = 0
     complete: bool = False
 
-    def messages(self, piece: Piece) -> list[Message]:
+    def topics(self) -> list[StoredTopic]:
+        """All topics of the file; a channel without schema has an empty type name."""
+        return [
+            StoredTopic(
+                channel_id=number,
+                name=channel.topic,
+                encoding=channel.message_encoding,
+                definition=self._definition(channel),
+                offered_qos=channel.metadata.get("offered_qos_profiles"),
+                message_count=self.counts[number],
+            )
+            for number, channel in self.channels.items()
+        ]
+
+    def _definition(self, channel: Channel) -> Definition:
+        type_hash = channel.metadata.get("topic_type_hash", "")
+        schema = self.schemas.get(channel.schema_id)
+        if schema is None:
+            return Definition("", "", type_hash, "")
+        text = schema.data.decode("utf-8", "replace")
+        return Definition(schema.name, text, type_hash, schema.encoding)
+
+    def spans(self) -> Iterator[Span]:
+        """The pieces, in file sequence."""
+        for piece in self.pieces:
+            yield Span(piece.start_ns, piece.end_ns, partial(self._load, piece))
+
+    def _load(self, piece: Piece, channel_ids: frozenset[int]) -> list[StoredMessage]:
+        return [m for m in self.messages(piece) if m.channel_id in channel_ids]
+
+    def check(self) -> None:
+        """Compare the data section with its CRC. Raises BagError."""
+        check_data(self.source, self.path)
+
+    def close(self) -> None:
+        """Close the file."""
+        self.stream.close()
+
+    def messages(self, piece: Piece) -> list[StoredMessage]:
         """The messages of a piece, in file sequence. Raises BagError."""
         with reading(self.path, f"the chunk at byte {piece.offset}"):
             if piece.is_chunk:

@@ -16,26 +16,25 @@ from .mcap_walk import walk
 
 _FOOTER_BYTES = FRAME.size + 20
 _TAIL_BYTES = _FOOTER_BYTES + len(MAGIC)
-_OTHER_FORMATS = (
-    (b"SQLite format 3\0", "a sqlite3 (.db3) bag", "rosbags-convert --dst-storage mcap"),
-    (b"#ROSBAG V", "a ROS 1 bag", "rosbags-convert --dst-storage mcap"),
-    (b"\x28\xb5\x2f\xfd", "compressed as a whole file", "zstd -d"),
-)
+PROFILES = ("ros2", "")  # MCAP's; writers other than rosbag2 may leave it empty
+GIVE_BAG = "give a bag directory, or a .mcap, .db3 or .bag file"
 
 
-def open_file(path: Path, *, salvage: bool = False) -> McapFile:
-    """Open and index a file; `salvage` indexes the whole records. Raises BagError."""
+def open_file(path: Path, *, salvage: bool = False, shown: Path | None = None) -> McapFile:
+    """Open and index a file; `salvage` indexes the whole records. Raises BagError.
+
+    Messages name the file `shown`, where that is the one given by the user.
+    """
+    source, path = path, shown or path
     try:
-        stream = path.open("rb")
+        stream = source.open("rb")
     except OSError as error:
-        raise BagError(
-            f"{path}: cannot be read ({error.strerror}); give a .mcap file or a bag directory"
-        ) from error
+        raise BagError(f"{path}: cannot be read ({error.strerror}); {GIVE_BAG}") from error
     try:
         with reading(path, "the file"):
-            file = McapFile(path, stream, stream.seek(0, 2))
+            file = McapFile(path, stream, stream.seek(0, 2), source)
             _require_mcap(file)
-            _require_ros2_profile(file)
+            _require_profile(file)
             footer = _footer(file)
         if footer is None and not salvage:
             raise BagError(
@@ -53,18 +52,12 @@ def open_file(path: Path, *, salvage: bool = False) -> McapFile:
 
 def _require_mcap(file: McapFile) -> None:
     if file.size == 0:
-        raise BagError(f"{file.path}: empty file; give a .mcap file or a bag directory")
-    head = file.bytes_at(0, min(file.size, 16))
-    for magic, kind, command in _OTHER_FORMATS:
-        if head.startswith(magic):
-            raise BagError(f"{file.path}: {kind}, not an MCAP file; convert it with `{command}`")
-    if not head.startswith(MAGIC):
-        raise BagError(
-            f"{file.path}: not an MCAP file (no magic bytes); give a .mcap file or a bag directory"
-        )
+        raise BagError(f"{file.path}: empty file; {GIVE_BAG}")
+    if not file.bytes_at(0, min(file.size, len(MAGIC))).startswith(MAGIC):
+        raise BagError(f"{file.path}: not an MCAP file (no magic bytes); {GIVE_BAG}")
 
 
-def _require_ros2_profile(file: McapFile) -> None:
+def _require_profile(file: McapFile) -> None:
     try:
         header = Header.read(body_stream(file.body(len(MAGIC), Opcode.HEADER)))
     except ValueError as error:
@@ -72,10 +65,10 @@ def _require_ros2_profile(file: McapFile) -> None:
             f"{file.path}: truncated within its header ({file.size} bytes), nothing of it can be "
             "recovered; record again"
         ) from error
-    if header.profile != "ros2":
+    if header.profile not in PROFILES:
         raise BagError(
-            f"{file.path}: profile {header.profile!r}, only ros2 can be read; "
-            "record with ROS 2, or convert it with `rosbags-convert`"
+            f"{file.path}: profile {header.profile!r}, only messages of ROS 2 (CDR) can be read "
+            "from MCAP; give a recording of ROS 2, or the ROS 1 .bag itself"
         )
 
 
@@ -93,7 +86,7 @@ def _read_summary(file: McapFile, footer: Footer) -> bool:
     """Fill the index from the summary; False, with nothing filled, if it is incomplete."""
     if footer.summary_start == 0:
         return False
-    found = McapFile(file.path, file.stream, file.size)
+    found = McapFile(file.path, file.stream, file.size, file.source)
     statistics: Statistics | None = None
     with reading(file.path, "the summary"):
         # The CRC covers all bytes before itself: not the footer's last 4 bytes and the magic.

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -19,6 +18,7 @@ from mcap.records import Attachment, Chunk
 from mcap.stream_reader import get_chunk_data_stream
 
 from ..core.errors import BagError
+from .storage_file import StoredMessage
 
 # First and last bytes of every file. mcap.writer has it too, but its import is slow.
 MAGIC = b"\x89MCAP0\r\n"
@@ -36,16 +36,6 @@ _PARSE_ERRORS = (
     struct.error,
     zstandard.ZstdError,
 )
-
-
-class Message(NamedTuple):
-    """One stored message; times in ns."""
-
-    channel_id: int
-    sequence: int
-    log_time_ns: int
-    publish_time_ns: int
-    data: bytes
 
 
 @contextmanager
@@ -81,10 +71,12 @@ def frames(data: bytes) -> Iterator[tuple[int, int, int]]:
         yield opcode, start, position
 
 
-def messages(data: bytes) -> list[Message]:
+def messages(data: bytes) -> list[StoredMessage]:
     """The messages among the records of `data`, in the same sequence."""
     return [
-        Message._make((*_MESSAGE.unpack_from(data, start), data[start + _MESSAGE.size : end]))
+        StoredMessage._make(
+            (*_MESSAGE.unpack_from(data, start), data[start + _MESSAGE.size : end])
+        )
         for opcode, start, end in frames(data)
         if opcode == Opcode.MESSAGE
     ]

@@ -12,7 +12,8 @@ from mcap.records import AttachmentIndex, Metadata, MetadataIndex
 from ..core.errors import BagError
 from . import mcap_records
 from .mcap_file import McapFile, Piece
-from .mcap_records import FRAME, MAGIC, Message, reading
+from .mcap_records import FRAME, MAGIC, reading
+from .storage_file import StoredMessage
 
 _UNCHUNKED_RUN_BYTES = 1 << 20  # messages outside chunks are indexed in runs of about this size
 
@@ -31,7 +32,7 @@ class _RecordWalk:
         self.salvage = salvage
         self.end = file.size - (len(MAGIC) if file.complete else 0)
         self.in_data = True
-        self.unchunked: list[Message] = []
+        self.unchunked: list[StoredMessage] = []
         self.unchunked_offset = 0
 
     def run(self) -> None:
@@ -109,7 +110,9 @@ class _RecordWalk:
         self._add_piece(self.unchunked, self.unchunked_offset, offset, is_chunk=False)
         self.unchunked = []
 
-    def _add_piece(self, messages: list[Message], start: int, end: int, *, is_chunk: bool) -> None:
+    def _add_piece(
+        self, messages: list[StoredMessage], start: int, end: int, *, is_chunk: bool
+    ) -> None:
         if messages:
             times = [message.log_time_ns for message in messages]
             self.file.counts.update(message.channel_id for message in messages)

@@ -20,10 +20,14 @@ class RawMessage(NamedTuple):
 
 
 class Source(NamedTuple):
-    """Messages that `load` reads later, none of them earlier than `start_ns`."""
+    """Messages that `load` reads later, none of them earlier than `start_ns`.
+
+    If they are sorted by log time, they are not read all at once.
+    """
 
     start_ns: int
-    load: Callable[[], list[RawMessage]]
+    load: Callable[[], Iterable[RawMessage]]
+    is_sorted: bool = False
 
 
 def merge_by_log_time(sources: Iterable[Source]) -> Iterator[RawMessage]:
@@ -34,7 +38,10 @@ def merge_by_log_time(sources: Iterable[Source]) -> Iterator[RawMessage]:
         # A source that starts at the same time as the heap's head may precede it.
         while unread and (not heap or unread[-1][1].start_ns <= heap[0][0]):
             index, source = unread.pop()
-            rest = iter(sorted(source.load(), key=lambda message: message.log_time_ns))
+            messages = source.load()
+            if not source.is_sorted:
+                messages = sorted(messages, key=lambda message: message.log_time_ns)
+            rest = iter(messages)
             first = next(rest, None)
             if first is not None:
                 heapq.heappush(heap, (first.log_time_ns, index, first, rest))

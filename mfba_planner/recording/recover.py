@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,8 +52,15 @@ def recover(path: str | Path, out_dir: str | Path) -> RecoverReport:
             chunks=reader.chunk_count,
             attachments=attachments,
             bytes_lost=reader.bytes_lost,
-            problems=tuple(reader.problems),
+            problems=(*reader.problems, *_left_out(reader)),
         )
+
+
+def _left_out(reader: BagReader) -> Iterator[str]:
+    """What was not copied because it is not CDR."""
+    yield from (f"left out {text}" for text in reader.left_out)
+    for topic, count in reader.not_cdr.items():
+        yield f"{topic}: left out {count} messages that are not CDR"
 
 
 def _copy(reader: BagReader, writer: BagWriter) -> int:

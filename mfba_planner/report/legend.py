@@ -46,6 +46,10 @@ def _all() -> dict[str, Entry]:
         "set": (Patch(**style.SECTOR), "sectors set"),
         "closing": (Patch(**style.SECTOR), "headings to a contact"),
         "in_range": (Line2D([], [], **_edge(style.SENSED)), "enlarged obstacle within SR"),
+        "returns": (Line2D([], [], **style.RETURNS_MARK), "returns of the lidar"),
+        "moving": (Line2D([], [], **_edge(style.MOVING_TRACK)), "tracked, moving; next 2 s"),
+        "resting": (Line2D([], [], **_edge(style.STANDING_TRACK)), "tracked, at rest"),
+        "wish": (Line2D([], [], color=style.WISH["color"]), "what the planner wanted, 1 s"),
         "wall": (Line2D([], [], **style.WALL), "wall"),
         "limit": (Line2D([], [], **_edge(style.LIMIT)), "wall for obstacles only"),
     }

@@ -10,9 +10,11 @@ from matplotlib.figure import Figure
 
 from mfba_planner.core.output_files import write_new
 from mfba_planner.evaluation.metrics import Result, evaluate
+from mfba_planner.recording.perceived import Perceived
 from mfba_planner.simulation.episode import Episode
 
 from . import format_values, legend, style
+from .draw_perceived import draw_perceived, draw_wishes, widened
 from .draw_scene import draw_recorded_path, draw_scene, label_numbers
 from .figure_sheet import to_bytes
 from .run_events import Pass, closest_passes
@@ -20,18 +22,19 @@ from .scene_layout import SceneLayout
 from .view_bounds import choose_view
 
 
-def draw_run(episode: Episode, path: Path) -> None:
+def draw_run(episode: Episode, path: Path, perceived: Sequence[Perceived] = ()) -> None:
     """Write the picture of a run as PNG; the same episode gives the same bytes.
 
-    Raises OutputError when path exists already or cannot be written.
+    perceived: what a real robot perceived; it is drawn with what its planner wanted. Raises
+    OutputError when path exists already or cannot be written.
     """
-    write_new(path, png_bytes(episode))
+    write_new(path, png_bytes(episode, perceived))
 
 
-def png_bytes(episode: Episode) -> bytes:
+def png_bytes(episode: Episode, perceived: Sequence[Perceived] = ()) -> bytes:
     """The picture of a run as PNG, without date or version inside."""
     with style.context():
-        return to_bytes(run_figure(episode), "png")
+        return to_bytes(run_figure(episode, perceived=perceived), "png")
 
 
 def draw_what_if(recorded: Episode, episode: Episode, change: str, path: Path) -> None:
@@ -44,14 +47,24 @@ def draw_what_if(recorded: Episode, episode: Episode, change: str, path: Path) -
         write_new(path, to_bytes(figure, "png"))
 
 
-def run_figure(episode: Episode, recorded: Episode | None = None, subtitle: str = "") -> Figure:
+def run_figure(
+    episode: Episode,
+    recorded: Episode | None = None,
+    subtitle: str = "",
+    perceived: Sequence[Perceived] = (),
+) -> Figure:
     """Compose head, world, panel and strip; call and save within style.context().
 
     The path of `recorded`, another run of the same world, is drawn beneath.
     """
     result, passes = evaluate(episode), closest_passes(episode)
     view, scale = choose_view(episode, passes)
+    if perceived:
+        view, scale = widened(view, perceived)
     layout = SceneLayout(view, scale)
+    if episode.start_ns is not None:  # a real robot, which did not follow the planner
+        draw_perceived(layout.ax, perceived)
+        draw_wishes(layout.ax, episode)
     if recorded:
         draw_recorded_path(layout.ax, recorded)
     draw_scene(layout.ax, episode, view, passes, result.encounters)

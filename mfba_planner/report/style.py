@@ -54,6 +54,14 @@ PASS: Looks = {
     "color": INK, "linewidth": 1.0, "marker": "o", "markersize": 4.0,
     "markerfacecolor": PAPER, "markeredgecolor": INK,
 }  # fmt: skip
+RETURNS: Looks = {"s": 2.0, "color": QUIET, "alpha": 0.35, "linewidths": 0.0}
+RETURNS_MARK: Looks = {"linestyle": "none", "marker": ".", "markersize": 4.0, "color": QUIET}
+MOVING_TRACK: Looks = {"edgecolor": VERMILLION, "linewidth": 1.3}
+STANDING_TRACK: Looks = {"edgecolor": FAINT, "linewidth": 0.7}
+WISH: Looks = {
+    "arrowstyle": "-|>", "mutation_scale": 9.0, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 1.2,
+    "color": GREEN,
+}  # fmt: skip
 RING: Looks = {"edgecolor": ORANGE, "linewidth": 1.4}
 SENSED: Looks = {"edgecolor": ORANGE, "linewidth": 1.1, "linestyle": (0, (1, 1.8))}
 SECTOR: Looks = {"facecolor": ORANGE, "alpha": 0.25, "linewidth": 0.0}

@@ -38,6 +38,7 @@ class Episode:
     outcome: Outcome
     truth: tuple[Pose2D, ...] = ()  # true pose at each tick; (): those of the decisions
     planner_name: str = ""  # the planner, where `planner` (its parameters) does not name it
+    start_ns: int | None = None  # stamp at time 0; None: the tick of a simulation, its tick 0
 
     def __post_init__(self) -> None:
         """Make the scenario that of this run, where obstacles wait for a trigger."""
@@ -54,7 +55,8 @@ class Episode:
 
     def time_s(self, stamp_ns: int) -> float:
         """Time since the first tick in seconds: t of the obstacles' motion."""
-        return (stamp_ns - self.planner.tick_ns) * NANO
+        start_ns = self.planner.tick_ns if self.start_ns is None else self.start_ns
+        return (stamp_ns - start_ns) * NANO
 
 
 def stamp_of(tick: int, tick_ns: int) -> int:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..core.errors import FrameError
@@ -46,14 +47,9 @@ class Pose(NamedTuple):
 class StaticFrames:
     """The tree of static transforms of a bag."""
 
-    def __init__(self, reader: BagReader) -> None:
-        """Read all static transforms of a bag; of several for a frame the last is used."""
+    def __init__(self, reader: BagReader, topics: Sequence[str]) -> None:
+        """Read the static transforms of some topics; of several for a frame the last is used."""
         self._parents: dict[str, tuple[str, Pose]] = {}
-        topics = [
-            name
-            for name, topic in reader.topics.items()
-            if topic.type_name == TRANSFORMS and name.rpartition("/")[2] == TF_STATIC
-        ]
         for message in reader.decoded(topics) if topics else ():
             for transform in message.message.transforms:
                 self._parents[transform.child_frame_id] = (

@@ -1,27 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run the planner on a foreign recording of /scan and /odom, for `mfba verify`."""
+"""Run the planner on any recording of a scan and odometry, scan by scan."""
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from statistics import median
+from typing import Any, NamedTuple
 
 from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point, Pose2D
-from ..core.planner_types import Decision, Ranges, RefusalReason, Scan, observe
+from ..core.planner_types import NANO, Decision, Mode, Ranges, RefusalReason, Scan, observe
 from ..perception.known_map import KnownMap
 from ..perception.no_return import NoReturn
+from ..perception.obstacle_tracker import Track
 from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sensory_vector import SensorParams
+from ..perception.static_map import StaticMap
 from ..planning.planner_factory import make_planner
 from ..planning.planner_params import PlannerParams
 from ..recording.bag_reader import BagReader, DecodedMessage
+from ..recording.configuration_attachment import has_configuration
 from ..recording.decisions_with_sectors import DECISION, SECTORS, robots_with_decisions
-from ..recording.file_integrity import check_data
 from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.from_messages import (
     goal_point,
@@ -32,7 +35,9 @@ from ..recording.from_messages import (
     value_or_refusal,
 )
 from ..simulation.decision_digest import digest
-from .lidar_extrinsics import StaticFrames
+from .lidar_extrinsics import TF_STATIC, TRANSFORMS, StaticFrames
+from .recorded_poses import RecordedPoses
+from .recorded_topics import named_or_only, of_robot, recorded, require_same_robot
 
 ODOMETRY, SCAN, GOAL, GRID = (
     "nav_msgs/msg/Odometry",
@@ -41,6 +46,8 @@ ODOMETRY, SCAN, GOAL, GRID = (
     "nav_msgs/msg/OccupancyGrid",
 )
 GOAL_TOPIC, MAP_TOPIC = "goal_pose", "map"
+CLOCKS_APART_S = 0.5  # more than a lidar or its driver takes
+FEWEST_SAMPLES, CLOCK_SAMPLES = 10, 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +60,9 @@ class RedecideParams:
     goal: Point | None = None
     scan: str = ""
     odom: str = ""
+    goal_topic: str = ""
+    odom_frame: str = ""  # required frame of the odometry; "": that of the first message
+    scan_frame: str = ""  # required frame of the scans; "": any
     planner: PlannerParams = field(default_factory=PlannerParams)
     sensor: SensorParams = field(default_factory=SensorParams)
     seed: int = 0
@@ -65,6 +75,7 @@ class RedecideResult:
     decided: tuple[Decision, ...]
     faults: tuple[str, ...]
     notes: tuple[str, ...]
+    nothing: str = ""  # why no scan led to a decision about the way, "" if one did
 
     @property
     def digest(self) -> str:
@@ -73,211 +84,237 @@ class RedecideResult:
 
 
 def is_foreign(reader: BagReader) -> bool:
-    """Whether a bag has scans and odometry, but no decisions and no sectors."""
-    types = {topic.type_name for topic in reader.topics.values()}
+    """Whether a bag has no configuration, no decisions and no sectors of ours.
+
+    A topic without messages counts as not recorded.
+    """
+    written = {name: topic for name, topic in reader.topics.items() if topic.message_count}
     ours = (
-        SECTORS in reader.topics
-        or DECISION in reader.topics
+        SECTORS in written
+        or DECISION in written
         or robots_with_decisions(reader) != [NO_NAMESPACE]
     )
-    return not ours and {ODOMETRY, SCAN} <= types
+    return not ours and not has_configuration(reader)
 
 
 def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResult:
     """Decide on every scan with the odometry of its stamp, or the newest recorded before it.
 
     Same as virtual_sensor (source: scan) and planner on a replay of the bag, with the lidar
-    extrinsics of /tf_static. Raises BagError for a bag that cannot be read or has no goal, if
-    topics must be named, for unknown lidar extrinsics, and where known_map finds no map.
+    extrinsics of /tf_static and the frame of the odometry as odom_frame. Raises BagError for a
+    bag that cannot be read or has no goal, if topics must be named, for unknown lidar extrinsics,
+    and where known_map finds no map.
     """
     with BagReader(path) as reader:
-        for file in reader.file_paths:
-            check_data(file)
-        scan = _topic_name(reader, SCAN, params.scan, "--scan")
-        odom = _topic_name(reader, ODOMETRY, params.odom, "--odom")
-        faults: list[str] = []
-        poses = _PoseLookup(reader, odom, faults)
-        goals = _goals(reader, params)
-        scan_yaw = _ScanYaw(reader, params, odom)
-        run = _PlannerRun(params, poses, goals, faults, scan_yaw)
-        if params.planner.reads_known_map:
-            run.take_known_map(_known_map(reader, odom))
-        return run.decide_all(reader, scan)
-
-
-def _topic_name(reader: BagReader, type_name: str, wanted: str, option: str) -> str:
-    found = sorted(name for name, topic in reader.topics.items() if topic.type_name == type_name)
-    if wanted in found:
-        return wanted
-    if wanted or len(found) > 1:
-        problem = (
-            f"{option} {wanted}: not one of" if wanted else f"{len(found)} topics of {type_name},"
+        reader.check_data()
+        run = RecordingDecider(reader, params)
+        decided = tuple(step.decision for step in run.decide())
+        return RedecideResult(
+            decided=decided, faults=run.faults, notes=run.notes, nothing=run.nothing
         )
-        raise BagError(f"{reader.path}: {problem} {', '.join(found)}; name one with {option}")
-    return found[0]
 
 
-def _topics_named(reader: BagReader, type_name: str, name: str) -> list[str]:
-    """The topics of a type and name, in any namespace."""
-    return [
-        topic
-        for topic, found in reader.topics.items()
-        if found.type_name == type_name and topic.rpartition("/")[2] == name
-    ]
+class DecidedScan(NamedTuple):
+    """A decision, and the scan it was made on in a frame aligned with odom; None if refused."""
+
+    decision: Decision
+    scan: Scan | None
+    log_time_ns: int
 
 
-def _known_map(reader: BagReader, odom: str) -> KnownMap:
-    """The first map that the planner would take, in the frame of the odometry."""
-    frame = next((m.message.header.frame_id for m in reader.decoded([odom])), "")
-    names, refusal = _topics_named(reader, GRID, MAP_TOPIC), f"no {MAP_TOPIC} was recorded"
-    for message in reader.decoded(names) if names else ():
-        try:
-            return known_map_from(message.message, frame)
-        except InputError as error:  # the planner would refuse it as well
-            refusal = str(error)
-    raise BagError(f"{reader.path}: known_map=true: {refusal}")
+class RecordingDecider:
+    """Decides on the scans of an open bag one by one; holds no decision.
 
+    Faults and notes are complete after the last decision.
+    """
 
-def _goals(reader: BagReader, params: RedecideParams) -> list[tuple[int, Point]]:
-    """(log time in ns, goal), sorted by time."""
-    if params.goal is not None:
-        return [(-1, params.goal)]
-    names = _topics_named(reader, GOAL, GOAL_TOPIC)
-    goals = []
-    for message in reader.decoded(names) if names else ():
-        try:
-            goals.append((message.log_time_ns, goal_point(message.message)))
-        except InputError:  # the planner would refuse it as well
-            continue
-    if not goals:
-        raise BagError(f"{reader.path}: no {GOAL_TOPIC} was recorded; give one with --goal X Y")
-    return goals
-
-
-def _rising(
-    reader: BagReader, topic: str, faults: list[str]
-) -> Iterator[tuple[int, DecodedMessage]]:
-    """Yield (stamp, message); a stamp that does not rise is a fault, its message is skipped."""
-    last_ns = -1
-    for message in reader.decoded([topic]):
-        stamp = stamp_ns(message.message.header.stamp)
-        if stamp <= last_ns:
-            faults.append(f"{topic}: stamp {stamp} ns comes after {last_ns} ns")
-            continue
-        last_ns = stamp
-        yield stamp, message
-
-
-class _PoseLookup:
-    """All poses of a recording, by stamp and by log time."""
-
-    def __init__(self, reader: BagReader, topic: str, faults: list[str]) -> None:
-        self.by_stamp: dict[int, Pose2D | RefusalReason] = {}
-        self._times_ns: list[int] = []
-        self._all: list[tuple[int, Pose2D | RefusalReason]] = []
-        for stamp, message in _rising(reader, topic, faults):
-            pose = value_or_refusal(robot_pose, message.message)
-            self.by_stamp[stamp] = pose
-            self._times_ns.append(message.log_time_ns)
-            self._all.append((stamp, pose))
-
-    def newest(self, log_time_ns: int) -> tuple[int, Pose2D | RefusalReason] | None:
-        """(stamp, pose) of the newest pose recorded up to a log time, None without one."""
-        index = bisect_right(self._times_ns, log_time_ns)
-        return self._all[index - 1] if index else None
-
-
-class _ScanYaw:
-    """The yaw of each scan's lidar on the robot, as given or from /tf_static."""
-
-    def __init__(self, reader: BagReader, params: RedecideParams, odom: str) -> None:
-        self.notes: list[str] = []
-        self._given_yaw_rad = params.scan_yaw_rad
-        self._path, self._frames = reader.path, StaticFrames(reader)
-        self._base = next((m.message.child_frame_id for m in reader.decoded([odom])), "")
-        self._yaws: dict[str, float] = {}
-
-    def yaw_rad(self, scan: Any) -> float:
-        """Yaw of the frame of a scan. Raises BagError if it is unknown."""
-        if self._given_yaw_rad is not None:
-            return self._given_yaw_rad
-        frame = scan.header.frame_id
-        if frame not in self._yaws:
-            try:
-                yaw, offset_m = self._frames.extrinsics(frame, self._base)
-            except FrameError as error:
-                raise BagError(f"{self._path}: {error}") from None
-            self._yaws[frame] = yaw
-            if yaw or offset_m:
-                self.notes.append(
-                    f"/tf_static: {frame} is rotated by {yaw:.4g} rad in {self._base}, "
-                    f"{offset_m:.4g} m from its origin: --robot-radius must include that"
-                )
-        return self._yaws[frame]
-
-
-class _PlannerRun:
-    """One planner, run on the scans one by one."""
-
-    def __init__(
-        self,
-        params: RedecideParams,
-        poses: _PoseLookup,
-        goals: list[tuple[int, Point]],
-        faults: list[str],
-        scan_yaw: _ScanYaw,
-    ) -> None:
-        self._params = params
-        self._scan_yaw = scan_yaw
-        self._poses = poses
-        self._goals = goals
-        self._faults = faults
+    def __init__(self, reader: BagReader, params: RedecideParams) -> None:
+        """Choose the topics and read odometry and goals. Raises as redecide_recording()."""
+        self._reader, self._params = reader, params
+        self.scan = named_or_only(reader, SCAN, params.scan, "--scan")
+        self.odom = named_or_only(reader, ODOMETRY, params.odom, "--odom", near=self.scan)
+        if not params.odom:
+            require_same_robot(reader, SCAN, self.scan, self.odom)
+        self._faults: list[str] = []
+        self._counts: Counter[str] = Counter()
+        self._decided: Counter[bool] = Counter()  # by whether the robot is stopped
+        self._reasons: Counter[str] = Counter()  # why it is
+        self._ahead_s: list[float] = []  # scan stamps against odometry at the same log time
+        first = next(m.message for m in reader.decoded([self.odom]))
+        self.frame = params.odom_frame or first.header.frame_id
+        self.base = first.child_frame_id
+        self._poses = RecordedPoses(
+            self._rising(self.odom),
+            partial(value_or_refusal, partial(robot_pose, frame=self.frame)),
+        )
+        self.goals, refused = self._goals()
+        self._notes = [refused] if refused else []
+        self._scan_yaw = _ScanYaw(reader, params, self.base, self._topics(TRANSFORMS, TF_STATIC))
         planner = replace(params.planner, robot_radius_m=params.robot_radius_m)
         self._planner = make_planner(planner, params.sensor, params.seed)
+        self.planner = self._planner.params
+        self.goal_id = 0
+        self._goal: Point | None = None
         self._pose = Pose2D(0.0, 0.0)
-        self._counts: Counter[str] = Counter()
+        if params.planner.reads_known_map:
+            self._planner.set_known_map(self._known_map())
 
-    def take_known_map(self, known_map: KnownMap) -> None:
-        """Give the planner the map before it decides."""
-        self._planner.set_known_map(known_map)
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """The obstacles that the planner tracks since its last decision, () if it does not."""
+        return self._planner.tracks
 
-    def decide_all(self, reader: BagReader, topic: str) -> RedecideResult:
-        decided = []
-        for stamp, message in _rising(reader, topic, self._faults):
-            decision = self._decide(stamp, message.log_time_ns, message.message)
-            if decision is not None:
-                decided.append(decision)
-        return RedecideResult(
-            decided=tuple(decided),
-            faults=tuple(self._faults),
-            notes=(
-                *self._scan_yaw.notes,
-                *(f"{count} scans {what}" for what, count in self._counts.items()),
-            ),
-        )
+    @property
+    def local_map(self) -> StaticMap | None:
+        """The planner's map, None if it keeps none."""
+        return self._planner.local_map
 
-    def _decide(self, stamp: int, log_time_ns: int, scan: Any) -> Decision | None:
-        if stamp in self._poses.by_stamp:
-            pose_stamp, pose = stamp, self._poses.by_stamp[stamp]
-        elif newest := self._poses.newest(log_time_ns):
-            pose_stamp, pose = newest
-            self._counts["without odometry of their stamp: the newest before them was taken"] += 1
+    @property
+    def scan_yaw_rad(self) -> float:
+        """The yaw of the lidar of the last scan on the robot."""
+        return self._scan_yaw.last_rad
+
+    @property
+    def has_same_extrinsics(self) -> bool:
+        """Whether all scans so far were of one mounting of a lidar, as parameters hold it."""
+        return self._scan_yaw.is_one
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Errors of the recording."""
+        return tuple(self._faults)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out or taken otherwise."""
+        counts = (f"{count} {what}" for what, count in self._counts.items())
+        return (*self._notes, *self._scan_yaw.notes, *self._clock_notes(), *counts)
+
+    @property
+    def nothing(self) -> str:
+        """Why no scan led to a decision about the way, "" if one did."""
+        if self._decided[False]:
+            return ""
+        if not self._decided:
+            return f"nothing was decided: {'; '.join(self.notes) or 'no scan'}"
+        reason, count = self._reasons.most_common(1)[0]
+        return f"no scan could be used, {count} of {self._decided.total()} because: {reason}"
+
+    def decide(self) -> Iterator[DecidedScan]:
+        """Yield the decision on each scan. Raises BagError."""
+        for stamp, message in self._rising(self.scan):
+            step = self._decide(stamp, message.log_time_ns, message.message)
+            if step is None:
+                continue
+            is_stopped = step.decision.mode is Mode.STOPPED
+            self._decided[is_stopped] += 1
+            if is_stopped:
+                self._reasons[step.decision.reason] += 1
+            yield step
+
+    def _topics(self, type_name: str, name: str) -> list[str]:
+        """The topics of this name that belong to the robot."""
+        return of_robot(recorded(self._reader, type_name), name, (self.scan, self.odom))
+
+    def _rising(self, topic: str) -> Iterator[tuple[int, DecodedMessage]]:
+        """Yield (stamp, message) of rising stamps.
+
+        A message that does not rise is skipped: it is a fault, but for odometry sent twice.
+        """
+        last_ns = -1
+        for message in self._reader.decoded([topic]):
+            stamp = stamp_ns(message.message.header.stamp)
+            if stamp > last_ns:
+                last_ns = stamp
+                yield stamp, message
+            elif stamp == last_ns and topic == self.odom:
+                self._counts[f"messages of {topic} that repeat a stamp: left out"] += 1
+            else:
+                self._faults.append(f"{topic}: stamp {stamp} ns comes after {last_ns} ns")
+
+    def _known_map(self) -> KnownMap:
+        """The first map that the planner would take, in the frame of the odometry."""
+        names, refusal = self._topics(GRID, MAP_TOPIC), f"no {MAP_TOPIC} was recorded"
+        for message in self._reader.decoded(names) if names else ():
+            try:
+                return known_map_from(message.message, self.frame)
+            except InputError as error:  # the planner would refuse it as well
+                refusal = str(error)
+        raise BagError(f"{self._reader.path}: known_map=true: {refusal}")
+
+    def _goals(self) -> tuple[list[tuple[int, Point]], str]:
+        """(log time in ns, goal), sorted by time, and a note about those that are refused."""
+        if self._params.goal is not None:
+            return [(-1, self._params.goal)], ""
+        wanted = self._params.goal_topic
+        all_names = recorded(self._reader, GOAL)
+        if wanted:
+            names = [named_or_only(self._reader, GOAL, wanted, "--goal-topic")]
         else:
-            self._counts["before the first odometry: not decided"] += 1
-            return None
+            names = self._topics(GOAL, GOAL_TOPIC)
+        goals, refused, refusal = [], 0, ""
+        for message in self._reader.decoded(names) if names else ():
+            try:
+                goals.append((message.log_time_ns, goal_point(message.message, self.frame)))
+            except InputError as error:  # the planner would refuse it as well
+                refused, refusal = refused + 1, str(error).split("; ")[0]
+        if goals:
+            return goals, f"{refused} goals are refused: {refusal}" if refused else ""
+        others = [name for name in all_names if name not in names]
+        remedy = "give one with --goal X Y" + (f", in metres in {self.frame!r}" if refusal else "")
+        if others:
+            remedy += f", or one of {', '.join(others)} with --goal-topic"
+        problem = (
+            f"no {GOAL_TOPIC} can be used: {refusal}"
+            if refusal
+            else (f"no {GOAL_TOPIC} was recorded" + (" for this robot" if others else ""))
+        )
+        raise BagError(f"{self._reader.path}: {problem}; {remedy}")
+
+    def _clock_notes(self) -> Iterator[str]:
+        if len(self._ahead_s) < FEWEST_SAMPLES:
+            return
+        ahead_s = median(self._ahead_s)
+        if abs(ahead_s) > CLOCKS_APART_S:
+            yield (
+                f"the stamps of {self.scan} are {abs(ahead_s):.3g} s "
+                f"{'ahead of' if ahead_s > 0.0 else 'behind'} those of {self.odom} received at "
+                "the same time: their clocks differ (synchronise them, and record again)"
+            )
+
+    def _decide(self, stamp: int, log_time_ns: int, scan: Any) -> DecidedScan | None:
+        newest, found = self._poses.newest(log_time_ns), self._poses.at(stamp)
+        if newest and len(self._ahead_s) < CLOCK_SAMPLES:
+            self._ahead_s.append((stamp - newest.stamp_ns) * NANO)
+        if found is None:
+            if newest is None:
+                self._counts["scans before the first odometry: not decided"] += 1
+                return None
+            self._counts[
+                "scans without odometry of their stamp: the newest before them was taken"
+            ] += 1
+            found = newest
+        pose_stamp, pose = found
         ranges = self._measure(pose, scan)
         if isinstance(ranges, str):
-            self._counts["that the sensor refuses"] += 1
-        goal = next((g for t, g in reversed(self._goals) if t <= log_time_ns), None)
+            self._counts["scans that the sensor refuses"] += 1
+        goal = next((g for t, g in reversed(self.goals) if t <= log_time_ns), None)
+        if goal != self._goal:
+            self._goal, self.goal_id = goal, self.goal_id + 1
+            self._planner.reset()  # as the node does
         observation = observe(stamp, pose, ranges, goal, self._pose, max(stamp - pose_stamp, 0))
         self._pose = observation.pose
-        if self._params.planner.reads_scan and not observation.refused:
+        sensed = None
+        if not observation.refused:
             yaw = observation.pose.yaw + self._scan_yaw.yaw_rad(scan)
-            observation = replace(observation, scan=aligned(self._laser_scan(scan), yaw))
-        return self._planner.plan(observation)
+            sensed = aligned(self._laser_scan(scan), yaw)
+            if self._params.planner.reads_scan:
+                observation = replace(observation, scan=sensed)
+        decision = self._planner.plan(observation)
+        return DecidedScan(decision, sensed, log_time_ns)
 
     def _laser_scan(self, scan: Any) -> Scan:
-        return laser_scan(scan, no_return=self._params.scan_no_return)
+        return laser_scan(scan, self._params.scan_frame, self._params.scan_no_return)
 
     def _measure(self, pose: Pose2D | RefusalReason, scan: Any) -> Ranges | RefusalReason:
         if isinstance(pose, str):
@@ -288,3 +325,46 @@ class _PlannerRun:
             lambda x: sense_scan(self._laser_scan(x), yaw, params.robot_radius_m, params.sensor),
             scan,
         )
+
+
+class _ScanYaw:
+    """The yaw of each scan's lidar on the robot, as given or from /tf_static."""
+
+    def __init__(
+        self, reader: BagReader, params: RedecideParams, base: str, transforms: list[str]
+    ) -> None:
+        self.notes: list[str] = []
+        self._given_yaw_rad = params.scan_yaw_rad
+        self._path, self._frames = reader.path, StaticFrames(reader, transforms)
+        self._base = base
+        self._yaws: dict[str, float] = {}
+        self.last_rad = params.scan_yaw_rad or 0.0
+
+    @property
+    def is_one(self) -> bool:
+        """Whether all scans so far had the same yaw."""
+        return len(set(self._yaws.values())) < 2
+
+    def yaw_rad(self, scan: Any) -> float:
+        """Yaw of the frame of a scan. Raises BagError if it is unknown."""
+        if self._given_yaw_rad is not None:
+            return self._given_yaw_rad
+        frame = scan.header.frame_id
+        if frame not in self._yaws:
+            if frame and not self._base:
+                raise BagError(
+                    f"{self._path}: frame {frame!r}: the odometry has no child_frame_id, so the "
+                    "lidar's mounting on the robot is not known; give --scan-yaw"
+                )
+            try:
+                yaw, offset_m = self._frames.extrinsics(frame, self._base)
+            except FrameError as error:
+                raise BagError(f"{self._path}: {error}") from None
+            self._yaws[frame] = yaw
+            if yaw or offset_m:
+                self.notes.append(
+                    f"/tf_static: {frame} is rotated by {yaw:.4g} rad in {self._base}, "
+                    f"{offset_m:.4g} m from its origin: --robot-radius must include that"
+                )
+        self.last_rad = self._yaws[frame]
+        return self.last_rad

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -13,7 +13,7 @@ from ..core.geometry import Point
 from ..perception.known_map import KnownMap
 from ..recording.bag_reader import BagReader, DecodedMessage
 from ..recording.decisions_with_sectors import DECISION, SECTORS, ranges_of, require_decisions
-from ..recording.decisions_without_inputs import omission_text
+from ..recording.decisions_without_inputs import omission_text, ragged_begin_text
 from ..recording.fleet_topics import messages_by_robot
 from ..recording.from_messages import goal_point, known_map_from, stamp_ns, waypoint_points
 
@@ -41,6 +41,7 @@ class TickRecords:
     known_map: KnownMap | None = None  # the first that the planner did not refuse
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    began_late: bool = False  # whether the planner ran before the recording began
     omitted_stamps: frozenset[int] = (
         frozenset()
     )  # stamps of decisions after the end of their inputs
@@ -74,31 +75,48 @@ def join_ticks(
     """
     by_topic: dict[str, list[Any]] = {name: [] for name in TICK_TOPICS}
     records = TickRecords(ticks=[], goals=[])
-    last_index: dict[str, int] = {}  # position of the last message of each topic in the bag
+    positions: dict[str, list[int]] = {name: [] for name in TICK_TOPICS}  # in the bag, by topic
     for index, message in enumerate(messages):
-        last_index[message.topic] = index
         if message.topic in (GOAL, WAYPOINTS):
             records.goals += _goals(message.topic, message.message, frame)
         elif message.topic == MAP:
             records.known_map = records.known_map or _known_map(message.message, frame)
         else:
             by_topic[message.topic].append(message.message)
+            positions[message.topic].append(index)
     ticks: dict[int, Tick] = {}
+    begun_ns = _begun_ns(by_topic)
     for topic in (*STAMPED, SCAN):
         # In real time a later decision on a stamp only reports stale inputs.
         must_match = bool(tick_ns) or topic not in (DECISION, STEP)
-        _join_stamped(records, ticks, topic, by_topic[topic], must_match=must_match)
+        _join_stamped(records, ticks, topic, by_topic[topic], begun_ns, must_match=must_match)
     # A blind sensor publishes no sensory vector.
-    sectors = [message for message in by_topic[SECTORS] if ranges_of(message)]
-    _join_unstamped(records, ticks, last_index, SECTORS, sectors, VECTOR, by_topic[VECTOR])
-    goal_steps, twists = by_topic[STEP], by_topic[TWIST]
-    _join_unstamped(
-        records, ticks, last_index, STEP, goal_steps, TWIST, twists, must_match=bool(tick_ns)
+    sectors = [item for item in zip(positions[SECTORS], by_topic[SECTORS]) if ranges_of(item[1])]
+    steps, twists, vectors = (
+        list(zip(positions[name], by_topic[name])) for name in (STEP, TWIST, VECTOR)
     )
+    records.began_late = bool(begun_ns) or bool(tick_ns and min(ticks) > tick_ns)
+    not_joined = set()
+    for stamped_topic, stamped, topic, unstamped in (
+        (SECTORS, sectors, VECTOR, vectors), (STEP, steps, TWIST, twists)
+    ):  # fmt: skip
+        # In real time nothing tells whether the first messages were recorded.
+        may_lack_first = records.began_late or not tick_ns
+        if begun_ns or (may_lack_first and not _alternate(stamped, unstamped)):
+            not_joined.add(topic)
+            records.notes.append(
+                f"{topic}: has no stamps, and not all of it was recorded; it is not checked"
+            )
+            continue
+        _join_unstamped(
+            records, ticks, stamped_topic, stamped, topic, unstamped, must_match=bool(tick_ns)
+        )
     records.ticks = [ticks[stamp] for stamp in sorted(ticks)]
     _omit_decisions(records, inputs)
     if tick_ns:
-        _check_gaps(records, tick_ns, (*STAMPED, *([SCAN] if by_topic[SCAN] else []), TWIST))
+        also = [SCAN] if by_topic[SCAN] else []
+        also += [] if TWIST in not_joined else [TWIST]
+        _check_gaps(records, tick_ns, (*STAMPED, *also))
     return records
 
 
@@ -116,18 +134,29 @@ def _known_map(message: Any, frame: str) -> KnownMap | None:
         return None
 
 
+def _begun_ns(by_topic: Mapping[str, Sequence[Any]]) -> int:
+    """The stamp at which the last of the stamped topics began, ns.
+
+    A recorder that has just found a topic may write its first messages in another sequence.
+    """
+    stamped = (by_topic[name] for name in STAMPED)
+    firsts = [stamp_ns(messages[0].header.stamp) for messages in stamped if messages]
+    return max(firsts) if len(set(firsts)) > 1 else 0
+
+
 def _join_stamped(
     records: TickRecords,
     ticks: dict[int, Tick],
     topic: str,
     messages: list[Any],
+    begun_ns: int = 0,
     *,
     must_match: bool = True,
 ) -> None:
     latest_ns, repeated = -1, 0
     for message in messages:
         stamp = stamp_ns(message.header.stamp)
-        if stamp < latest_ns:
+        if begun_ns <= stamp < latest_ns:
             records.faults.append(f"{topic}: stamp {stamp} ns comes after {latest_ns} ns")
         latest_ns = max(latest_ns, stamp)
         stored = ticks.setdefault(stamp, Tick(stamp_ns=stamp)).messages
@@ -150,62 +179,89 @@ def _content(topic: str, message: Any) -> str:
     return str(message)
 
 
+def _alternate(stamped: list[tuple[int, Any]], unstamped: list[tuple[int, Any]]) -> bool:
+    """Whether the first message without stamp follows the first stamped one; also without any."""
+    return not unstamped or sum(position < unstamped[0][0] for position, _ in stamped) == 1
+
+
 def _join_unstamped(
     records: TickRecords,
     ticks: dict[int, Tick],
-    last_index: dict[str, int],
     stamped_topic: str,
-    stamped_messages: list[Any],
+    stamped: list[tuple[int, Any]],
     topic: str,
-    unstamped_messages: list[Any],
+    unstamped: list[tuple[int, Any]],
     *,
-    must_match: bool = True,
+    must_match: bool,
 ) -> None:
     """Join messages without stamp: each gets the stamp of the message it followed.
 
-    A node that was killed between the two may have left the last one unpaired.
+    Both are given with their positions in the bag. A node that was killed between the two may have
+    left the last one unpaired.
     """
-    if not stamped_messages or not unstamped_messages:
+    if not stamped or not unstamped:
         return
-    if hasattr(unstamped_messages[0], "header"):
-        _join_stamped(records, ticks, topic, unstamped_messages, must_match=must_match)
+    if hasattr(unstamped[0][1], "header"):
+        messages = [message for _, message in unstamped]
+        _join_stamped(records, ticks, topic, messages, must_match=must_match)
         return
-    surplus = len(stamped_messages) - len(unstamped_messages)
+    surplus = len(stamped) - len(unstamped)
     if surplus:
-        counts = f"{len(unstamped_messages)} messages for {len(stamped_messages)}"
-        text = f"{topic}: {counts} on {stamped_topic}"
-        if surplus != (1 if last_index[stamped_topic] > last_index[topic] else -1):
-            records.faults.append(text)
+        text = f"{topic}: {len(unstamped)} messages for {len(stamped)} on {stamped_topic}"
+        if surplus != (1 if stamped[-1][0] > unstamped[-1][0] else -1):
+            # In real time a message may be lost, and which one is not known.
+            (records.faults if must_match else records.notes).append(text)
             return
         records.notes.append(f"{text}, and the last one is unpaired (was a node killed?)")
-    for stamped, unstamped in zip(stamped_messages, unstamped_messages):
-        stamp = stamp_ns(stamped.header.stamp)
-        first = ticks[stamp].messages.setdefault(topic, unstamped)
-        if must_match and str(first) != str(unstamped):
+    for (_, message), (_, other) in zip(stamped, unstamped):
+        stamp = stamp_ns(message.header.stamp)
+        first = ticks[stamp].messages.setdefault(topic, other)
+        if must_match and str(first) != str(other):
             records.faults.append(f"{topic}: stamp {stamp} ns is repeated with other content")
 
 
 def _omit_decisions(records: TickRecords, inputs: Sequence[str]) -> None:
-    """Note the decisions after the end of an input, see recording/decisions_without_inputs.py.
+    """Note decisions outside the recording of an input, see recording/decisions_without_inputs.py.
 
     Not if these are all decisions, nor for an input that was never recorded.
     """
     last_ns = {name: tick.stamp_ns for tick in records.ticks for name in tick.messages}
+    first_ns = {name: tick.stamp_ns for tick in records.ticks[::-1] for name in tick.messages}
     decided = [tick.stamp_ns for tick in records.ticks if DECISION in tick.messages]
     ended = {
         name: last_ns[name] for name in inputs if last_ns.get(name, decided[-1]) < decided[-1]
     }
-    stamps = [stamp for stamp in decided if any(last < stamp for last in ended.values())]
-    if stamps and len(stamps) < len(decided):
-        records.omitted_stamps = frozenset(stamps)
-        records.notes.append(omission_text(stamps, ended))
+    begun = {
+        name: first_ns[name] for name in inputs if first_ns.get(name, decided[0]) > decided[0]
+    }
+    late = [stamp for stamp in decided if any(last < stamp for last in ended.values())]
+    early = [stamp for stamp in decided if any(stamp < first for first in begun.values())]
+    if len({*early, *late}) == len(decided):
+        return
+    records.omitted_stamps = frozenset((*early, *late))
+    if early:
+        records.notes.append(ragged_begin_text(early, begun))
+    if late:
+        records.notes.append(omission_text(late, ended))
+
+
+def _whole_from(ticks: Sequence[Tick], needed: tuple[str, ...]) -> int:
+    """The index of the first tick from which on every needed topic was recorded, 0 if none."""
+    begun: set[str] = set()
+    for index, tick in enumerate(ticks):
+        begun.update(name for name in needed if name in tick.messages)
+        if len(begun) == len(needed):
+            return index
+    return 0
 
 
 def _check_gaps(records: TickRecords, tick_ns: int, needed: tuple[str, ...]) -> None:
     """Lockstep: find missing ticks, and ticks with missing messages."""
     first = records.ticks[0].stamp_ns
+    begin = 0
     if first > tick_ns:
         records.notes.append(f"the recording starts at stamp {first} ns, not at tick 0")
+        begin = _whole_from(records.ticks, needed)
     for a, b in pairwise(records.ticks):
         ticks_apart, rest = divmod(b.stamp_ns - a.stamp_ns, tick_ns)
         if rest:
@@ -217,7 +273,7 @@ def _check_gaps(records: TickRecords, tick_ns: int, needed: tuple[str, ...]) -> 
     # The recording may end within the last tick. A topic that is missing there may have ended
     # one tick earlier.
     last_messages = records.ticks[-1].messages
-    for tick, after in pairwise(records.ticks):
+    for tick, after in pairwise(records.ticks[begin:]):
         expected = last_messages if after is records.ticks[-1] else needed
         missing = [topic for topic in needed if topic in expected and topic not in tick.messages]
         if missing and tick.stamp_ns not in records.omitted_stamps:

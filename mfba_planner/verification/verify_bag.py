@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,8 @@ from ..perception.scan_to_sectors import aligned, sense_scan
 from ..perception.sense_segments import sense_circles_and_segments
 from ..perception.sensory_vector import sensory_vector
 from ..planning.planner_factory import make_planner
+from ..planning.planner_params import Method
 from ..recording.bag_reader import BagReader
-from ..recording.file_integrity import check_data
 from ..recording.fleet_topics import NO_NAMESPACE, select_robots
 from ..recording.from_messages import (
     body_velocity,
@@ -34,8 +35,9 @@ from ..recording.from_messages import (
     velocity,
 )
 from ..recording.from_messages import decision as read_decision
-from ..recording.run_parameters import Setup, read_setup, read_setups
-from ..simulation.decision_digest import digest
+from ..recording.run_parameters import Nodes, read_setup, read_setups
+from ..recording.run_setup import Setup
+from ..simulation.decision_digest import canonical, digest
 from ..simulation.recorded_motion import is_present
 from ..simulation.scenario_map import with_known_map
 from .compare_decisions import Divergence, first_divergence
@@ -55,6 +57,11 @@ from .tick_records import (
 )
 
 Progress = Callable[[int, int], None]
+_BEFORE = "what the planner perceived before the recording began is not in the bag"
+_NOT_PERCEIVED = (
+    f"{{count}} can be checked: {_BEFORE}; start the recorder before the planner, or send a new "
+    "goal while it records"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,18 +101,19 @@ def verify_each(
     robots: Sequence[str] = (),
     *,
     allow_modules: bool = False,
+    given: Nodes | None = None,
     progress: Progress = lambda done, total: None,
 ) -> dict[str, Report]:
     """Verify a bag of mfba: the decisions of every robot, or of the robots named.
 
-    progress is called with the ticks that are done and all ticks, of each robot in turn.
+    `given` are the parameters of the nodes, by node, instead of those in the bag. progress is
+    called with the ticks that are done and all ticks, of each robot in turn.
     Raises BagError for a bag that cannot be checked, for an unknown robot, and for an optimiser
     MODULE:NAME unless allow_modules: a bag must not choose what is imported.
     """
     with BagReader(path) as reader:
-        for file in reader.file_paths:
-            check_data(file)
-        setups = read_setups(reader).by_robot
+        reader.check_data()
+        setups = read_setups(reader, given).by_robot
         names = select_robots(reader.path, list(setups), robots)
         for name in names:
             optimizer = setups[name].planner.optimizer
@@ -131,14 +139,15 @@ def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Repor
     read_odom = partial(robot_pose, frame=setup.odom_frame)
     read_sectors = partial(sector_ranges, frame=setup.odom_frame)
     planner = make_planner(setup.planner, setup.sensor, setup.seed)
-    if tick_records.known_map is None:  # a bag of the core driver: the scenario's walls
-        with_known_map(planner, setup.planner, setup.scenario)
-    elif setup.planner.known_map:
+    if tick_records.known_map is not None and setup.planner.known_map:
         planner.set_known_map(tick_records.known_map)
+    elif setup.is_simulated:  # a bag of the core driver: the scenario's walls
+        with_known_map(planner, setup.planner, setup.scenario)
     goals = deque(tick_records.goals)
     goal: Point | None = None
     pose = Pose2D(0.0, 0.0)
-    recorded, decided = [], []
+    recorded: list[Decision] = []
+    decided: list[Decision] = []
     unchecked, goal_id = 0, ""
     for count, tick in enumerate(tick_records.ticks):
         progress(count, len(tick_records.ticks))
@@ -163,14 +172,16 @@ def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Repor
         if decision.goal != goal:
             while goals and goal != decision.goal:
                 goal = goals.popleft()
-            if goal != decision.goal:
+            if goal != decision.goal and not decided and decision.goal:
+                notes.append("its first goal is older than the recording")
+            elif goal != decision.goal:
                 reason = (
                     "without the known goal (was the planner restarted?)"
                     if decision.goal is None
                     else "for a goal that was not in any /goal_pose"
                 )
                 faults.append(f"stamp {tick.stamp_ns} ns: decided {reason}")
-                goal = decision.goal
+            goal = decision.goal
         pose_input: Any = decision.pose
         if setup.lockstep:
             pose_input = (
@@ -186,6 +197,14 @@ def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Repor
         faults += _contradictions(setup, tick, decision)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
+    if tick_records.began_late and setup.planner.method is not Method.PAPER:
+        first = _first_without_memory(recorded, decided)
+        if first == len(recorded) > 0:
+            faults.append(_NOT_PERCEIVED.format(count=f"none of its {first} decisions"))
+            recorded, decided = [], []
+        elif first:
+            notes.append(f"left out the first {first} decisions: {_BEFORE}")
+            recorded, decided = recorded[first:], decided[first:]
     return Report(
         setup=setup,
         recorded=tuple(recorded),
@@ -194,6 +213,13 @@ def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Repor
         faults=tuple(faults),
         notes=tuple(notes),
     )
+
+
+def _first_without_memory(recorded: Sequence[Decision], decided: Sequence[Decision]) -> int:
+    """The index from which on all decisions are equal, their number if the last one is not."""
+    pairs = reversed(list(zip(recorded, decided)))
+    equal = takewhile(lambda pair: canonical(0, pair[0]) == canonical(0, pair[1]), pairs)
+    return len(recorded) - sum(1 for _ in equal)
 
 
 def _inputs(setup: Setup) -> list[str]:
@@ -231,6 +257,8 @@ def _contradictions(setup: Setup, tick: Tick, decision: Decision) -> list[str]:
     ):
         if topic in tick.messages and not agrees(tick.messages[topic], decision):
             found.append(f"stamp {tick.stamp_ns} ns: {topic} does not match the decision")
+    if not setup.is_simulated and not setup.lockstep:
+        return found  # the sensor may have used other odometry
     source = SCAN if setup.scenario.robot.lidar.beams else OBSTACLES
     if {source, ODOM} <= tick.messages.keys() and not _sectors_match_sensor(setup, tick, decision):
         found.append(f"stamp {tick.stamp_ns} ns: {SECTORS} does not match the sensor")

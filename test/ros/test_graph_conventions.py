@@ -43,6 +43,10 @@ TABLE = [
     ("/planner/decision", "diagnostic_msgs/msg/DiagnosticArray", ["planner"], [], False),
     ("/local_map", "nav_msgs/msg/OccupancyGrid", ["planner"], [], True),
     ("/outcome", "diagnostic_msgs/msg/DiagnosticStatus", ["world_sim"], [], True),
+    *(
+        (f"/{node}/parameters", "std_msgs/msg/String", [node], [], True)
+        for node in ("world_sim", "virtual_sensor", "planner")
+    ),
     ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", [], ["world_sim"], False),
     ("/markers", "visualization_msgs/msg/MarkerArray", ["planner", "world_sim"], [], False),
     # Only the recorder subscribes: the paper's robot has neither a lidar nor odometry noise, and

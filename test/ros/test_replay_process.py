@@ -191,7 +191,10 @@ def test_it_exits_without_output_on_a_signal(
     ("line", "text"),
     [
         ("", "replay: the following arguments are required: BAG; see `replay --help`"),
-        ("none", "replay: none: does not exist; give a .mcap file or a bag directory"),
+        (
+            "none",
+            "replay: none: does not exist; give a bag directory, or a .mcap, .db3 or .bag file",
+        ),
         ("bag --rate nan", "replay: rate=nan: not finite; give a value in [0.001, 1e+06]"),
         ("bag --topics odm", "replay: --topics /odm: not there; did you mean '/odom'?"),
         ("bag --start-offset 9", "replay: start_offset=9 s: beyond the end of bag, which lasts "),

@@ -22,6 +22,7 @@ from ...planning.planner_params import PlannerParams
 from ...recording.decisions_without_inputs import print_omissions
 from ...recording.fleet_topics import NO_NAMESPACE, select_robots
 from ...recording.local_maps import NO_MAPS, RobotMaps, read_local_maps
+from ...recording.perceived import NOTHING_PERCEIVED, RobotPerceived, read_perceived
 from ...recording.read_episode import Recording, read_recording
 from ...report.result_json import read_result
 from ...scenarios.scenario_files import load_scenario
@@ -44,27 +45,28 @@ def add_paths(parser: Parser) -> None:
 class NamedEpisodes(NamedTuple):
     """(name, run) pairs; fleet_names has all robots' names if the runs are one fleet's.
 
-    maps holds the local maps of the bags by the run's name.
+    maps holds the local maps of the bags by the run's name, perceived what real robots perceived.
     """
 
     runs: list[tuple[str, Episode]]
     fleet_names: tuple[str, ...] = ()
     maps: RobotMaps = NO_MAPS
+    perceived: RobotPerceived = NOTHING_PERCEIVED
 
 
 def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> NamedEpisodes:
     """Read or simulate the runs; print what is left out. Raises BagError, InputError."""
     loaded = [_recording(path, robots) for path in paths]
-    first, maps = loaded[0]
-    if len(paths) == 1 and NO_NAMESPACE not in first.episodes:
+    first, maps, perceived = loaded[0]
+    if len(paths) == 1 and first.scenario.robot_names:
         return NamedEpisodes(list(first.episodes.items()), first.scenario.robot_names, maps)
-    runs, maps_of = [], {}
-    for path, (recording, maps) in zip(paths, loaded):
+    runs, maps_of, perceived_of = [], {}, {}
+    for path, (recording, maps, perceived) in zip(paths, loaded):
         for robot, episode in recording.episodes.items():
             name = ".".join(filter(None, (_name(path), robot)))
             runs.append((name, episode))
-            maps_of[name] = maps.get(robot, ())
-    return NamedEpisodes(runs, maps=maps_of)
+            maps_of[name], perceived_of[name] = maps.get(robot, ()), perceived.get(robot, ())
+    return NamedEpisodes(runs, maps=maps_of, perceived=perceived_of)
 
 
 def _name(path: Path) -> str:
@@ -75,18 +77,19 @@ def _name(path: Path) -> str:
     return path.name if path.is_dir() else path.stem
 
 
-def _recording(path: Path, robots: Sequence[str]) -> tuple[Recording, RobotMaps]:
-    """A recording and its local maps."""
+def _recording(path: Path, robots: Sequence[str]) -> tuple[Recording, RobotMaps, RobotPerceived]:
+    """A recording, its local maps, and what its robots perceived."""
     bag = bag_in(path)
-    if bag == path and not any(path.glob("*.mcap")) and (path / _RESULT).is_file():
+    if bag == path and not any(path.glob("*.mcap*")) and (path / _RESULT).is_file():
         path = path / _RESULT
     if path.suffix != ".json":
         recording = read_recording(bag, robots)
         print_omissions(bag, recording.omitted)
-        return recording, read_local_maps(bag, recording.episodes)
+        episodes = recording.episodes
+        return recording, read_local_maps(bag, episodes), read_perceived(bag, episodes)
     select_robots(path, [NO_NAMESPACE], robots)
     episode = _simulate_result(path)
-    return Recording(episode.scenario, episode.seed, {NO_NAMESPACE: episode}, {}), NO_MAPS
+    return Recording(episode.scenario, episode.seed, {NO_NAMESPACE: episode}, {}), NO_MAPS, {}
 
 
 def _simulate_result(path: Path) -> Episode:

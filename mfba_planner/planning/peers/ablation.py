@@ -131,7 +131,7 @@ class NoTracker(Predictive):
     def forget(self) -> None:
         """As Predictive."""
         super().forget()
-        self._tracker = _NothingTracked(self.options.tracking)
+        self.tracker = _NothingTracked(self.options.tracking)
 
 
 class _NothingTracked(Tracker):

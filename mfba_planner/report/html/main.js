@@ -82,6 +82,14 @@ function legend() {
     ...(runs.some((run) => run.maps.length)
       ? [entry("local map: what stands, as seen", svg("path", { d: "M3 8h0M8 8h0M13 8h0M18 8h0", class: "map" }))]
       : []),
+    ...(runs.some((run) => run.perceived.length)
+      ? [
+          entry("returns of the lidar", svg("path", { d: "M3 8h0M8 8h0M13 8h0M18 8h0", class: "returns" })),
+          entry(`tracked obstacle; moving: in ${AHEAD} s`,
+            svg("circle", { cx: 6, cy: 8, r: 5, class: "track" }),
+            svg("circle", { cx: 16, cy: 8, r: 5, class: "track moving" })),
+        ]
+      : []),
     entry("sensing range, sector or heading that is set",
       svg("path", { d: "M2 14A18 18 0 0 1 20 14L11 2Z", class: "sector set" }),
       svg("path", { d: "M1 14A18 18 0 0 1 21 14", class: "ring" })),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The local maps of a run for the page: few, and small."""
+"""The local maps of a run, and what a real robot perceived, for the page: few, and small."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mfba_planner.recording.local_maps import MapPoints
+from mfba_planner.recording.perceived import Perceived
 from mfba_planner.simulation.episode import Episode
 
 MOST_MAPS = 60  # of a run: about 3 kB each
@@ -26,6 +27,24 @@ def map_data(episode: Episode, maps: Sequence[MapPoints]) -> list[dict[str, Any]
     known = [(k, points) for k, points in known if k < len(stamps)]
     chosen = known[:: -max(1, -(-len(known) // MOST_MAPS))][::-1]
     return [{"tick": k, "points": _differences(points)} for k, points in chosen]
+
+
+def perceived_data(episode: Episode, perceived: Sequence[Perceived]) -> list[dict[str, Any]]:
+    """Tick, returns (as the points of map_data) and tracks [x, y, radius, vx, vy] of each."""
+    stamps = [tick.stamp_ns for tick in episode.ticks]
+    known = [(bisect_left(stamps, found.stamp_ns), found) for found in perceived]
+    return [
+        {
+            "tick": k,
+            "points": _differences(found.points_m),
+            "tracks": [
+                [round(v, 3) for v in (*t.center_m, t.radius_m, *t.velocity_mps)]
+                for t in found.tracks
+            ],
+        }
+        for k, found in known
+        if k < len(stamps)
+    ]
 
 
 def _differences(points_m: np.ndarray) -> list[int]:

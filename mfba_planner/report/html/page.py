@@ -16,6 +16,7 @@ from mfba_planner import __version__
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.output_files import write_new
 from mfba_planner.recording.local_maps import NO_MAPS, RobotMaps
+from mfba_planner.recording.perceived import NOTHING_PERCEIVED, RobotPerceived
 from mfba_planner.report import format_values
 from mfba_planner.simulation.episode import Episode
 
@@ -33,19 +34,23 @@ def write_page(
     path: Path,
     roster: Sequence[str] = (),
     maps: RobotMaps = NO_MAPS,
+    perceived: RobotPerceived = NOTHING_PERCEIVED,
 ) -> None:
     """Write the page of some named runs; the same runs give the same bytes.
 
     roster: the names of all robots of the fleet, if the runs are of one; they share a scene.
-    maps: the local maps of each run, by its name.
+    maps: the local maps of each run, by its name; perceived: what real robots perceived.
     Raises InputError for too many runs or ticks, OutputError when path exists already or cannot
     be written.
     """
-    write_new(path, page(runs, roster, maps).encode())
+    write_new(path, page(runs, roster, maps, perceived).encode())
 
 
 def page(
-    runs: Sequence[tuple[str, Episode]], roster: Sequence[str] = (), maps: RobotMaps = NO_MAPS
+    runs: Sequence[tuple[str, Episode]],
+    roster: Sequence[str] = (),
+    maps: RobotMaps = NO_MAPS,
+    perceived: RobotPerceived = NOTHING_PERCEIVED,
 ) -> str:
     """The text of the page. Raises InputError for too many runs or ticks."""
     episodes = [episode for _, episode in runs]
@@ -60,7 +65,7 @@ def page(
         style=_own("page.css"),
         data=as_json(
             {
-                **page_data(runs, __version__, roster, maps),
+                **page_data(runs, __version__, roster, maps, perceived),
                 "worlds": names,
                 "charts": charts(episodes),
                 "looks": [look(number) for number in range(len(runs))],

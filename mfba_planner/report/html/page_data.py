@@ -21,8 +21,10 @@ from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.odometry_jump import is_odometry_jump
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.recording.local_maps import NO_MAPS, RobotMaps
+from mfba_planner.recording.perceived import NOTHING_PERCEIVED, Perceived, RobotPerceived
 from mfba_planner.report import format_values
-from mfba_planner.report.html.map_data import map_data
+from mfba_planner.report.draw_perceived import widened
+from mfba_planner.report.html.map_data import map_data, perceived_data
 from mfba_planner.report.result_table import result_rows
 from mfba_planner.report.run_events import closest_passes
 from mfba_planner.report.sector_ring import ring_of
@@ -46,13 +48,14 @@ def page_data(
     version: str,
     roster: Sequence[str] = (),
     maps: RobotMaps = NO_MAPS,
+    perceived: RobotPerceived = NOTHING_PERCEIVED,
 ) -> Plain:
     """The data of the page of some named runs; runs in equal worlds share one view.
 
     roster: the names of all robots of the fleet, if the runs are of one; they share a scene.
     """
     is_fleet = in_one_scene(runs, roster)
-    views = [choose_view(episode, closest_passes(episode))[0] for _, episode in runs]
+    views = [_view(episode, perceived.get(name, ())) for name, episode in runs]
     shared = [
         _union(
             view
@@ -70,10 +73,18 @@ def page_data(
         "modes": [{"key": mode.value, "label": format_values.MODES[mode]} for mode in _MODES],
         "runs": [
             run_data(name, episode, view, obstacle_names(name, episode, roster), times_s)
-            | {"maps": map_data(episode, maps.get(name, ()))}
+            | {
+                "maps": map_data(episode, maps.get(name, ())),
+                "perceived": perceived_data(episode, perceived.get(name, ())),
+            }
             for (name, episode), view in zip(runs, shared)
         ],
     }
+
+
+def _view(episode: Episode, perceived: Sequence[Perceived]) -> View:
+    view, _ = choose_view(episode, closest_passes(episode))
+    return widened(view, perceived)[0] if perceived else view
 
 
 def in_one_scene(runs: Sequence[tuple[str, Episode]], roster: Sequence[str]) -> bool:

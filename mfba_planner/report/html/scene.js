@@ -60,6 +60,9 @@ class Scene {
     if (walls.length) this.add("path", { class: "segments", d: walls.join("") });
     this.map = this.add("path", { class: "map" });
     this.mapTicks = this.run.maps.map(({ tick }) => tick);
+    this.returns = this.add("path", { class: "returns" });
+    this.tracks = this.add("g", { class: "tracks" });
+    this.perceivedTicks = this.run.perceived.map(({ tick }) => tick);
     if (!world.walls) return;
     const [x0, y0, x1, y1] = world.walls;
     this.add("rect", { class: "wall", x: x0, y: -y1, width: x1 - x0, height: y1 - y0 });
@@ -216,6 +219,7 @@ class Scene {
   showDecision(k) {
     const { ticks } = this.run;
     this.showMap(k);
+    this.showPerceived(k);
     const mode = DATA.modes[ticks.mode[k]].key;
     set(this.element, { "data-mode": mode, "data-tick": k });
     const isAnySet = ticks.vs[k].includes("1");
@@ -248,14 +252,24 @@ class Scene {
     const number = k < this.mapTicks[0] ? -1 : indexAt(this.mapTicks, k);
     if (this.mapShown === number) return;
     this.mapShown = number;
-    const { points } = this.run.maps[number] ?? { points: [] };
-    const dots = [];
-    for (let i = 0, x = 0, y = 0; i < points.length; i += 2) {
-      x += points[i];
-      y += points[i + 1];
-      dots.push(`M${x / 100} ${-y / 100}h0`);
-    }
-    set(this.map, { d: dots.join(""), "data-points": dots.length });
+    showDots(this.map, this.run.maps[number]?.points ?? []);
+  }
+
+  /** The returns of the last scan until tick k, and the tracks then, with an arrow if they move. */
+  showPerceived(k) {
+    const number = k < this.perceivedTicks[0] ? -1 : indexAt(this.perceivedTicks, k);
+    if (this.perceivedShown === number) return;
+    this.perceivedShown = number;
+    const { points, tracks } = this.run.perceived[number] ?? { points: [], tracks: [] };
+    showDots(this.returns, points);
+    this.tracks.replaceChildren(
+      ...tracks.flatMap(([x, y, r, vx, vy]) => {
+        const kind = vx || vy ? "track moving" : "track";
+        const circle = svg("circle", { class: kind, cx: x, cy: -y, r });
+        const arrow = this.arrow(x, y, AHEAD * vx, AHEAD * vy);
+        return arrow ? [circle, svg("path", { class: kind, d: arrow })] : [circle];
+      }),
+    );
   }
 
   /** A line with a head of seven pixels, from (x, y) along (dx, dy). */
@@ -271,6 +285,17 @@ class Scene {
     };
     return `M${x} ${-y}L${tx} ${-ty}${wing(1)}${wing(-1)}`;
   }
+}
+
+/** A dot for each point; points are in cm, as differences. */
+function showDots(element, points) {
+  const dots = [];
+  for (let i = 0, x = 0, y = 0; i < points.length; i += 2) {
+    x += points[i];
+    y += points[i + 1];
+    dots.push(`M${x / 100} ${-y / 100}h0`);
+  }
+  set(element, { d: dots.join(""), "data-points": dots.length });
 }
 
 function between(a, b, fraction) {

@@ -12,7 +12,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import UInt8MultiArray
+from std_msgs.msg import String, UInt8MultiArray
 from visualization_msgs.msg import MarkerArray
 
 WORLD_SIM = "world_sim"
@@ -163,6 +163,11 @@ OUTCOME = Topic(
     writers=(WORLD_SIM,),
     qos=LATCHED_QOS,
 )
+# What a recorder of any kind needs to decide again: the nodes' parameters as JSON, latched.
+PARAMETERS = {
+    node: Topic(name=f"{node}/parameters", type=String, writers=(node,), qos=LATCHED_QOS)
+    for node in (WORLD_SIM, VIRTUAL_SENSOR, PLANNER)
+}
 INITIALPOSE = Topic(
     name="initialpose", type=PoseWithCovarianceStamped, readers=(WORLD_SIM,), qos=VIEW_QOS
 )
@@ -196,6 +201,7 @@ GRAPH: tuple[Topic, ...] = (
     INITIALPOSE,
     MARKERS,
     DIAGNOSTICS,
+    *PARAMETERS.values(),
 )
 
 try:  # not among the PyPI wheels; published and recorded where it is installed

@@ -83,7 +83,8 @@ class Player:
         self._since_ns = time.monotonic_ns()  # start of the present phase
         self._started_ns = self._played_ns = 0
         self._rewind()
-        for line in [*self._bag.problems, *left_out]:
+        others = (f"left out {text}" for text in self._bag.left_out)
+        for line in [*self._bag.problems, *others, *left_out]:
             self._node.get_logger().warning(line)
 
     def _resolve(self, name: str) -> str:

@@ -89,10 +89,10 @@ def parse(args: list[str]) -> ReplaySettings:
     """Settings from a command line without ROS arguments. Raises ConfigError."""
     parser = Parser(
         prog="replay",
-        description="Play a bag: a directory or a .mcap file of this package or of rosbag2.",
+        description="Play a bag of this package, of rosbag2 or of ROS 1: a directory or a file.",
         epilog=_EPILOG,
     )
-    parser.add_argument("bag", metavar="BAG", help="bag directory or .mcap file")
+    parser.add_argument("bag", metavar="BAG", help="run or bag directory, or file")
     for name, default, item in walk(ReplaySettings(bag="")):
         flag, spec = "--" + name.replace("_", "-"), item.metadata["spec"]
         if isinstance(default, bool):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -18,7 +19,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from ..interface import parameters
-from ..interface.topics import Topic, expected_readers, reading_qos, with_depth
+from ..interface.topics import PARAMETERS, Topic, expected_readers, reading_qos, with_depth
 from .connection_check import type_mismatch
 from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
 
@@ -32,6 +33,7 @@ class GraphNode(Node):
         """Pass rclpy's keyword arguments on (context, parameter_overrides, ...)."""
         super().__init__(name, **kwargs)
         self.finished = False
+        self._kind = name
         self._advertised: list[tuple[Topic, Publisher]] = []
         self._subscribed: list[Subscription] = []
         self._peers: set[str] = set()
@@ -145,8 +147,23 @@ class GraphNode(Node):
         Called last in a constructor: parameters that were given but not declared are logged.
         """
         parameters.warn_of_unknown(self)
+        self._publish_parameters()
         self._peers = peers
         self.create_service(Trigger, "~/ready", self._on_ready)
+
+    def _publish_parameters(self) -> None:
+        """Publish the parameters, latched: a recording can then be decided again."""
+        topic = PARAMETERS.get(self._kind)
+        if topic is None:
+            return
+        self._parameters_publisher = self.create_publisher(
+            topic.type,
+            topic.name,
+            topic.qos,
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )
+        text = json.dumps(parameters.values(self), sort_keys=True)
+        self._parameters_publisher.publish(topic.type(data=text))
 
     def missing(self) -> str:
         """What is missing before a first message would reach all peers; empty: nothing.
