@@ -49,6 +49,7 @@ class Nodes:
         self._executor = make_executor(self._context)
         self._probe = rclpy.create_node("probe", context=self._context)
         self._executor.add_node(self._probe)
+        self._nodes = [self._probe]
         self._pairs = [self._start(method) for method in ("paper", "predictive")]
 
     def _start(self, method: str) -> Any:
@@ -57,6 +58,7 @@ class Nodes:
             given = [Parameter(name, value=value) for name, value in {**values, **more}.items()]
             node = kind(context=self._context, namespace=method, parameter_overrides=given)
             self._executor.add_node(node)
+            self._nodes.append(node)
         odom, scan = (
             self._probe.create_publisher(topic.type, f"{method}/{topic.name}", topic.qos)
             for topic in (topics.ODOM, topics.SCAN)
@@ -71,6 +73,14 @@ class Nodes:
         goal.publish(message)
         self._settle()
         return odom, scan, commands
+
+    def close(self) -> None:
+        """End the nodes and free their domain."""
+        for node in self._nodes:
+            node.destroy_node()
+        self._executor.shutdown()
+        self._context.shutdown()
+        self._lock.close()
 
     def _settle(self) -> None:
         for _ in range(40):

@@ -3,6 +3,7 @@
 
 import importlib
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -36,7 +37,10 @@ def test_what_comes_in_is_accepted_or_refused(
     fuzz: ModuleType, door: str, cases: int, tmp_path: Path
 ) -> None:
     opened = fuzz.DOORS[door](tmp_path)
-    found = {number: fuzz.run_case(door, opened, number) for number in range(cases)}
+    with ExitStack() as stack:
+        if door == "messages":
+            stack.callback(opened.close)
+        found = {number: fuzz.run_case(door, opened, number) for number in range(cases)}
     failed = {n: text for n, text in found.items() if text not in ("accepted", "refused")}
     assert failed == {}
     assert set(found.values()) == {"accepted", "refused"}
