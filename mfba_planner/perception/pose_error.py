@@ -37,6 +37,7 @@ class PoseError:
         """Start with small variances and no error."""
         self.variance_m2 = _FIRST_SD**2
         self.variance_rad2 = _FIRST_SD**2
+        self.learnt = 0  # scans that the variances were learnt from
         self.error = NO_ERROR
         self._mean = (0.0, 0.0, 0.0)  # of the last errors
 
@@ -125,6 +126,7 @@ class PoseError:
         count = int(np.count_nonzero(tracks))
         if not count:
             return
+        self.learnt += 1
         vm, vr = self.variance_m2, self.variance_rad2
         length = equations.length(self._mean)[tracks]
         length.sort()

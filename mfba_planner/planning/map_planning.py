@@ -72,7 +72,7 @@ class MapPlanning:
         self.search = MapSearch(route, params.robot_radius_m, headings, reach_m, self._known_map)
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
-        self._may_move = np.empty(0, dtype=bool)  # each of them
+        self._may_move = np.empty(0, dtype=bool)  # of them, where the odometry hides it
         self._blocked, self._place = BlockedHeadings(), PlaceCheck()
 
     def update(self, stamp_ns: int, pose: Pose2D, tracker: Tracker) -> None:
@@ -80,7 +80,7 @@ class MapPlanning:
         assert tracker.beams is not None
         moving, surely = tracker.moving()
         self._radii_m = tracker.radii_m
-        self._may_move = tracker.may_move()
+        self._may_move = tracker.may_move() & tracker.may_hide_motion
         self._reach_m = self.map.params.spacing_m / tracker.beams.spacing_rad
         self.map.update(stamp_ns, pose, tracker.beams, moving, surely, tracker.pose_error)
         if self._known_map is not None:
