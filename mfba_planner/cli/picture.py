@@ -8,8 +8,8 @@ from pathlib import Path
 from ..core.argument_parser import Parser
 from ..core.output_files import bag_in
 from ..recording.decisions_without_inputs import print_omissions
-from ..recording.perceived import read_perceived
 from ..recording.read_episode import read_recording
+from ..recording.read_perceived import read_perceived
 
 
 def main(args: list[str]) -> int:

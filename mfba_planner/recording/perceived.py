@@ -4,22 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..core.errors import BagError, InputError
 from ..core.geometry import Point, Pose2D
 from ..core.planner_types import Scan
-from ..perception.scan_to_sectors import aligned
-from ..simulation.episode import Episode
-from .bag_reader import BagReader
-from .fleet_topics import messages_by_robot, robot_topic
-from .from_messages import laser_scan, stamp_ns
 
-SCAN = "/scan"
 MOST_PERCEIVED = 400  # of a run
 
 T = TypeVar("T")
@@ -76,26 +68,3 @@ def returns_of(scan: Scan, pose: Pose2D) -> np.ndarray:
     angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hit)
     points = np.column_stack((np.cos(angles), np.sin(angles))) * ranges[hit, None]
     return (points + pose.position).astype(np.float32)
-
-
-def read_perceived(
-    path: str | Path, episodes: Mapping[str, Episode], *, salvage: bool = False
-) -> dict[str, tuple[Perceived, ...]]:
-    """The returns of each robot by stamp, for recordings of real robots. Raises BagError."""
-    real = [name for name, episode in episodes.items() if episode.start_ns is not None]
-    found: dict[str, EvenChoice[Perceived]] = {name: EvenChoice(MOST_PERCEIVED) for name in real}
-    poses = {name: {t.stamp_ns: t.pose for t in episodes[name].ticks} for name in real}
-    with BagReader(path, salvage=salvage) as reader:
-        named = [name for name in real if robot_topic(name, SCAN) in reader.topics]
-        for robot, message in messages_by_robot(reader, named, [SCAN]) if named else ():
-            stamp = stamp_ns(message.message.header.stamp)
-            pose = poses[robot].get(stamp)
-            if pose is None:
-                continue
-            try:
-                scan = laser_scan(message.message)
-            except InputError as error:
-                raise BagError(f"{reader.path}: {robot_topic(robot, SCAN)}: {error}") from None
-            yaw = pose.yaw + episodes[robot].scenario.robot.lidar.yaw_rad
-            found[robot].add(Perceived(stamp, returns_of(aligned(scan, yaw), pose)))
-    return {name: tuple(choice.items) for name, choice in found.items()}

@@ -33,8 +33,8 @@ BAG = {"mcap", "mcap_ros2", "numpy", "yaml"}
 BEFORE = {
     "run": set[str](),
     "replay": set[str](),
-    **dict.fromkeys(("info", "digest", "verify", "diff", "export", "picture", "animate"), BAG),
-    **dict.fromkeys(("view", "report"), BAG),
+    **dict.fromkeys(("decide", "info", "digest", "verify", "diff", "export"), BAG),
+    **dict.fromkeys(("animate", "picture", "view", "report"), BAG),
     "recover": BAG - {"numpy"},
     "import": {"numpy", "yaml"},
 }

@@ -22,8 +22,9 @@ from ...planning.planner_params import PlannerParams
 from ...recording.decisions_without_inputs import print_omissions
 from ...recording.fleet_topics import NO_NAMESPACE, select_robots
 from ...recording.local_maps import NO_MAPS, RobotMaps, read_local_maps
-from ...recording.perceived import NOTHING_PERCEIVED, RobotPerceived, read_perceived
+from ...recording.perceived import NOTHING_PERCEIVED, RobotPerceived
 from ...recording.read_episode import Recording, read_recording
+from ...recording.read_perceived import read_perceived
 from ...report.result_json import read_result
 from ...scenarios.scenario_files import load_scenario
 from ...simulation.decision_digest import digest
