@@ -19,8 +19,8 @@ from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, MfbaError
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.configuration_attachment import read_configuration
-from mfba_planner.recording.read_perceived import read_perceived
 from mfba_planner.recording.read_episode import read_recording
+from mfba_planner.recording.read_perceived import read_perceived
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Outcome
 from mfba_planner.verification.verify_bag import verify
