@@ -35,7 +35,7 @@ _TURN_SHARE = 0.8  # of a step, by which an obstacle that turns back is found el
 _NEAR_M, _NEAR_ROUND_M = 0.1, 0.04  # returns so near to a predicted circle are its own
 _KNOWN = 3  # scans after which a track's velocity is known
 _MAY_MOVE = 4.0  # squared significance of a velocity that may be one
-_LEARNT, _EXACT_M = 6, 0.005  # scans and standard deviation from which poses surely err
+_LEARNT = 6  # scans from which the errors of poses are known
 _ANCHORS = 3  # such tracks tell that there is no common motion
 
 
@@ -201,14 +201,9 @@ class Tracker:
 
     @property
     def pose_variance(self) -> tuple[float, float]:
-        """Variances of single poses, per axis (m^2) and of the heading (rad^2), as learnt."""
-        return self._pose_error.variance_m2, self._pose_error.variance_rad2
-
-    @property
-    def may_hide_motion(self) -> bool:
-        """Whether poses are known to err by so much that slow motion is seen late."""
+        """Variances of single poses, per axis (m^2) and of the heading (rad^2); 0: not learnt."""
         e = self._pose_error
-        return e.learnt >= _LEARNT and e.variance_m2 > _EXACT_M * _EXACT_M
+        return (e.variance_m2, e.variance_rad2) if e.learnt >= _LEARNT else (0.0, 0.0)
 
     @property
     def radii_m(self) -> Array:

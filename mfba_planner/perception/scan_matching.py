@@ -59,6 +59,13 @@ class ScanMatching:
         self._squares = [0.0, 0.0]  # of the errors, and of what the tracker leaves of them
         self._believes = False
 
+    @property
+    def variance(self) -> tuple[float, float]:
+        """Variances of single poses, per axis (m^2) and of the heading (rad^2); inf: unknown."""
+        if self._scans < _LEARNING_SCANS:
+            return math.inf, math.inf
+        return self._variance_m2, self._variance_rad2
+
     def estimate(
         self, found: Surfaces, still: Array, origin: Point, nearest: Nearest, expected: Error
     ) -> None:

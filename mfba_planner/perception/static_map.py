@@ -75,7 +75,7 @@ class StaticMap:
         p = self.params
         self._points = MapPoints(p.cell_m, p.size_m)
         self._moving = MovingReturns(p.size_m)
-        self._matching = ScanMatching(p.cell_m)
+        self.matching = ScanMatching(p.cell_m)
         self._free = FreeSpace(_LAGS_S, _MARGIN_M)
         self._observed = ObservedCells(p.size_m)
         self._stamp_ns: int | None = None
@@ -91,7 +91,7 @@ class StaticMap:
         """Drop all that is known, as after a jump of the odometry."""
         for part in (self._points, self._moving, self._free, self._observed):
             part.clear()
-        self._matching.reset()
+        self.matching.reset()
         self._stamp_ns, self._field, self._begin_s = None, None, self._time_s
         self.version += 1
 
@@ -103,7 +103,7 @@ class StaticMap:
     @property
     def noise_m(self) -> float:
         """Standard deviation of a return from the surfaces of the map, as learnt."""
-        return self._matching.noise_m
+        return self.matching.noise_m
 
     def update(
         self,
@@ -152,21 +152,21 @@ class StaticMap:
         changed |= self._clear(beams, surely)
         x, y = self._robot
         changed |= self._points.roll(x, y)
-        self._observed.update(self._time_s, x, y, self._matching.error[2], beams)
-        self._free.add(beams, self._matching.error, self._matching.sd_rad)
+        self._observed.update(self._time_s, x, y, self.matching.error[2], beams)
+        self._free.add(beams, self.matching.error, self.matching.sd_rad)
         self.version += changed
 
     @property
     def _robot(self) -> Point:
         """The robot's position in the map's frame."""
-        ex, ey, _ = self._matching.error
+        ex, ey, _ = self.matching.error
         return (self._origin[0] - ex, self._origin[1] - ey)
 
     def _mark(
         self, found: Surfaces, beams: Beams, moving: Array, pose_error: tuple[float, float, float]
     ) -> bool:
         """Match the scan, and mark what stands; whether the points changed."""
-        p, points, matching, motion = self.params, self._points, self._matching, self._moving
+        p, points, matching, motion = self.params, self._points, self.matching, self._moving
         in_track = motion.near_any(found.x, found.y, moving)
         usable = found.range_m > 0.0
         usable &= found.range_m < beams.longest_m - _LIMIT_M
@@ -199,7 +199,7 @@ class StaticMap:
         standing[same] = self._points.data[HITS][index[same]] >= _STANDING_HITS
         asked = (~standing).nonzero()[0]
         appeared = np.zeros(x.size, dtype=bool)
-        margin = 3.0 * self._matching.noise_m + 2.0 * self._matching.sd_m
+        margin = 3.0 * self.matching.noise_m + 2.0 * self.matching.sd_m
         appeared[asked] = self._free.appeared(x[asked], y[asked], margin)
         return appeared
 
@@ -240,7 +240,7 @@ class StaticMap:
         of = index[chosen]
         if not of.size:
             return False
-        c, s = math.cos(self._matching.error[2]), math.sin(self._matching.error[2])
+        c, s = math.cos(self.matching.error[2]), math.sin(self.matching.error[2])
         nx, ny = found.nx[chosen], found.ny[chosen]
         nx, ny = c * nx + s * ny, c * ny - s * nx
         rest = nx * (x[chosen] - data[X][of]) + ny * (y[chosen] - data[Y][of])
@@ -249,7 +249,7 @@ class StaticMap:
         dx = np.bincount(of, rest * nx, n)[met] / count[met]
         dy = np.bincount(of, rest * ny, n)[met] / count[met]
         # A point whose returns have left it follows them at once: what creeps is in the map too.
-        noise_m = self._matching.noise_m / np.sqrt(count[met])
+        noise_m = self.matching.noise_m / np.sqrt(count[met])
         left = dx * dx + dy * dy > (_CREEP_M + _CREEP_SD * noise_m) ** 2
         data[HITS, met[left]] = 1.0
         data[FIRST, met[left]] = self._time_s
@@ -265,7 +265,7 @@ class StaticMap:
 
     def _clear(self, beams: Beams, moving: Array) -> bool:
         """Clear points that the beams see through, and young ones where something moves."""
-        points, p, m = self._points, self.params, self._matching
+        points, p, m = self._points, self.params, self.matching
         if not (points.count and beams.range_m.size):
             return False
         data, (ox, oy) = points.data, self._robot
@@ -304,12 +304,12 @@ class StaticMap:
 
     def to_map(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Positions (k,) in odom, by the pose of the last scan, in the map's frame."""
-        return self._matching.corrected(x, y, self._origin)
+        return self.matching.corrected(x, y, self._origin)
 
     def points(self) -> Array:
         """Points (n, 2) in odom, by the pose of the last scan."""
         data = self._points.data
-        x, y = self._matching.measured(data[X], data[Y], self._origin)
+        x, y = self.matching.measured(data[X], data[Y], self._origin)
         return np.stack((x, y), axis=1)
 
     def map_points(self) -> Array:
@@ -382,8 +382,8 @@ class StaticMap:
         if self._stamp_ns is None:
             return None
         (left, low), cells = cut_to_known(*self.occupancy_grid(), self.params.cell_m)
-        x, y = self._matching.measured(np.array([left]), np.array([low]), self._origin)
-        origin = Pose2D(float(x[0]), float(y[0]), float(self._matching.error[2]))
+        x, y = self.matching.measured(np.array([left]), np.array([low]), self._origin)
+        origin = Pose2D(float(x[0]), float(y[0]), float(self.matching.error[2]))
         return OccupancyGrid(self._stamp_ns, origin, self.params.cell_m, cells)
 
 

@@ -41,6 +41,7 @@ _LEAST_M = 0.005  # kept from what stands, beyond the robot's radius
 _BESIDE_M, _AHEAD_M = 0.15, 0.1
 _MOVING_M = 1.0  # edge to edge: the robot may be waiting for what moves so near
 _SLOW_MPS, _ESTABLISHED_M = 0.5, 0.05
+_EXACT_M = 0.005  # standard deviation of poses from which they hide slow motion
 _DRIVES_MPS = 0.1  # a slower velocity is a wait
 ENCLOSED = "what stands leaves no way out"
 _STRAIGHT = "the straight way is free"
@@ -72,6 +73,7 @@ class MapPlanning:
         self.search = MapSearch(route, params.robot_radius_m, headings, reach_m, self._known_map)
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
+        self.pose_variance = (0.0, 0.0)  # of single poses, m^2 and rad^2, as far as learnt
         self._may_move = np.empty(0, dtype=bool)  # of them, where the odometry hides it
         self._blocked, self._place = BlockedHeadings(), PlaceCheck()
 
@@ -80,9 +82,13 @@ class MapPlanning:
         assert tracker.beams is not None
         moving, surely = tracker.moving()
         self._radii_m = tracker.radii_m
-        self._may_move = tracker.may_move() & tracker.may_hide_motion
         self._reach_m = self.map.params.spacing_m / tracker.beams.spacing_rad
         self.map.update(stamp_ns, pose, tracker.beams, moving, surely, tracker.pose_error)
+        # Walls that come into view look like errors of poses to the tracker, but not to the map.
+        (vm, vr), by_map = tracker.pose_variance, self.map.matching.variance
+        self.pose_variance = min(vm, by_map[0]), min(vr, by_map[1])
+        hidden = self.pose_variance[0] > _EXACT_M * _EXACT_M
+        self._may_move = tracker.may_move() & hidden
         if self._known_map is not None:
             self._known_map.update(tracker.beams, *self._in_map(pose.position))
 

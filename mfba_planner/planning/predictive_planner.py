@@ -337,7 +337,7 @@ class Predictive(BasePlanner):
         if obs.scan is None or obs.circles is not None or obs.sensed is None:
             return obs
         now = obs.pose_ns, obs.pose
-        error, variance = self.tracker.pose_error, self.tracker.pose_variance
+        error, variance = self.tracker.pose_error, self._map_planning.pose_variance
         return replace(obs, pose=self._dead_reckoning.pose(obs.sensed, now, error, variance))
 
     def _drive_rollout(self, obs: Observation) -> DriveRollout | None:
