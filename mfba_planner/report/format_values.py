@@ -18,6 +18,7 @@ MODES = {
     Mode.STOPPED: "stopped (unusable input)",
     Mode.ARRIVED: "arrived",
 }
+UNKNOWN = "unknown"
 _OUTCOMES = {
     Outcome.GOAL_REACHED: "goal reached",
     Outcome.TIME_LIMIT: "time limit",
@@ -47,7 +48,7 @@ def number(value: float, digits: int, unit: str = "", absent: str = "none") -> s
 
 def length(result: Result) -> str:
     """Path length."""
-    return number(result.length_m, 3, "m", absent="unknown")
+    return number(result.length_m, 3, "m", absent=UNKNOWN)
 
 
 def time(result: Result) -> str:

@@ -32,12 +32,17 @@ def result_rows(
     """Yield (name, value, remark) for each line of the table; names: those of the obstacles."""
     yield "outcome", format_values.outcome(result), _why_no_success(result)
     yield "length", format_values.length(result), _excess(episode, result)
-    yield "time", format_values.time(result), "simulated"
+    is_real = episode.start_ns is not None  # a recorded drive of a robot
+    yield "time", format_values.time(result), "recorded" if is_real else "simulated"
     yield "fitness", format_values.fitness(result), "1 / length"
-    between = "edge to edge" if math.isfinite(result.min_clearance_m) else ""
-    yield "min clearance", format_values.clearance(result), between
-    yield "collisions", str(result.collisions), ""
-    yield "encounters", str(len(result.encounters)), _encountered(result, names)
+    if is_real:
+        for name in ("min clearance", "collisions", "encounters"):
+            yield name, format_values.UNKNOWN, "not in the recording"
+    else:
+        between = "edge to edge" if math.isfinite(result.min_clearance_m) else ""
+        yield "min clearance", format_values.clearance(result), between
+        yield "collisions", str(result.collisions), ""
+        yield "encounters", str(len(result.encounters)), _encountered(result, names)
     yield "mode switches", str(result.mode_switches), _ticks_by_mode(result)
     rate = "" if ticks_per_s is None else f"{format_values.number(ticks_per_s, 0)} ticks/s"
     yield "ticks", str(result.ticks), rate

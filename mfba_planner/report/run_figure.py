@@ -96,12 +96,17 @@ def _pass_rows(passes: Sequence[Pass], result: Result) -> list[tuple[str, str, s
 def _cells(episode: Episode, result: Result) -> list[tuple[str, str, str]]:
     """(label, value, colour) of the result strip."""
     touched = style.BAD if result.collisions else style.INK
+    clearance, collisions = format_values.clearance(result), str(result.collisions)
+    ended = style.GOOD if result.success else style.BAD
+    if episode.start_ns is not None:  # of a real robot they are not recorded
+        clearance = collisions = format_values.UNKNOWN
+        ended = style.INK
     return [
-        ("outcome", format_values.outcome(result), style.GOOD if result.success else style.BAD),
+        ("outcome", format_values.outcome(result), ended),
         ("length", format_values.length(result), style.INK),
         ("time", format_values.time(result), style.INK),
-        ("min clearance", format_values.clearance(result), touched),
-        ("collisions", str(result.collisions), touched),
+        ("min clearance", clearance, touched),
+        ("collisions", collisions, touched),
         ("mode switches", str(result.mode_switches), style.INK),
         ("algorithm", episode.label, style.INK),
         ("seed", format_values.one_line(str(episode.seed), 12), style.INK),

@@ -131,3 +131,11 @@ def test_long_names_and_seeds_are_cut() -> None:
     words = title.split()
     assert words[0] == "n" * 37 + "...,"
     assert words[1:4] == ["mfba,", "seed", "1" + "0" * 20 + "...,"]
+
+
+def test_of_a_recorded_drive_contacts_are_unknown(episode: Episode) -> None:
+    """Where the obstacles were is not recorded, so that there were none must not be said."""
+    table = rows(replace(episode, start_ns=1))
+    assert table["time"][1] == "recorded"
+    for name in ("min clearance", "collisions", "encounters"):
+        assert table[name] == ("unknown", "not in the recording")
