@@ -81,9 +81,9 @@ class DeadReckoning:
         if moved is None:
             return present
         dx, dy = rotated((moved.x, moved.y), before.yaw)
-        way_m = (dx * dx + dy * dy) ** 0.5
+        moved_m = (dx * dx + dy * dy) ** 0.5
         known = 1.0 if error != (0.0, 0.0, 0.0) else 2.0
-        share_m = _share(known * variance[0], _LEAST_SD_M + _SLIP * way_m)
+        share_m = _share(known * variance[0], _LEAST_SD_M + _SLIP * moved_m)
         share_rad = _share(known * variance[1], _LEAST_SD_RAD + _SLIP * abs(moved.yaw))
         off: Point = (
             before.x + dx - (present.x + error[0]),

@@ -23,6 +23,7 @@ from mfba_planner.core.errors import BagError
 from mfba_planner.core.planner_types import Mode
 from mfba_planner.recording.file_integrity import check_data
 from mfba_planner.recording.from_messages import stamp_ns
+from mfba_planner.recording.merge_by_time import RawMessage
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation import run_episode
 from mfba_planner.simulation.decision_digest import digest
@@ -200,8 +201,18 @@ def test_an_interrupted_recording_is_checked_up_to_its_end(bag: Path, tmp_path: 
     assert 20 < len(report.decided) < 40
 
 
-def test_a_bag_without_configuration_is_refused(bag: Path, tmp_path: Path) -> None:
+def test_the_configuration_is_in_the_attachment_and_in_latched_topics(
+    bag: Path, tmp_path: Path
+) -> None:
     plain = rewrite(bag, tmp_path / "plain", list, configure=lambda _: None)
+    assert verify(plain).is_identical
+
+
+def test_a_bag_without_any_configuration_is_refused(bag: Path, tmp_path: Path) -> None:
+    def edit(messages: list[RawMessage]) -> list[RawMessage]:
+        return [message for message in messages if not message.topic.endswith("/parameters")]
+
+    plain = rewrite(bag, tmp_path / "plain", edit, configure=lambda _: None)
     with pytest.raises(BagError, match="has no mfba_planner/configuration"):
         verify(plain)
 
