@@ -185,9 +185,20 @@ class _Check:
 def check(name: str, patience_s: float = PATIENCE_S) -> Iterator[Property]:
     """The properties of an optimiser, one by one. Raises ConfigError for an unknown name.
 
-    A search that takes longer than patience_s does not end.
+    A search that takes longer than patience_s does not end. Global generators are left as they
+    were.
     """
-    return _Check(name, patience_s).properties()
+    return _restoring(_Check(name, patience_s).properties())
+
+
+def _restoring(properties: Iterator[Property]) -> Iterator[Property]:
+    """The properties; global generators are left as they were after each."""
+    while True:
+        with _global_states():
+            found = next(properties, None)
+        if found is None:
+            return
+        yield found
 
 
 def print_digest(name: str) -> None:
