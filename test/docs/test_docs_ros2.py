@@ -22,6 +22,7 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 # Commands of other packages in the text, and the tests of statements about them.
 MENTIONED = {
     "ros2 bag": "recording/test_bag_writer.py",
+    "ros2 bag convert": "verification/test_verify_bag.py",
     "ros2 bag info": "recording/test_bag_metadata.py",
     "ros2 bag play": "recording/test_bag_qos.py",
     "ros2 bag record": "recording/test_bag_reader.py",
