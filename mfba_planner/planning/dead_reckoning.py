@@ -7,6 +7,7 @@ to pose moves the robot among them by the errors of two poses; its own commands 
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import NamedTuple
 
@@ -36,33 +37,32 @@ class DeadReckoning:
 
     def command(self, stamp_ns: int, pose: Pose2D, after: Pose2D) -> None:
         """From the stamp on, the robot is driven as from pose to after within a tick."""
-        while self._motions and (
-            self._motions[-1].stamp_ns >= stamp_ns
-            or self._motions[0].stamp_ns < stamp_ns - _KEPT_NS
-        ):
-            late = self._motions[-1].stamp_ns >= stamp_ns
-            self._motions.pop() if late else self._motions.popleft()
+        motions = self._motions
+        while motions and motions[-1].stamp_ns >= stamp_ns:
+            motions.pop()
+        while motions and motions[0].stamp_ns < stamp_ns - _KEPT_NS:
+            motions.popleft()
         ahead_m, left_m = rotated((after.x - pose.x, after.y - pose.y), -pose.yaw)
         turn_rad = wrap_angle(after.yaw - pose.yaw)
-        self._motions.append(_Motion(stamp_ns, ahead_m, left_m, turn_rad))
+        motions.append(_Motion(stamp_ns, ahead_m, left_m, turn_rad))
 
     def moved(self, from_ns: int, to_ns: int) -> Pose2D | None:
         """The motion between two stamps, in the robot's frame at the first.
 
         None where no command is known at from_ns.
         """
+        if not self._motions or self._motions[0].stamp_ns > from_ns:
+            return None
         x = y = yaw = 0.0
         ends = [motion.stamp_ns for motion in self._motions][1:] + [to_ns]
-        known = False
         for motion, end_ns in zip(self._motions, ends):
             begin_ns, end_ns = max(motion.stamp_ns, from_ns), min(end_ns, to_ns)
-            known = known or motion.stamp_ns <= from_ns
             if end_ns <= begin_ns:
                 continue
             share = (end_ns - begin_ns) / self._tick_ns
             dx, dy = rotated((share * motion.ahead_m, share * motion.left_m), yaw)
             x, y, yaw = x + dx, y + dy, yaw + share * motion.turn_rad
-        return Pose2D(x, y, yaw) if known else None
+        return Pose2D(x, y, yaw)
 
     def pose(
         self,
@@ -81,7 +81,7 @@ class DeadReckoning:
         if moved is None:
             return present
         dx, dy = rotated((moved.x, moved.y), before.yaw)
-        moved_m = (dx * dx + dy * dy) ** 0.5
+        moved_m = math.sqrt(dx * dx + dy * dy)
         known = 1.0 if error != (0.0, 0.0, 0.0) else 2.0
         share_m = _share(known * variance[0], _LEAST_SD_M + _SLIP * moved_m)
         share_rad = _share(known * variance[1], _LEAST_SD_RAD + _SLIP * abs(moved.yaw))

@@ -43,6 +43,7 @@ _MOVING_M = 1.0  # edge to edge: the robot may be waiting for what moves so near
 _SLOW_MPS, _ESTABLISHED_M = 0.5, 0.05
 _EXACT_M = 0.005  # standard deviation of poses from which they hide slow motion
 _DRIVES_MPS = 0.1  # a slower velocity is a wait
+_NONE = np.zeros(0, dtype=bool)
 ENCLOSED = "what stands leaves no way out"
 _STRAIGHT = "the straight way is free"
 
@@ -74,7 +75,7 @@ class MapPlanning:
         self._reach_m = 0.0
         self._radii_m = np.empty(0)  # of the tracks
         self.pose_variance = (0.0, 0.0)  # of single poses, m^2 and rad^2, as far as learnt
-        self._may_move = np.empty(0, dtype=bool)  # of them, where the odometry hides it
+        self._may_move = _NONE  # of them, where the odometry hides it
         self._blocked, self._place = BlockedHeadings(), PlaceCheck()
 
     def update(self, stamp_ns: int, pose: Pose2D, tracker: Tracker) -> None:
@@ -88,7 +89,7 @@ class MapPlanning:
         (vm, vr), by_map = tracker.pose_variance, self.map.matching.variance
         self.pose_variance = min(vm, by_map[0]), min(vr, by_map[1])
         hidden = self.pose_variance[0] > _EXACT_M * _EXACT_M
-        self._may_move = tracker.may_move() & hidden
+        self._may_move = tracker.may_move() if hidden else _NONE
         if self._known_map is not None:
             self._known_map.update(tracker.beams, *self._in_map(pose.position))
 
