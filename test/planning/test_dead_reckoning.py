@@ -156,3 +156,16 @@ def test_what_may_move_is_kept_off_though_points_of_it_are_in_the_map(world: int
     result = evaluate(episode)
     assert result.collisions == 0
     assert result.min_clearance_m > 0.02
+
+
+@pytest.mark.parametrize(("error", "poses"), [((1e-12, 0.0, 0.0), 1.0), (NO_ERROR, 2.0)])
+def test_an_unknown_error_of_the_scan_s_pose_counts_as_a_second_pose(
+    error: tuple[float, float, float], poses: float
+) -> None:
+    still = Pose2D(0.0, 0.0, 0.0)
+    found = commanded([still, still]).pose(
+        (0, still), (TICK_NS, Pose2D(0.02, 0.0, 0.02)), error, NOISY
+    )
+    odometry, command = poses * NOISY[0], 0.005**2  # variances
+    expected = 0.02 * command / (odometry + command)
+    assert (found.x, found.yaw) == pytest.approx((expected, expected), abs=1e-9)
