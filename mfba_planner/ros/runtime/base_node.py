@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -24,6 +25,7 @@ from .connection_check import type_mismatch
 from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
 
 SPIN_S = 0.1  # longest time until a signal is noticed
+READERS_TIMEOUT_S = 1.0  # longest wait for what was published to arrive
 
 
 class GraphNode(Node):
@@ -194,6 +196,17 @@ class GraphNode(Node):
 
     def drain(self, executor: Executor) -> None:
         """Receive what was sent already; called once after a signal, before close."""
+
+    def wait_for_readers(self, timeout_s: float = READERS_TIMEOUT_S) -> bool:
+        """Whether all reliable readers have what this node published, after a wait if need be.
+
+        A writer that is destroyed takes along what a busy reader has not fetched yet.
+        """
+        deadline = time.monotonic() + timeout_s
+        return all(
+            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+            for _, publisher in self._advertised
+        )
 
     def spin_once(self, executor: Executor) -> None:
         """One iteration of the process's loop, SPIN_S long at most."""

@@ -69,6 +69,7 @@ def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
         if node.finished:
             wait_for_callers(node, executor, lambda: stop.is_set)
         node.drain(executor)
+        node.wait_for_readers()
         return 0
     finally:
         try:
