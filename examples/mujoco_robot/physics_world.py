@@ -96,8 +96,8 @@ class PhysicsWorld:
         self._names = [model.geom(number).name for number in range(model.ngeom)]
         self._wheels_at = [int(model.jnt_qposadr[joint(side)]) for side in ("left", "right")]
         self._wheel_speeds_at = [int(model.jnt_dofadr[joint(side)]) for side in ("left", "right")]
-        self._seen_groups = np.ones(6, dtype=np.uint8)
-        self._seen_groups[HIDDEN_GROUP] = 0
+        self._visible_groups = np.ones(6, dtype=np.uint8)
+        self._visible_groups[HIDDEN_GROUP] = 0
 
     @property
     def time_s(self) -> float:
@@ -234,18 +234,31 @@ class PhysicsWorld:
         ranges, _ = self.cast(origin, directions)
         return ranges
 
+    def render(
+        self, origin: np.ndarray, directions: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As cast(), for a camera outside the robot, which sees the robot too."""
+        return self.cast(origin, directions, normals, excluded=-1)
+
+    def show(self, frame: Frame) -> None:
+        """Put robot and people as they were at the moment of a frame; for films only."""
+        self.data.qpos[:] = frame.qpos
+        self.data.mocap_pos[:] = frame.people
+        mujoco.mj_forward(self.model, self.data)
+
     def cast(
-        self, origin: np.ndarray, directions: np.ndarray, normals: np.ndarray | None = None
+        self, origin: np.ndarray, directions: np.ndarray, normals: np.ndarray | None = None,
+        excluded: int | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Ranges (n,) of rays along unit vectors (n, 3), inf for a miss, and the geoms hit (n,).
 
         The robot's own body is not hit. normals (3 n,) is filled in if given.
         """
-        count = len(directions)
+        count, body = len(directions), self._base if excluded is None else excluded
         geoms, ranges = np.full(count, -1, dtype=np.int32), np.zeros(count)
         mujoco.mj_multiRay(
             self.model, self.data, origin, np.ascontiguousarray(directions).reshape(-1),
-            self._seen_groups, True, self._base, geoms, ranges, normals, count,
+            self._visible_groups, True, body, geoms, ranges, normals, count,
             mujoco.mjMAXVAL,
         )  # fmt: skip
         return np.where(ranges < 0.0, np.inf, ranges), geoms

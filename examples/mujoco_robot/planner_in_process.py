@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
+import numpy as np
 from contact_events import ContactEvent
 from crowded_room import Room
 from physics_world import ODOMETRY_NS, SCAN_NS, PhysicsWorld
@@ -33,6 +34,12 @@ REACTION_NS = 60_000_000  # from the stamp of a scan until its command moves the
 SCAN_AGE_NS = 40_000_000  # of a scan when it arrives, in the stamped timing
 SPEED_MPS = 0.8
 FILM_PERIOD_NS = 100_000_000
+ROBOT_STREAM = 21  # of the errors of the robot's sensors
+
+
+def robot_rng(world: int) -> np.random.Generator:
+    """The random generator of the robot's sensors in a world."""
+    return np.random.default_rng((ROBOT_STREAM, world))
 
 
 class Timing(Enum):

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Drives in many rooms: how often the robot arrives and what it touches, beside our simulator.
+
+Run: python examples/mujoco_robot/many_worlds.py [--worlds N] [--first K] [--only ROW] [--out FILE]
+A row is a robot: MuJoCo's in both timings, kidnapped in two forms, and that of
+mfba_planner.simulation among the same people. The planner runs in this process, on the inputs
+that its node would get; --graph N repeats every Nth world of the lockstep row with the real nodes
+and compares the decisions.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import sys
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from contact_events import ContactEvent, side_of
+from crowded_room import draw_room
+from physics_world import Lifted, PhysicsWorld
+from planner_in_process import Drive, Timing, drive, planner_params, robot_rng
+
+from mfba_planner.core.geometry import bearing, distance, wrap_angle
+from mfba_planner.core.planner_types import NANO
+from mfba_planner.evaluation.metrics import steps_driven, tick_clearances
+from mfba_planner.evaluation.statistics import rate
+from mfba_planner.perception.sensory_vector import SensorParams
+from mfba_planner.planning.planner_factory import make_planner
+from mfba_planner.simulation.decision_digest import digest
+from mfba_planner.simulation.episode import Episode, Outcome
+from mfba_planner.simulation.lidar_perception import OWN_ROBOT, LidarPerception
+from mfba_planner.simulation.run_episode import run
+
+Row = dict[str, Any]
+SIDES = ("driving", "standing", "behind")
+
+
+def by_geometry(episode: Episode) -> tuple[ContactEvent, ...]:
+    """Contacts by the circles of robot and obstacles, swept between ticks; each begin once."""
+    found, touching = [], set[int]()
+    people_and_pillars = len(episode.scenario.obstacles)
+    for gaps, (a, b) in zip(tick_clearances(episode), steps_driven(episode)):
+        now = {number for number, gap in enumerate(gaps) if gap < 0.0}
+        tick_s = max(1, b.stamp_ns - a.stamp_ns) * NANO
+        forwards = abs(wrap_angle(bearing(a.pose.position, b.pose.position) - a.pose.yaw)) < 1.57
+        speed = distance(a.pose.position, b.pose.position) / tick_s * (1.0 if forwards else -1.0)
+        turn = wrap_angle(b.pose.yaw - a.pose.yaw) / tick_s
+        time_s = episode.time_s(a.stamp_ns)
+        centers = episode.scenario.centers(time_s)
+        for number in sorted(now - touching):
+            is_wall = number == people_and_pillars
+            point = b.pose.position if is_wall else centers[number]
+            side = "driving" if is_wall else side_of(a.pose, speed, turn, point)
+            what = "wall" if is_wall else f"obstacle{number}"
+            found.append(
+                ContactEvent(time_s=time_s, touched=what, side=side, speed_mps=speed)
+            )
+        touching = now
+    return tuple(found)
+
+
+def physics(number: int, timing: Timing, lifted: Lifted | None) -> Row:
+    """The robot of the physics engine in a world."""
+    room = draw_room(number, kidnapped=lifted is not None)
+    world = PhysicsWorld(room, robot_rng(number), lifted=lifted or Lifted.JUMPS)
+    found: Drive = drive(world, seed=number, timing=timing)
+    row = _row(number, found.episode, found.contacts)
+    row |= {"arrived": found.arrived, "off_goal_m": found.off_goal_m}
+    return row | {
+        "odometry_off_m": found.odometry_off_m,
+        "by_geometry": len(by_geometry(found.episode)),
+    }
+
+
+def ours(number: int, latency_ticks: int) -> Row:
+    """The robot of our simulator in the same world; scans are that many ticks old."""
+    room = draw_room(number)
+    params, sensor = planner_params(room), SensorParams()
+    episode = run(
+        room.scenario,
+        planner=params,
+        sensor=sensor,
+        seed=number,
+        path_planner=make_planner(params, sensor, number),
+        observe=LidarPerception(OWN_ROBOT, latency_ticks),
+    )
+    return _row(number, episode, by_geometry(episode))
+
+
+def _row(number: int, episode: Episode, contacts: Iterable[ContactEvent]) -> Row:
+    last = (episode.truth or (episode.ticks[-1].pose,))[-1]
+    return {
+        "world": number,
+        "arrived": episode.outcome is Outcome.GOAL_REACHED,
+        "time_s": episode.time_s(episode.ticks[-1].stamp_ns),
+        "off_goal_m": distance(last.position, episode.scenario.goal_m),
+        "clearance_m": min(map(min, tick_clearances(episode))),
+        "contacts": [asdict(event) for event in contacts],
+        "digest": digest(episode.ticks),
+    }
+
+
+ROWS: dict[str, Callable[[int], Row]] = {
+    "MuJoCo, stamped": partial(physics, timing=Timing.STAMPED, lifted=None),
+    "MuJoCo, lockstep": partial(physics, timing=Timing.LOCKSTEP, lifted=None),
+    "ours, no latency": partial(ours, latency_ticks=0),
+    "ours, scans 0.1 s old": partial(ours, latency_ticks=1),
+    "kidnapped, noticed": partial(physics, timing=Timing.STAMPED, lifted=Lifted.JUMPS),
+    "kidnapped, unnoticed": partial(physics, timing=Timing.STAMPED, lifted=Lifted.UNNOTICED),
+}
+
+
+def compute(job: tuple[str, int]) -> tuple[str, Row]:
+    """One drive; a worker process calls it."""
+    name, number = job
+    return name, ROWS[name](number)
+
+
+def table(found: dict[str, list[Row]]) -> str:
+    """The rows as Markdown; intervals are Wilson's, 95 %."""
+    lines = [
+        "| robot | arrived | no contact | contacts: driving, standing, behind | of these people |"
+        " time, s | off the goal, m: median, most |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, rows in found.items():
+        events = [event for row in rows for event in row["contacts"]]
+        sides = ", ".join(str(sum(e["side"] == side for e in events)) for side in SIDES)
+        people = sum(e["touched"].startswith(("person", "obstacle")) for e in events)
+        clean = sum(not row["contacts"] for row in rows)
+        arrived = [row for row in rows if row["arrived"]]
+        times = statistics.median([row["time_s"] for row in arrived] or [0.0])
+        off = [row["off_goal_m"] for row in arrived] or [0.0]
+        lines.append(
+            f"| {name} | {_share(len(arrived), len(rows))} | {_share(clean, len(rows))} | {sides} "
+            f"| {people} | {times:.1f} | {statistics.median(off):.2f}, {max(off):.2f} |"
+        )
+    return "\n".join(lines)
+
+
+def _share(count: int, n: int) -> str:
+    found = rate(count, n)
+    return f"{count} of {n} [{100 * found.low:.1f}, {100 * found.high:.1f}] %"
+
+
+def main() -> int:
+    """Compute the rows and print the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--worlds", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0, help="number of the first world")
+    parser.add_argument("--only", action="append", choices=list(ROWS), help="a row of the table")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--out", type=Path, help="JSON lines, one per drive")
+    given = parser.parse_args()
+    names = given.only or list(ROWS)
+    jobs = [(n, k) for n in names for k in range(given.first, given.first + given.worlds)]
+    found: dict[str, list[Row]] = {name: [] for name in names}
+    context = get_context("spawn")
+    with ProcessPoolExecutor(given.workers, mp_context=context) as pool:
+        for name, row in pool.map(compute, jobs):
+            found[name].append(row)
+            if given.out:
+                with given.out.open("a", encoding="utf-8") as lines:
+                    lines.write(json.dumps({"row": name, **row}) + "\n")
+    print(table(found))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
