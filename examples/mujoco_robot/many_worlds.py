@@ -2,9 +2,9 @@
 """Drives in many rooms: how often the robot arrives and what it touches, beside our simulator.
 
 Run: python examples/mujoco_robot/many_worlds.py [--worlds N] [--first K] [--only ROW] [--out FILE]
-A row is a robot: MuJoCo's in both timings, kidnapped in two forms, and that of
+A row is a robot: MuJoCo's, also kidnapped in two forms, and that of
 mfba_planner.simulation among the same people. The planner runs in this process, on the inputs
-that its node would get; --graph N repeats every Nth world of the lockstep row with the real nodes
+that its node would get; --graph N repeats every Nth world of the first row with the real nodes
 and compares the decisions.
 """
 
@@ -26,7 +26,7 @@ from typing import Any
 from contact_events import ContactEvent, side_of
 from crowded_room import draw_room
 from physics_world import Lifted, PhysicsWorld
-from planner_in_process import Drive, Timing, drive, planner_params, robot_rng
+from planner_in_process import Drive, drive, planner_params, robot_rng
 
 from mfba_planner.core.geometry import bearing, distance, wrap_angle
 from mfba_planner.core.planner_types import NANO
@@ -67,11 +67,11 @@ def by_geometry(episode: Episode) -> tuple[ContactEvent, ...]:
     return tuple(found)
 
 
-def physics(number: int, timing: Timing, lifted: Lifted | None) -> Row:
+def physics(number: int, lifted: Lifted | None = None) -> Row:
     """The robot of the physics engine in a world."""
     room = draw_room(number, kidnapped=lifted is not None)
     world = PhysicsWorld(room, robot_rng(number), lifted=lifted or Lifted.JUMPS)
-    found: Drive = drive(world, seed=number, timing=timing)
+    found: Drive = drive(world, seed=number)
     row = _row(number, found.episode, found.contacts)
     row |= {"arrived": found.arrived, "off_goal_m": found.off_goal_m}
     return row | {
@@ -109,12 +109,11 @@ def _row(number: int, episode: Episode, contacts: Iterable[ContactEvent]) -> Row
 
 
 ROWS: dict[str, Callable[[int], Row]] = {
-    "MuJoCo, stamped": partial(physics, timing=Timing.STAMPED, lifted=None),
-    "MuJoCo, lockstep": partial(physics, timing=Timing.LOCKSTEP, lifted=None),
+    "MuJoCo": physics,
     "ours, no latency": partial(ours, latency_ticks=0),
     "ours, scans 0.1 s old": partial(ours, latency_ticks=1),
-    "kidnapped, noticed": partial(physics, timing=Timing.STAMPED, lifted=Lifted.JUMPS),
-    "kidnapped, unnoticed": partial(physics, timing=Timing.STAMPED, lifted=Lifted.UNNOTICED),
+    "kidnapped, noticed": partial(physics, lifted=Lifted.JUMPS),
+    "kidnapped, unnoticed": partial(physics, lifted=Lifted.UNNOTICED),
 }
 
 

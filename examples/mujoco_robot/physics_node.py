@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot as a ROS node: it publishes scan, odom and /tf and follows cmd_vel, nothing else.
 
-Its parameters, topics and stamps tell no node that it is simulated. In real time stamps are those
-of the clock. In lockstep time stands until the cmd_vel (TwistStamped) of a scan's stamp has come.
+In real time it follows the clock. Else time stands from a scan until the cmd_vel (TwistStamped) of
+its stamp has come: as fast as planner and machine are, and with the same decisions every time. As
+nodes keep the newest odometry only, it is then published just before each scan.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from mfba_planner.ros.interface.topics import CMD_VEL, ODOM, SCAN, TF
 from mfba_planner.ros.runtime.spin_node import StopFlag, make_executor
 
 ODOM_FRAME, BASE_FRAME, SCAN_FRAME = "odom", "base_link", "base_scan"
-REPEAT_S = 2.0  # lockstep: publish a tick again, if no command has come
+BEGIN_AFTER_S = 0.5  # not in real time: for the first odometry, which would else be replaced
 
 
 class PhysicsNode(Node):
@@ -53,7 +54,7 @@ class PhysicsNode(Node):
             "people": 10,
             "kidnapped": False,
             "lifted": Lifted.JUMPS.value,
-            "lockstep": False,
+            "real_time": False,
             "wait_for": "",
             "result": "",
             "film": "",
@@ -66,7 +67,7 @@ class PhysicsNode(Node):
             room, robot_rng(found["world"]), lifted=Lifted(found["lifted"])
         )
         self._result, self._film = found["result"], found["film"]
-        self._lockstep = found["lockstep"]
+        self._real_time = found["real_time"]
         self._wait_for = {name for name in found["wait_for"].split(",") if name}
         self._film_ns = FILM_PERIOD_NS if self._film else 0
         qos = QoSProfile(depth=50)
@@ -77,8 +78,9 @@ class PhysicsNode(Node):
             self.get_logger().info("tf2_msgs is not installed: no /tf")
         self.create_subscription(TwistStamped, CMD_VEL.name, self._on_cmd_vel, qos)
         self._scans: list[tuple[int, Scan]] = []  # measured, not yet published
-        self._started_ns = 0  # real time: the clock's time at the begin, else 1
-        self._published_at = 0.0
+        self._started_ns: int | None = None  # the stamp of time 0
+        self._begin_at = 0.0
+        self._awaited_ns = 0  # the stamp whose command moves time on; 0: none
         self.create_timer(0.005, self._on_timer)
 
     def _has_readers(self) -> bool:
@@ -92,41 +94,46 @@ class PhysicsNode(Node):
         return self.count_publishers(CMD_VEL.name) > 0 or not self._wait_for
 
     def _on_timer(self) -> None:
-        if not self._started_ns:
+        if self._started_ns is None:
             if not self._has_readers():
                 return
-            self._started_ns = 1 if self._lockstep else self.get_clock().now().nanoseconds
+            now_ns = self.get_clock().now().nanoseconds
+            self._started_ns = now_ns if self._real_time else stamp_at(0)
+            self._publish_odometry()
             self._measure()
-        if self._lockstep:
-            if time.monotonic() - self._published_at > REPEAT_S:
-                self._publish_tick()
-        else:
-            self._follow_the_clock()
+            self._begin_at = time.monotonic() + BEGIN_AFTER_S
+        elif self._begin_at and not self._real_time and time.monotonic() > self._begin_at:
+            self._begin_at = 0.0
+            self._until_next_scan_arrives()
+        if self._real_time:
+            self._advance(self.get_clock().now().nanoseconds - self._started_ns)
 
-    def _follow_the_clock(self) -> None:
+    def _advance(self, until_ns: int) -> None:
+        """Step to a time, or just before it, and publish what is measured and due on the way."""
         physics = self.physics
-        due_ns = self.get_clock().now().nanoseconds - self._started_ns
-        while physics.now_ns + ODOMETRY_NS <= due_ns:
+        while physics.now_ns + ODOMETRY_NS <= until_ns:
             physics.advance(physics.now_ns + ODOMETRY_NS, self._film_ns)
+            is_due = bool(self._scans) and self._scans[0][0] + SCAN_AGE_NS <= physics.now_ns
+            if self._real_time or is_due:
+                self._publish_odometry()
             self._measure()
-            self._publish_odometry(self._started_ns + physics.now_ns)
-        while self._scans and self._scans[0][0] + SCAN_AGE_NS <= due_ns:
-            at_ns, scan = self._scans.pop(0)
-            self._scan.publish(scan_msg(scan, self._started_ns + at_ns, SCAN_FRAME))
+            if is_due:
+                at_ns, scan = self._scans.pop(0)
+                self._awaited_ns = self._stamp(at_ns)
+                self._scan.publish(scan_msg(scan, self._awaited_ns, SCAN_FRAME))
+
+    def _until_next_scan_arrives(self) -> None:
+        self._advance(self._scans[0][0] + SCAN_AGE_NS)
+
+    def _stamp(self, at_ns: int) -> int:
+        return (self._started_ns or 0) + at_ns
 
     def _measure(self) -> None:
         if self.physics.now_ns % SCAN_NS == 0:
             self._scans.append((self.physics.now_ns, self.physics.scan()))
 
-    def _publish_tick(self) -> None:
-        """Lockstep: scan and odometry of the present moment, maybe once more."""
-        self._published_at = time.monotonic()
-        at_ns, scan = self._scans[-1]
-        self._scan.publish(scan_msg(scan, stamp_at(at_ns), SCAN_FRAME))
-        self._publish_odometry(stamp_at(at_ns))
-
-    def _publish_odometry(self, at_ns: int) -> None:
-        odometry = self.physics.odometry
+    def _publish_odometry(self) -> None:
+        odometry, at_ns = self.physics.odometry, self._stamp(self.physics.now_ns)
         velocity = towards((0.0, 0.0), odometry.pose.yaw, odometry.speed_mps)
         message = odometry_msg(
             odometry.pose, velocity, at_ns, ODOM_FRAME, BASE_FRAME, odometry.turn_radps
@@ -137,18 +144,16 @@ class PhysicsNode(Node):
 
     def _on_cmd_vel(self, message: TwistStamped) -> None:
         physics, twist = self.physics, message.twist
-        if not self._lockstep:
+        if self._real_time:
             physics.command(twist.linear.x, twist.angular.z)
             return
-        if not self._scans or stamp_ns(message.header.stamp) != stamp_at(physics.now_ns):
-            return  # of a tick that was answered before
-        tick_ns = physics.now_ns
-        physics.advance(tick_ns + REACTION_NS, self._film_ns)
+        if stamp_ns(message.header.stamp) != self._awaited_ns or not self._awaited_ns:
+            return  # another one on the same scan
+        tick_ns, self._awaited_ns = self._awaited_ns - self._stamp(0), 0
+        self._advance(tick_ns + REACTION_NS)
         physics.command(twist.linear.x, twist.angular.z)
-        physics.advance(tick_ns + SCAN_NS, self._film_ns)
-        self._scans.clear()
-        self._measure()
-        self._publish_tick()
+        self._advance(tick_ns + SCAN_NS)
+        self._until_next_scan_arrives()
 
     def close(self) -> None:
         """Write what the engine has counted, and the frames of the film."""

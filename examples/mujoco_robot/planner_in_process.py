@@ -1,22 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """One drive with the planner in this process, on the inputs that its node would get.
 
-Two timings. Lockstep: odometry and scan have one stamp, and time stands while the planner decides;
-the command still takes effect REACTION_NS later. A graph in lockstep takes the same decisions, bit
-for bit. Stamped: as on a robot, the scan arrives SCAN_AGE_NS after its stamp, beside odometry that
-is newer, and the planner's node joins them by their stamps (NewestInputs).
+A scan arrives SCAN_AGE_NS after its stamp, beside odometry that is newer, and the command on it
+moves the wheels REACTION_NS after that stamp. The planner's node joins scan and odometry by their
+stamps (NewestInputs); here the same code does. The decisions equal those of the graph that
+run.py starts, where it does not follow the clock.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 from contact_events import ContactEvent
 from crowded_room import Room
-from physics_world import ODOMETRY_NS, SCAN_NS, PhysicsWorld
+from physics_world import SCAN_NS, PhysicsWorld
 
 from mfba_planner.core.geometry import Pose2D, distance, pose_as_in_message
 from mfba_planner.core.planner_types import NANO, Decision, Mode, Observation, Scan, observe
@@ -40,13 +39,6 @@ ROBOT_STREAM = 21  # of the errors of the robot's sensors
 def robot_rng(world: int) -> np.random.Generator:
     """The random generator of the robot's sensors in a world."""
     return np.random.default_rng((ROBOT_STREAM, world))
-
-
-class Timing(Enum):
-    """How the planner's inputs are timed."""
-
-    LOCKSTEP = "lockstep"
-    STAMPED = "stamped"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +77,6 @@ def drive(
     world: PhysicsWorld,
     *,
     seed: int,
-    timing: Timing = Timing.STAMPED,
     film: bool = False,
     go_on: Callable[[Decision], bool] = lambda _: True,
 ) -> Drive:
@@ -93,7 +84,7 @@ def drive(
     params, sensor = planner_params(world.room), SensorParams()
     planner = make_planner(params, sensor, seed)
     film_ns = FILM_PERIOD_NS if film else 0
-    inputs = (_LockstepInputs if timing is Timing.LOCKSTEP else _StampedInputs)(world, film_ns)
+    inputs = _Inputs(world, film_ns)
     ticks: list[Decision] = []
     truth: list[Pose2D] = []
     limit_ns = round(world.scenario.time_limit_s / NANO)
@@ -131,26 +122,7 @@ def stamp_at(now_ns: int) -> int:
     return now_ns + SCAN_NS
 
 
-class _LockstepInputs:
-    """Odometry and scan of the same moment, as virtual_sensor and planner pair them."""
-
-    def __init__(self, world: PhysicsWorld, film_ns: int) -> None:
-        self._world, self._film_ns = world, film_ns
-
-    def observe(self, sensor: SensorParams) -> Observation:
-        """The observation at the present tick."""
-        world = self._world
-        scan, pose = world.scan(), pose_as_in_message(world.odometry.pose)
-        ranges = sense_scan(scan, pose.yaw, world.scenario.robot_radius_m, sensor)
-        stamp = stamp_at(world.now_ns)
-        return _with_scan(Inputs(stamp, pose, ranges, scan=scan), world, pose)
-
-    def advance(self, until_ns: int) -> None:
-        """Let the world go on."""
-        self._world.advance(until_ns, self._film_ns)
-
-
-class _StampedInputs:
+class _Inputs:
     """The scan SCAN_AGE_NS after its stamp, with the odometry that has arrived by then."""
 
     def __init__(self, world: PhysicsWorld, film_ns: int) -> None:
@@ -164,6 +136,7 @@ class _StampedInputs:
         world = self._world
         scan, stamp = world.scan(), stamp_at(world.now_ns)
         self.advance(world.now_ns + SCAN_AGE_NS)
+        self._add_odometry()
         # virtual_sensor turns the scan by the newest heading.
         ranges = sense_scan(scan, self._last.yaw, world.scenario.robot_radius_m, sensor)
         inputs = self._newest.add_sectors(stamp, ranges, world.time_s, scan)
@@ -171,10 +144,8 @@ class _StampedInputs:
         return _with_scan(inputs, world, self._last)
 
     def advance(self, until_ns: int) -> None:
-        """Let the world go on, and take its odometry."""
-        while self._world.now_ns < until_ns:
-            self._world.advance(self._world.now_ns + ODOMETRY_NS, self._film_ns)
-            self._add_odometry()
+        """Let the world go on."""
+        self._world.advance(until_ns, self._film_ns)
 
     def _add_odometry(self) -> None:
         self._last = pose_as_in_message(self._world.odometry.pose)

@@ -7,6 +7,7 @@ People and all that stands do not touch each other.
 
 from __future__ import annotations
 
+import colorsys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ TIMESTEP_S = 0.004
 BODY_Z_M, BODY_HALF_M = 0.15, 0.1  # middle and half of the height of the robot's body
 LIDAR_Z_M = 0.32
 PERSON_HALF_M, WALL_HALF_M = 0.85, 0.6
+PADDING = "-150 -20"  # of people: 1/s^2 and 1/s, the acceleration per depth and per speed
 HIDDEN_GROUP = 3  # geoms that lidar and camera do not see
 _FLOOR, _BODY = "1", "2"  # bits of contype and conaffinity
 
@@ -104,15 +106,20 @@ def _add_walls(world: ElementTree.Element, room: Room) -> None:
 
 
 def _add_person(world: ElementTree.Element, number: int) -> None:
-    """A cylinder that a mocap body carries, and a head for the film."""
+    """A cylinder that a mocap body carries, and a head for the film.
+
+    It goes on below the floor, so that no contact pushes the robot downwards. It is padded: who
+    pushes the robot against a wall does not crush it, as the engine's stiff contact would.
+    """
     person = ElementTree.SubElement(
         world, "body", name=f"person{number}", mocap="true", pos=f"0 0 {PERSON_HALF_M}"
     )
-    hue = number / 10.0
-    rgba = f"{0.35 + 0.5 * hue:.2f} {0.35 + 0.3 * (1 - hue):.2f} {0.85 - 0.5 * hue:.2f} 1"
+    red, green, blue = colorsys.hsv_to_rgb(number * 0.618 % 1.0, 0.55, 0.85)
+    rgba = f"{red:.3f} {green:.3f} {blue:.3f} 1"
     _geom(
-        person, f"person{number}", "cylinder", f"{BODY_RADIUS_M} {PERSON_HALF_M - 0.12}",
-        pos="0 0 -0.12", rgba=rgba, contype=_BODY, conaffinity=_BODY,
+        person, f"person{number}", "cylinder", f"{BODY_RADIUS_M} {2 * PERSON_HALF_M - 0.2}",
+        pos=f"0 0 {-PERSON_HALF_M}", rgba=rgba, contype=_BODY, conaffinity=_BODY,
+        priority="1", friction="0.3", solref=PADDING,
     )  # fmt: skip
     _geom(
         person, f"head{number}", "sphere", "0.13", pos="0 0 0.75", rgba="0.9 0.75 0.65 1",
