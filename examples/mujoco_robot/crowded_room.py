@@ -200,7 +200,9 @@ def _with_kidnapping(
         x, y = rng.uniform(0.8, SIDE_M - 0.8, size=2).round(_DIGITS).tolist()
         people_off = min((math.dist((x, y), center) for center in centers), default=math.inf)
         far = distance((x, y), scenario.start_m) > 3.0 and distance((x, y), scenario.goal_m) > 3.0
-        if far and people_off > _KEPT_FREE_M and (
-            clearance_m((x, y), boxes, pillars) >= ROBOT_RADIUS_M + 0.2
+        if (
+            far
+            and people_off > _KEPT_FREE_M
+            and (clearance_m((x, y), boxes, pillars) >= ROBOT_RADIUS_M + 0.2)
         ):
             return replace(scenario, kidnappings=(Kidnapping(at_s=at_s, to_m=(x, y)),))

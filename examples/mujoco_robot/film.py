@@ -55,7 +55,6 @@ class Camera:
         rays = np.stack([np.ones_like(across), -across, up], axis=-1).reshape(-1, 3)
         rays /= np.linalg.norm(rays, axis=1)[:, None]
         c, s = math.cos(_DOWN_RAD), math.sin(_DOWN_RAD)
-        self._rays = rays @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]).T
         self._rays = rays @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
         self._yaw: float | None = None
         model = world.model
@@ -72,15 +71,15 @@ class Camera:
         behind = _BEHIND_M
         origin = np.array([pose.x - behind * c, pose.y - behind * s, _ABOVE_M])
         origin[:2] = np.clip(origin[:2], 0.15, SIDE_M - 0.15)
-        normals = np.zeros(3 * len(rays))
-        ranges, geoms = self._world.render(origin, rays, normals)
+        flat = np.zeros(3 * len(rays))
+        ranges, geoms = self._world.render(origin, rays, flat)
         hit = geoms >= 0
         colours = self._colours[geoms]
         points = origin + np.where(hit, ranges, 0.0)[:, None] * rays
         floor = geoms == self._floor
         tiles = (np.floor(points[:, 0]) + np.floor(points[:, 1])) % 2 < 0.5
         colours = np.where((floor & tiles)[:, None], 0.88 * colours, colours)
-        normals = normals.reshape(-1, 3)
+        normals = flat.reshape(-1, 3)
         facing = np.where((normals * rays).sum(axis=1) > 0.0, -1.0, 1.0)
         light = 0.55 + 0.45 * np.maximum((normals @ _LIGHT) * facing, 0.0)
         haze = np.where(hit, np.exp(-0.02 * np.where(hit, ranges, 0.0)), 1.0)[:, None]
@@ -144,7 +143,8 @@ class TopView:
         self._ring(draw, pose.position, ROBOT_RADIUS_M, (120, 130, 150))
         ahead = (pose.x + 0.25 * math.cos(pose.yaw), pose.y + 0.25 * math.sin(pose.yaw))
         draw.line([self._px(pose.position), self._px(ahead)], fill=(255, 150, 40), width=3)
-        draw.text((8, 6), f"{time_s:5.1f} s   contacts: {contacts}", fill=(0, 0, 0))
+        text = f"{time_s:.1f} s, contacts: {contacts}"
+        draw.text((14, 10), text, fill=(0, 0, 0), font_size=22)
         return np.asarray(image.resize((HEIGHT_PX, HEIGHT_PX), Image.Resampling.LANCZOS))
 
 
@@ -162,6 +162,4 @@ def write_film(
         )
     first, *others = images
     options = {"lossless": False, "quality": 75} if path.suffix == ".webp" else {"optimize": False}
-    first.save(
-        path, save_all=True, append_images=others, duration=FRAME_MS, loop=0, **options
-    )
+    first.save(path, save_all=True, append_images=others, duration=FRAME_MS, loop=0, **options)

@@ -60,9 +60,7 @@ def by_geometry(episode: Episode) -> tuple[ContactEvent, ...]:
             point = b.pose.position if is_wall else centers[number]
             side = "driving" if is_wall else side_of(a.pose, speed, turn, point)
             what = "wall" if is_wall else f"obstacle{number}"
-            found.append(
-                ContactEvent(time_s=time_s, touched=what, side=side, speed_mps=speed)
-            )
+            found.append(ContactEvent(time_s=time_s, touched=what, side=side, speed_mps=speed))
         touching = now
     return tuple(found)
 

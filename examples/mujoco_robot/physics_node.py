@@ -60,9 +60,7 @@ class PhysicsNode(Node):
             "film": "",
         }
         found = {name: self.declare_parameter(name, value).value for name, value in values.items()}
-        room = draw_room(
-            found["world"], people=found["people"], kidnapped=found["kidnapped"]
-        )
+        room = draw_room(found["world"], people=found["people"], kidnapped=found["kidnapped"])
         self.physics = PhysicsWorld(
             room, robot_rng(found["world"]), lifted=Lifted(found["lifted"])
         )

@@ -79,7 +79,11 @@ class PhysicsWorld:
         self._find_names()
         start = Pose2D(*self.scenario.start_m)
         self.odometry = WheelOdometry(
-            start, self.body.wheel_radius_m, self.body.wheel_apart_m, errors or OdometryErrors(), rng
+            start,
+            self.body.wheel_radius_m,
+            self.body.wheel_apart_m,
+            errors or OdometryErrors(),
+            rng,
         )
         self._kidnappings = list(self.scenario.kidnappings)
         self._move_people()
@@ -209,9 +213,7 @@ class PhysicsWorld:
             self.odometry.put(Pose2D(*to_m, believed.yaw))
 
     def _keep_frame(self) -> None:
-        self.frames.append(
-            Frame(self.time_s, self.data.qpos.copy(), self.data.mocap_pos.copy())
-        )
+        self.frames.append(Frame(self.time_s, self.data.qpos.copy(), self.data.mocap_pos.copy()))
 
     def scan(self) -> Scan:
         """The lidar's scan now, in the lidar's frame, with noise; rounded as in a LaserScan."""
@@ -247,7 +249,10 @@ class PhysicsWorld:
         mujoco.mj_forward(self.model, self.data)
 
     def cast(
-        self, origin: np.ndarray, directions: np.ndarray, normals: np.ndarray | None = None,
+        self,
+        origin: np.ndarray,
+        directions: np.ndarray,
+        normals: np.ndarray | None = None,
         excluded: int | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Ranges (n,) of rays along unit vectors (n, 3), inf for a miss, and the geoms hit (n,).

@@ -81,7 +81,8 @@ def model_xml(room: Room, body: RobotBody) -> str:
 def _geom(
     parent: ElementTree.Element, name: str, kind: str, size: str, **more: str
 ) -> ElementTree.Element:
-    return ElementTree.SubElement(parent, "geom", name=name, type=kind, size=size, **more)
+    attributes = {"name": name, "type": kind, "size": size} | more
+    return ElementTree.SubElement(parent, "geom", attributes)
 
 
 def _add_walls(world: ElementTree.Element, room: Room) -> None:

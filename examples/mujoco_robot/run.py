@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import yaml
-from crowded_room import PEOPLE, Room, draw_room
+from crowded_room import PEOPLE, TIME_LIMIT_S, Room, draw_room
 from film import load_frames, write_film
 from physics_world import Lifted, PhysicsWorld
 from planner_in_process import planner_params, robot_rng
@@ -36,7 +36,7 @@ from mfba_planner.core.planner_types import NANO, Mode
 from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.launcher.forked_process import ForkServer
 from mfba_planner.launcher.graph_monitor import ServiceCall
-from mfba_planner.launcher.node_processes import NodeProcesses
+from mfba_planner.launcher.node_processes import NodeProcesses, parameters_yaml
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.recording.from_messages import decision_field, stamp_ns
 from mfba_planner.ros.interface.to_messages import pose_stamped_msg
@@ -62,6 +62,7 @@ class RunOptions:
     kidnapped: bool = False
     lifted: Lifted = Lifted.JUMPS
     real_time: bool = False
+    time_limit_s: float = TIME_LIMIT_S
     film: bool = False
 
 
@@ -88,7 +89,9 @@ class Operator(GraphNode):
         goal = self.create_publisher(GOAL_POSE.type, GOAL_POSE.name, GOAL_POSE.qos)
         goal.publish(pose_stamped_msg(room.scenario.goal_m, 0, "odom"))
         self.ready = {
-            name: ServiceCall(self.create_client(Trigger, f"{name}/ready"), Trigger.Request(), 0.05)
+            name: ServiceCall(
+                self.create_client(Trigger, f"{name}/ready"), Trigger.Request(), 0.05
+            )
             for name in NODES
         }
         self.create_subscription(DECISION.type, DECISION.name, self._on_decision, DECISION.qos)
@@ -133,7 +136,7 @@ def opened_operator(room: Room, domain: int) -> Iterator[tuple[Operator, Callabl
 @contextmanager
 def physics_process(
     options: RunOptions, directory: Path, log: IO[str]
-) -> Iterator["subprocess.Popen[str]"]:
+) -> Iterator[subprocess.Popen[str]]:
     """The robot's process; it ends with the block and writes its results then."""
     parameters: dict[str, Any] = {
         "world": options.world,
@@ -145,11 +148,13 @@ def physics_process(
         "result": str(directory / "robot.json"),
         "film": str(directory / "frames.npz") if options.film else "",
     }
-    arguments = ["--ros-args"]
-    for name, value in parameters.items():
-        arguments += ["-p", f"{name}:={json.dumps(value)}"]
+    values = directory / "robot_parameters.yaml"
+    values.write_text(parameters_yaml(parameters), encoding="utf-8")
     process = subprocess.Popen(
-        [sys.executable, str(ROBOT), *arguments], stdout=log, stderr=log, text=True
+        [sys.executable, str(ROBOT), "--ros-args", "--params-file", str(values)],
+        stdout=log,
+        stderr=log,
+        text=True,
     )
     try:
         yield process
@@ -160,6 +165,7 @@ def physics_process(
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+        values.unlink()
 
 
 def node_parameters(room: Room, options: RunOptions, bag: Path) -> dict[str, dict[str, Any]]:
@@ -193,15 +199,16 @@ def run_graph(options: RunOptions, directory: Path) -> RunResult:
         def print_node_line(name: str, line: str) -> None:
             log.write(f"[{name}] {line}\n")
 
-        with ForkServer() as server, private_domain() as domain:
-            with (
-                opened_operator(room, domain) as (operator, spin),
-                NodeProcesses(server, print_node_line, lambda: False) as nodes,
-            ):
-                nodes.start(node_parameters(room, options, directory / "bag"), {})
-                _wait(operator.all_ready, spin, nodes, READY_TIMEOUT_S, operator)
-                with physics_process(options, directory, log) as robot:
-                    _drive(operator, spin, nodes, robot, room.scenario.time_limit_s)
+        with (
+            ForkServer() as server,
+            private_domain() as domain,
+            opened_operator(room, domain) as (operator, spin),
+            NodeProcesses(server, print_node_line, lambda: False) as nodes,
+        ):
+            nodes.start(node_parameters(room, options, directory / "bag"), {})
+            _wait(operator.all_ready, spin, nodes, READY_TIMEOUT_S, operator)
+            with physics_process(options, directory, log) as robot:
+                _drive(operator, spin, nodes, robot, options.time_limit_s)
     result = _result(directory, operator.mode == Mode.ARRIVED.value)
     if options.film:
         _film(room, directory, result)
@@ -228,7 +235,7 @@ def _drive(
     operator: Operator,
     spin: Callable[[], None],
     nodes: NodeProcesses,
-    robot: "subprocess.Popen[str]",
+    robot: subprocess.Popen[str],
     limit_s: float,
 ) -> None:
     operator.received_at = time.monotonic()
@@ -279,13 +286,21 @@ def main() -> int:
         help="lift the robot and put it elsewhere: its odometry jumps too, or does not notice",
     )
     parser.add_argument(
-        "--real-time", action="store_true", help="by the clock, as a robot; else as fast as possible"
+        "--real-time",
+        action="store_true",
+        help="by the clock, as a robot; else as fast as possible",
+    )
+    parser.add_argument(
+        "--time-limit", type=float, default=TIME_LIMIT_S, metavar="S", help="end after this time"
     )
     parser.add_argument("--film", action="store_true", help="render DIR/film.webp")
     parser.add_argument("--out", type=Path, default=Path("runs/physics"), metavar="DIR")
     given = parser.parse_args()
-    if given.world < 0 or given.people < 0:
-        raise ConfigError("--world and --people: give numbers from 0 up")
+    if given.world < 0 or given.people < 0 or not given.time_limit > 0.0:
+        raise ConfigError(
+            f"--world {given.world} --people {given.people} --time-limit {given.time_limit:g}: "
+            "give numbers from 0 up, and a time above 0"
+        )
     refuse_existing(given.out)
     options = RunOptions(
         world=given.world,
@@ -293,12 +308,15 @@ def main() -> int:
         kidnapped=given.kidnapped is not None,
         lifted=Lifted(given.kidnapped or Lifted.JUMPS.value),
         real_time=given.real_time,
+        time_limit_s=given.time_limit,
         film=given.film,
     )
     result = run_graph(options, given.out)
     robot, contacts = result.robot, result.robot["contacts"]
     print(f"{'arrived' if result.arrived else 'did not arrive'} after {robot['time_s']:.1f} s")
-    print(f"goal missed by {robot['off_goal_m']:.2f} m; odometry off {robot['odometry_off_m']:.2f} m")
+    print(
+        f"goal missed by {robot['off_goal_m']:.2f} m; odometry off {robot['odometry_off_m']:.2f} m"
+    )
     print(f"contacts: {len(contacts)}")
     for event in contacts:
         print(f"  {event['time_s']:.1f} s: {event['touched']}, {event['side']}")

@@ -21,7 +21,7 @@ class OdometryErrors:
 
     wheel_radius_share: float = 0.003  # of each wheel
     wheel_apart_share: float = 0.01
-    gyro_bias_radps: float = 0.0005 # what is left after its calibration at rest
+    gyro_bias_radps: float = 0.0005  # what is left after its calibration at rest
     gyro_noise_radps: float = 0.005  # of one reading
     encoder_ticks: int = 2048  # per turn of a wheel
     gyro_weight: float = 0.95  # of the turn by the gyro, beside that by the wheels
