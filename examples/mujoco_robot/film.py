@@ -143,9 +143,10 @@ class TopView:
         self._ring(draw, pose.position, ROBOT_RADIUS_M, (120, 130, 150))
         ahead = (pose.x + 0.25 * math.cos(pose.yaw), pose.y + 0.25 * math.sin(pose.yaw))
         draw.line([self._px(pose.position), self._px(ahead)], fill=(255, 150, 40), width=3)
+        small = image.resize((HEIGHT_PX, HEIGHT_PX), Image.Resampling.LANCZOS)
         text = f"{time_s:.1f} s, contacts: {contacts}"
-        draw.text((14, 10), text, fill=(0, 0, 0), font_size=22)
-        return np.asarray(image.resize((HEIGHT_PX, HEIGHT_PX), Image.Resampling.LANCZOS))
+        ImageDraw.Draw(small).text((8, 6), text, fill=(0, 0, 0))
+        return np.asarray(small)
 
 
 def write_film(
