@@ -31,6 +31,7 @@ SPEEDS_MPS = (0.5, 1.5)
 TIME_LIMIT_S = 90.0
 WALL_M = 0.1  # thickness
 APART_M = 1.3  # between all that stands
+SPEED_MPS = 1.2  # of the robot
 LIDAR = Lidar(beams=360, range_max_m=8.0)
 RANGE_SD_M = 0.01
 _PILLARS, _WALLS = 4, 3
@@ -89,6 +90,7 @@ def draw_room(number: int, *, people: int = PEOPLE, kidnapped: bool = False) -> 
         time_limit_s=TIME_LIMIT_S,
         robot=Robot(
             drive=Drive.DIFFERENTIAL,
+            max_speed_mps=SPEED_MPS,
             lidar=LIDAR,
             noise=Noise(scan_m=RANGE_SD_M),
             footprint_m=(FootprintCircle(0.0, 0.0, BODY_RADIUS_M),),

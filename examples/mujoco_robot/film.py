@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from crowded_room import BODY_RADIUS_M, ROBOT_RADIUS_M, SIDE_M
+from engine import mujoco
 from physics_world import Frame, PhysicsWorld
 from PIL import Image, ImageDraw
 

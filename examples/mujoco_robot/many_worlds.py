@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives in many rooms: how often the robot arrives and what it touches, beside our simulator.
 
-Run: python examples/mujoco_robot/many_worlds.py [--worlds N] [--first K] [--only ROW] [--out FILE]
+Run: python examples/mujoco_robot/many_worlds.py [--worlds N] [--first K] [--only ROW] [--graph N]
 A row is a robot: MuJoCo's, also kidnapped in two forms, and that of
 mfba_planner.simulation among the same people. The planner runs in this process, on the inputs
 that its node would get; --graph N repeats every Nth world of the first row with the real nodes
@@ -15,9 +15,10 @@ import json
 import os
 import statistics
 import sys
+import tempfile
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -26,14 +27,19 @@ from typing import Any
 from contact_events import ContactEvent, side_of
 from crowded_room import draw_room
 from physics_world import Lifted, PhysicsWorld
-from planner_in_process import Drive, drive, planner_params, robot_rng
+from planner_in_process import DriveResult, drive, planner_params, robot_rng
 
+from mfba_planner.core.child_process import end_with_parent
+from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import bearing, distance, wrap_angle
 from mfba_planner.core.planner_types import NANO
+from mfba_planner.core.robot_base import Drive
+from mfba_planner.entry_points import run_and_return_exit_code
 from mfba_planner.evaluation.metrics import steps_driven, tick_clearances
 from mfba_planner.evaluation.statistics import rate
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_factory import make_planner
+from mfba_planner.recording.read_episode import read_episode
 from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode, Outcome
 from mfba_planner.simulation.lidar_perception import OWN_ROBOT, LidarPerception
@@ -69,7 +75,7 @@ def physics(number: int, lifted: Lifted | None = None) -> Row:
     """The robot of the physics engine in a world."""
     room = draw_room(number, kidnapped=lifted is not None)
     world = PhysicsWorld(room, robot_rng(number), lifted=lifted or Lifted.JUMPS)
-    found: Drive = drive(world, seed=number)
+    found: DriveResult = drive(world, seed=number)
     row = _row(number, found.episode, found.contacts)
     row |= {"arrived": found.arrived, "off_goal_m": found.off_goal_m}
     return row | {
@@ -78,9 +84,11 @@ def physics(number: int, lifted: Lifted | None = None) -> Row:
     }
 
 
-def ours(number: int, latency_ticks: int) -> Row:
+def ours(number: int, latency_ticks: int, drive_type: Drive = Drive.DIFFERENTIAL) -> Row:
     """The robot of our simulator in the same world; scans are that many ticks old."""
     room = draw_room(number)
+    robot = replace(room.scenario.robot, drive=drive_type)
+    room = room._replace(scenario=replace(room.scenario, robot=robot))
     params, sensor = planner_params(room), SensorParams()
     episode = run(
         room.scenario,
@@ -102,14 +110,17 @@ def _row(number: int, episode: Episode, contacts: Iterable[ContactEvent]) -> Row
         "off_goal_m": distance(last.position, episode.scenario.goal_m),
         "clearance_m": min(map(min, tick_clearances(episode))),
         "contacts": [asdict(event) for event in contacts],
+        "ticks": len(episode.ticks),
         "digest": digest(episode.ticks),
     }
 
 
+FIRST = "MuJoCo"
 ROWS: dict[str, Callable[[int], Row]] = {
-    "MuJoCo": physics,
+    FIRST: physics,
     "ours, no latency": partial(ours, latency_ticks=0),
     "ours, scans 0.1 s old": partial(ours, latency_ticks=1),
+    "ours, omnidirectional": partial(ours, latency_ticks=0, drive_type=Drive.OMNIDIRECTIONAL),
     "kidnapped, noticed": partial(physics, lifted=Lifted.JUMPS),
     "kidnapped, unnoticed": partial(physics, lifted=Lifted.UNNOTICED),
 }
@@ -148,6 +159,17 @@ def _share(count: int, n: int) -> str:
     return f"{count} of {n} [{100 * found.low:.1f}, {100 * found.high:.1f}] %"
 
 
+def by_graph(row: Row) -> bool:
+    """Whether the real nodes decide in this world as the planner in this process did."""
+    from run import RunOptions, run_graph
+
+    with tempfile.TemporaryDirectory() as directory:
+        run_graph(RunOptions(world=row["world"]), Path(directory) / "run")
+        ticks = read_episode(Path(directory) / "run/bag").ticks
+    # The nodes may decide once more while they are being stopped.
+    return digest(ticks[: row["ticks"]]) == row["digest"]
+
+
 def main() -> int:
     """Compute the rows and print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
@@ -155,21 +177,35 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="number of the first world")
     parser.add_argument("--only", action="append", choices=list(ROWS), help="a row of the table")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument(
+        "--graph", type=int, default=0, metavar="N", help="every Nth world through the graph too"
+    )
     parser.add_argument("--out", type=Path, help="JSON lines, one per drive")
     given = parser.parse_args()
+    if given.worlds < 1 or given.first < 0 or given.workers < 1 or given.graph < 0:
+        raise ConfigError(
+            f"--worlds {given.worlds} --first {given.first} --workers {given.workers} --graph "
+            f"{given.graph}: give at least one world and one worker, and else numbers from 0 up"
+        )
     names = given.only or list(ROWS)
     jobs = [(n, k) for n in names for k in range(given.first, given.first + given.worlds)]
     found: dict[str, list[Row]] = {name: [] for name in names}
     context = get_context("spawn")
-    with ProcessPoolExecutor(given.workers, mp_context=context) as pool:
+    with ProcessPoolExecutor(
+        given.workers, context, initializer=end_with_parent, initargs=(os.getpid(),)
+    ) as pool:
         for name, row in pool.map(compute, jobs):
             found[name].append(row)
             if given.out:
                 with given.out.open("a", encoding="utf-8") as lines:
                     lines.write(json.dumps({"row": name, **row}) + "\n")
     print(table(found))
+    if given.graph:
+        again = found[FIRST][:: given.graph] if FIRST in found else []
+        equal = sum(map(by_graph, again))
+        print(f"graph: {equal} of {len(again)} digests equal")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_and_return_exit_code(main, "many_worlds.py"))

@@ -10,10 +10,10 @@ import math
 from enum import Enum
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 from contact_events import ContactEvents
 from crowded_room import LIDAR, RANGE_SD_M, Room
+from engine import mujoco
 from robot_model_xml import (
     HIDDEN_GROUP,
     LIDAR_Z_M,

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from contact_events import ContactEvent
-from crowded_room import Room
+from crowded_room import SPEED_MPS, Room
 from physics_world import SCAN_NS, PhysicsWorld
 
 from mfba_planner.core.geometry import Pose2D, distance, pose_as_in_message
@@ -31,7 +31,6 @@ from mfba_planner.simulation.episode import Episode, Outcome
 
 REACTION_NS = 60_000_000  # from the stamp of a scan until its command moves the wheels
 SCAN_AGE_NS = 40_000_000  # of a scan when it arrives, in the stamped timing
-SPEED_MPS = 0.8
 FILM_PERIOD_NS = 100_000_000
 ROBOT_STREAM = 21  # of the errors of the robot's sensors
 
@@ -42,7 +41,7 @@ def robot_rng(world: int) -> np.random.Generator:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
+class DriveResult:
     """What came of one drive; lengths in metres."""
 
     episode: Episode
@@ -66,6 +65,7 @@ def planner_params(room: Room) -> PlannerParams:
     params = PlannerParams(goal_tolerance_m=0.1, speed_mps=SPEED_MPS)
     params = replace(
         preset(replace(params, recovery=replace(params.recovery, enabled=True))),
+        step_length_m=SPEED_MPS * SCAN_NS * NANO,
         method=Method.PREDICTIVE,
         perception=PerceptionInput.SCAN,
     )
@@ -79,7 +79,7 @@ def drive(
     seed: int,
     film: bool = False,
     go_on: Callable[[Decision], bool] = lambda _: True,
-) -> Drive:
+) -> DriveResult:
     """Drive until the planner has arrived, the time limit, or go_on() says no."""
     params, sensor = planner_params(world.room), SensorParams()
     planner = make_planner(params, sensor, seed)
@@ -109,7 +109,7 @@ def drive(
         outcome=Outcome.GOAL_REACHED if arrived else Outcome.TIME_LIMIT,
         truth=tuple(truth),
     )
-    return Drive(
+    return DriveResult(
         episode=episode,
         contacts=tuple(world.contacts),
         off_goal_m=distance(world.pose.position, world.scenario.goal_m),

@@ -37,7 +37,7 @@ class RobotBody:
     wheel_friction: float = 0.8
     servo_nms: float = 2.0
     max_torque_nm: float = 1.8
-    max_wheel_radps: float = 14.0
+    max_wheel_radps: float = 18.0
     max_accel_mps2: float = 2.5
     max_turn_accel_radps2: float = 3.2
 

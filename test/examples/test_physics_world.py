@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from crowded_room import BODY_RADIUS_M, LIDAR, RANGE_SD_M, Room, clearance_m, draw_room
 from physics_world import SCAN_NS, Lifted, PhysicsWorld
-from planner_in_process import Drive, drive, robot_rng
+from planner_in_process import DriveResult, drive, robot_rng
 from robot_model_xml import RobotBody
 from wheel_odometry import OdometryErrors
 
@@ -125,7 +125,9 @@ def test_the_lidar_measures_what_geometry_says() -> None:
         world.put(Pose2D(*pose))
         circles = [
             (*center, obstacle.radius_m)
-            for center, obstacle in zip(room.scenario.centers(world.time_s), room.scenario.obstacles)
+            for center, obstacle in zip(
+                room.scenario.centers(world.time_s), room.scenario.obstacles
+            )
         ]
         expected = scan_at(
             world.pose, replace(LIDAR, range_max_m=50.0), circles, None, room.scenario.segments
@@ -184,10 +186,12 @@ def test_one_who_pushes_the_robot_against_a_wall_does_not_crush_it() -> None:
     assert sum(event.is_person for event in world.contacts) == 1
 
 
-def with_kidnapping(lifted: Lifted, to_m: Point) -> Drive:
+def with_kidnapping(lifted: Lifted, to_m: Point) -> DriveResult:
     room = draw_room(1, people=0)
     scenario = replace(room.scenario, kidnappings=(Kidnapping(at_s=2.0, to_m=to_m),))
-    return drive(PhysicsWorld(room._replace(scenario=scenario), robot_rng(1), lifted=lifted), seed=1)
+    return drive(
+        PhysicsWorld(room._replace(scenario=scenario), robot_rng(1), lifted=lifted), seed=1
+    )
 
 
 def test_a_lifted_robot_arrives_where_its_odometry_notices() -> None:
