@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robot as a ROS node: it publishes scan, odom and /tf and follows cmd_vel, nothing else.
+"""The robot as a ROS node: it publishes scan, odom, /tf and /tf_static and follows cmd_vel.
 
 In real time it follows the clock. Else time stands from a scan until the cmd_vel (TwistStamped) of
 its stamp has come: as fast as planner and machine are, and with the same decisions every time. As
@@ -18,7 +18,7 @@ from typing import Any
 import rclpy
 from crowded_room import draw_room
 from film import save_frames
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import TransformStamped, TwistStamped
 from physics_world import ODOMETRY_NS, SCAN_NS, Lifted, PhysicsWorld
 from planner_in_process import (
     FILM_PERIOD_NS,
@@ -28,8 +28,9 @@ from planner_in_process import (
     stamp_at,
 )
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from robot_model_xml import LIDAR_Z_M
 
 from mfba_planner.core.geometry import distance, towards
 from mfba_planner.core.planner_types import Scan
@@ -41,6 +42,14 @@ from mfba_planner.ros.runtime.spin_node import StopFlag, make_executor
 
 ODOM_FRAME, BASE_FRAME, SCAN_FRAME = "odom", "base_link", "base_scan"
 BEGIN_AFTER_S = 0.5  # not in real time: for the first odometry, which would else be replaced
+
+
+def lidar_on_base() -> TransformStamped:
+    """Where the lidar is on the base, for /tf_static."""
+    transform = TransformStamped(child_frame_id=SCAN_FRAME)
+    transform.header.frame_id = BASE_FRAME
+    transform.transform.translation.z = LIDAR_Z_M
+    return transform
 
 
 class PhysicsNode(Node):
@@ -72,8 +81,12 @@ class PhysicsNode(Node):
         self._odom = self.create_publisher(ODOM.type, ODOM.name, qos)
         self._scan = self.create_publisher(SCAN.type, SCAN.name, qos)
         self._tf = self.create_publisher(TF.type, TF.name, qos) if TF else None
-        if not TF:
-            self.get_logger().info("tf2_msgs is not installed: no /tf")
+        if TF:
+            latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            self._static = self.create_publisher(TF.type, "/tf_static", latched)
+            self._static.publish(TF.type(transforms=[lidar_on_base()]))
+        else:
+            self.get_logger().info("tf2_msgs is not installed: no /tf, no /tf_static")
         self.create_subscription(TwistStamped, CMD_VEL.name, self._on_cmd_vel, qos)
         self._scans: list[tuple[int, Scan]] = []  # measured, not yet published
         self._started_ns: int | None = None  # the stamp of time 0

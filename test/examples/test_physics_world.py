@@ -136,14 +136,14 @@ def test_the_lidar_measures_what_geometry_says() -> None:
         # A beam along an edge may hit on one side and miss on the other.
         assert np.sort(off)[:-4].max() < 0.002
         compared += 1
-        noisy, seen = world.scan().ranges_m, expected < LIDAR.range_max_m - 0.1
-        sd = np.std(np.sort(noisy[seen] - expected[seen])[4:-4])
+        noisy, near = world.scan().ranges_m, expected < LIDAR.range_max_m - 0.1
+        sd = np.std(np.sort(noisy[near] - expected[near])[4:-4])
         assert 0.7 * RANGE_SD_M < sd < 1.3 * RANGE_SD_M
         assert np.isinf(noisy[expected > LIDAR.range_max_m + 0.1]).all()
     assert compared >= 3
 
 
-def test_one_who_walks_into_the_standing_robot_is_counted_once() -> None:
+def test_a_person_walking_into_the_standing_robot_is_counted_once() -> None:
     walk = ((0.0, 6.0, 5.0), (4.0, 6.0, 2.2), (8.0, 6.0, 5.0))
     world = PhysicsWorld(empty_room(walk), np.random.default_rng(0))
     world.advance(8_000_000_000)
@@ -154,7 +154,7 @@ def test_one_who_walks_into_the_standing_robot_is_counted_once() -> None:
     assert world.pose.y < START[1] - 0.05  # it was pushed
 
 
-def test_one_who_comes_from_behind_and_one_in_front_are_told_apart() -> None:
+def test_contacts_from_behind_and_in_front_are_distinguished() -> None:
     behind, _, _ = driven(empty_room(((0.0, 3.0, 2.0), (6.0, 9.0, 2.0))), 0.3, 0.0, 5.0)
     assert [(e.touched, e.side) for e in behind.contacts] == [("person0", "behind")]
     ahead, _, _ = driven(empty_room(at(7.5, 2.0)), 0.5, 0.0, 3.0)
@@ -174,7 +174,7 @@ def test_a_pillar_is_driven_into_once_and_a_second_time_after_backing_off() -> N
     assert len(world.contacts) == 2
 
 
-def test_one_who_pushes_the_robot_against_a_wall_does_not_crush_it() -> None:
+def test_a_person_pushing_the_robot_against_a_wall_does_not_crush_it() -> None:
     walk = ((0.0, 6.0, 4.0), (4.0, 6.0, 0.3), (8.0, 6.0, 4.0))
     world = PhysicsWorld(empty_room(walk), np.random.default_rng(0))
     fastest = 0.0
