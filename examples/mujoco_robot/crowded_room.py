@@ -2,14 +2,16 @@
 """A room with walls, pillars and people who walk among waypoints: a Scenario for both engines.
 
 The room is 12 x 12 m. Whatever stands keeps 1.3 m to all else, so that the robot passes
-everywhere. People walk straight from waypoint to waypoint at a speed of their own; they see
-neither the robot nor each other, and walk round nothing but walls and pillars.
+everywhere. People walk at a speed of their own, among waypoints or to and fro across the room; they
+see neither the robot nor each other, and walk round nothing but walls and pillars.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -36,8 +38,16 @@ LIDAR = Lidar(beams=360, range_max_m=8.0)
 RANGE_SD_M = 0.01
 _PILLARS, _WALLS = 4, 3
 _KEPT_FREE_M = 2.0  # centre to centre, between the robot's start and people at the beginning
-_CLEAR_M = 0.1  # between a person and what stands
+_FREE_M = BODY_RADIUS_M + 0.1  # between the centre of a person and what stands
+_ACROSS_M = 8.0  # the shortest way to and fro
 _DIGITS = 4
+
+
+class Walk(Enum):
+    """How people walk: to random waypoints, with sharp turns, or straight across and back."""
+
+    WAYPOINTS = "waypoints"
+    STRAIGHT = "straight"
 
 
 class Box(NamedTuple):
@@ -72,7 +82,13 @@ BORDER: tuple[Segment, ...] = (
 )
 
 
-def draw_room(number: int, *, people: int = PEOPLE, kidnapped: bool = False) -> Room:
+def draw_room(
+    number: int,
+    *,
+    people: int = PEOPLE,
+    walk: Walk = Walk.WAYPOINTS,
+    kidnapped: bool = False,
+) -> Room:
     """World of that number; the same at every call.
 
     With kidnapped the robot is put elsewhere after 4 to 10 s, to a place where nobody is then.
@@ -80,7 +96,7 @@ def draw_room(number: int, *, people: int = PEOPLE, kidnapped: bool = False) -> 
     rng = np.random.default_rng((20, number))
     boxes, pillars = _draw_what_stands(rng)
     start, goal = _ends(rng, boxes, pillars)
-    walkers = [_person(rng, boxes, pillars, start, goal) for _ in range(people)]
+    walkers = [_person(rng, walk, boxes, pillars, (start, goal)) for _ in range(people)]
     scenario = Scenario(
         name=f"room{number}",
         start_m=start,
@@ -147,35 +163,74 @@ def _ends(
 
 def _person(
     rng: np.random.Generator,
+    walk: Walk,
     boxes: tuple[Box, ...],
     pillars: tuple[Obstacle, ...],
-    start: Point,
-    goal: Point,
+    ends: tuple[Point, Point],
 ) -> Obstacle:
-    """One who walks among random waypoints for the whole time."""
+    """One who walks for the whole time, and is not near the robot's start or goal at first."""
     speed = float(rng.uniform(*SPEEDS_MPS))
-    free = BODY_RADIUS_M + _CLEAR_M
-
-    def point() -> Point:
-        x, y = rng.uniform(0.5, SIDE_M - 0.5, size=2).round(_DIGITS).tolist()
-        return x, y
-
-    here = point()
-    while min(distance(here, start), distance(here, goal)) < _KEPT_FREE_M or (
-        clearance_m(here, boxes, pillars) < free
-    ):
-        here = point()
-    t_s, knots = 0.0, [(0.0, *here)]
+    route = (_to_and_fro if walk is Walk.STRAIGHT else _among_waypoints)(rng, boxes, pillars, ends)
+    here, t_s = next(route), 0.0
+    knots: list[Knot] = [(t_s, *here)]
     while t_s < TIME_LIMIT_S:
-        there = point()
-        length = distance(here, there)
-        if length < 1.0 or not _is_free(here, there, free, boxes, pillars):
-            continue
-        t_s = round(t_s + length / speed, _DIGITS)
+        there = next(route)
+        t_s = round(t_s + distance(here, there) / speed, _DIGITS)
         here = there
         knots.append((t_s, *here))
-    trajectory: tuple[Knot, ...] = tuple(knots)
-    return Obstacle(center_m=knots[0][1:], radius_m=BODY_RADIUS_M, trajectory=trajectory)
+    return Obstacle(center_m=knots[0][1:], radius_m=BODY_RADIUS_M, trajectory=tuple(knots))
+
+
+def _point(rng: np.random.Generator) -> Point:
+    x, y = rng.uniform(0.5, SIDE_M - 0.5, size=2).round(_DIGITS).tolist()
+    return x, y
+
+
+def _among_waypoints(
+    rng: np.random.Generator,
+    boxes: tuple[Box, ...],
+    pillars: tuple[Obstacle, ...],
+    ends: tuple[Point, Point],
+) -> Iterator[Point]:
+    here = _point(rng)
+    while _near(here, ends) or clearance_m(here, boxes, pillars) < _FREE_M:
+        here = _point(rng)
+    yield here
+    while True:
+        there = _point(rng)
+        if distance(here, there) >= 1.0 and _is_free(here, there, _FREE_M, boxes, pillars):
+            here = there
+            yield here
+
+
+def _to_and_fro(
+    rng: np.random.Generator,
+    boxes: tuple[Box, ...],
+    pillars: tuple[Obstacle, ...],
+    ends: tuple[Point, Point],
+) -> Iterator[Point]:
+    """From a point of a line across the room to one of its ends, to the other one, and so on."""
+    while True:
+        a, b, share = _point(rng), _point(rng), float(rng.random())
+        here = (
+            round(a[0] + share * (b[0] - a[0]), _DIGITS),
+            round(a[1] + share * (b[1] - a[1]), _DIGITS),
+        )
+        if (
+            distance(a, b) >= _ACROSS_M
+            and 0.1 < share < 0.9
+            and not _near(here, ends)
+            and _is_free(a, b, _FREE_M, boxes, pillars)
+        ):
+            break
+    yield here
+    while True:
+        yield b
+        yield a
+
+
+def _near(point: Point, ends: tuple[Point, Point]) -> bool:
+    return min(distance(point, end) for end in ends) < _KEPT_FREE_M
 
 
 def _is_free(

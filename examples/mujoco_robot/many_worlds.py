@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from contact_events import ContactEvent, side_of
-from crowded_room import draw_room
+from crowded_room import Walk, draw_room
 from physics_world import Lifted, PhysicsWorld
 from planner_in_process import DriveResult, drive, planner_params, robot_rng
 
@@ -71,9 +71,9 @@ def by_geometry(episode: Episode) -> tuple[ContactEvent, ...]:
     return tuple(found)
 
 
-def physics(number: int, lifted: Lifted | None = None) -> Row:
+def physics(number: int, lifted: Lifted | None = None, walk: Walk = Walk.WAYPOINTS) -> Row:
     """The robot of the physics engine in a world."""
-    room = draw_room(number, kidnapped=lifted is not None)
+    room = draw_room(number, walk=walk, kidnapped=lifted is not None)
     world = PhysicsWorld(room, robot_rng(number), lifted=lifted or Lifted.JUMPS)
     found: DriveResult = drive(world, seed=number)
     row = _row(number, found.episode, found.contacts)
@@ -118,6 +118,7 @@ def _row(number: int, episode: Episode, contacts: Iterable[ContactEvent]) -> Row
 FIRST = "MuJoCo"
 ROWS: dict[str, Callable[[int], Row]] = {
     FIRST: physics,
+    "MuJoCo, people straight ahead": partial(physics, walk=Walk.STRAIGHT),
     "ours, no latency": partial(ours, latency_ticks=0),
     "ours, scans 0.1 s old": partial(ours, latency_ticks=1),
     "ours, omnidirectional": partial(ours, latency_ticks=0, drive_type=Drive.OMNIDIRECTIONAL),
