@@ -2,8 +2,8 @@
 """A room with walls, pillars and people who walk among waypoints: a Scenario for both engines.
 
 The room is 12 x 12 m. Whatever stands keeps 1.3 m to all else, so that the robot passes
-everywhere. People walk at a speed of their own, among waypoints or to and fro across the room; they
-see neither the robot nor each other, and walk round nothing but walls and pillars.
+everywhere. People walk at a speed of their own, among waypoints or to and fro across the room;
+they see neither the robot nor each other, and walk round nothing but walls and pillars.
 """
 
 from __future__ import annotations

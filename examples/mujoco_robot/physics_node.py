@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
-from crowded_room import draw_room
+from crowded_room import PEOPLE, Walk, draw_room
 from film import save_frames
 from geometry_msgs.msg import TransformStamped, TwistStamped
 from physics_world import ODOMETRY_NS, SCAN_NS, Lifted, PhysicsWorld
@@ -60,7 +60,8 @@ class PhysicsNode(Node):
         super().__init__("robot", **kwargs)
         values = {
             "world": 0,
-            "people": 10,
+            "people": PEOPLE,
+            "walk": Walk.WAYPOINTS.value,
             "kidnapped": False,
             "lifted": Lifted.JUMPS.value,
             "real_time": False,
@@ -69,7 +70,12 @@ class PhysicsNode(Node):
             "film": "",
         }
         found = {name: self.declare_parameter(name, value).value for name, value in values.items()}
-        room = draw_room(found["world"], people=found["people"], kidnapped=found["kidnapped"])
+        room = draw_room(
+            found["world"],
+            people=found["people"],
+            walk=Walk(found["walk"]),
+            kidnapped=found["kidnapped"],
+        )
         self.physics = PhysicsWorld(
             room, robot_rng(found["world"]), lifted=Lifted(found["lifted"])
         )

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import yaml
-from crowded_room import PEOPLE, TIME_LIMIT_S, Room, draw_room
+from crowded_room import PEOPLE, TIME_LIMIT_S, Room, Walk, draw_room
 from film import load_frames, write_film
 from physics_world import Lifted, PhysicsWorld
 from planner_in_process import planner_params, robot_rng
@@ -59,6 +59,7 @@ class RunOptions:
 
     world: int = 0
     people: int = PEOPLE
+    walk: Walk = Walk.WAYPOINTS
     kidnapped: bool = False
     lifted: Lifted = Lifted.JUMPS
     real_time: bool = False
@@ -141,6 +142,7 @@ def physics_process(
     parameters: dict[str, Any] = {
         "world": options.world,
         "people": options.people,
+        "walk": options.walk.value,
         "kidnapped": options.kidnapped,
         "lifted": options.lifted.value,
         "real_time": options.real_time,
@@ -190,7 +192,9 @@ def node_parameters(room: Room, options: RunOptions, bag: Path) -> dict[str, dic
 
 def run_graph(options: RunOptions, directory: Path) -> RunResult:
     """Drive through the graph and write the run directory. GraphError when the graph is stuck."""
-    room = draw_room(options.world, people=options.people, kidnapped=options.kidnapped)
+    room = draw_room(
+        options.world, people=options.people, walk=options.walk, kidnapped=options.kidnapped
+    )
     directory.mkdir(parents=True)
     text = yaml.safe_dump(scenario_to_dict(room.scenario), sort_keys=False)
     (directory / "world.yaml").write_text(text, encoding="utf-8")
@@ -281,6 +285,12 @@ def main() -> int:
     parser.add_argument("--world", type=int, default=0, help="number of the world")
     parser.add_argument("--people", type=int, default=PEOPLE)
     parser.add_argument(
+        "--walk",
+        choices=[walk.value for walk in Walk],
+        default=Walk.WAYPOINTS.value,
+        help="people walk to random waypoints, or straight across the room and back",
+    )
+    parser.add_argument(
         "--kidnapped",
         choices=[lifted.value for lifted in Lifted],
         help="lift the robot and put it elsewhere: its odometry jumps too, or does not notice",
@@ -305,6 +315,7 @@ def main() -> int:
     options = RunOptions(
         world=given.world,
         people=given.people,
+        walk=Walk(given.walk),
         kidnapped=given.kidnapped is not None,
         lifted=Lifted(given.kidnapped or Lifted.JUMPS.value),
         real_time=given.real_time,
