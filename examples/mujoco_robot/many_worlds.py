@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from contact_events import ContactEvent, side_of
-from crowded_room import Walk, draw_room
+from crowded_room import PEOPLE, Walk, draw_room
 from physics_world import Lifted, PhysicsWorld
 from planner_in_process import DriveResult, drive, planner_params, robot_rng
 
@@ -46,6 +46,7 @@ from mfba_planner.simulation.lidar_perception import OWN_ROBOT, LidarPerception
 from mfba_planner.simulation.run_episode import run
 
 Row = dict[str, Any]
+TURNED_S = 1.5
 SIDES = ("driving", "standing", "behind")
 
 
@@ -160,6 +161,28 @@ def _share(count: int, n: int) -> str:
     return f"{count} of {n} [{100 * found.low:.1f}, {100 * found.high:.1f}] %"
 
 
+def after_turns(rows: list[Row]) -> str:
+    """How often the first contact of a drive is with a person who has just changed direction."""
+    touched = turned = moments = just_turned = 0
+    for row in rows:
+        people = draw_room(row["world"]).scenario.obstacles[:PEOPLE]
+        ends = [[knot[0] for knot in person.trajectory[1:]] for person in people]
+
+        def has_turned(person: int, at_s: float, ends: list[list[float]] = ends) -> bool:
+            return any(0.0 <= at_s - end_s <= TURNED_S for end_s in ends[person])
+
+        for event in [e for e in row["contacts"] if e["touched"].startswith("person")][:1]:
+            touched += 1
+            turned += has_turned(int(event["touched"][len("person") :]), event["time_s"])
+        for second in range(int(row["time_s"])):
+            moments += len(people)
+            just_turned += sum(has_turned(person, second) for person in range(len(people)))
+    return (
+        f"{FIRST}: {turned} of {touched} first contacts with a person who had turned within "
+        f"{TURNED_S} s; of all people at any time {100 * just_turned / max(1, moments):.0f} %"
+    )
+
+
 def by_graph(row: Row) -> bool:
     """Whether the real nodes decide in this world as the planner in this process did."""
     from run import RunOptions, run_graph
@@ -201,6 +224,8 @@ def main() -> int:
                 with given.out.open("a", encoding="utf-8") as lines:
                     lines.write(json.dumps({"row": name, **row}) + "\n")
     print(table(found))
+    if FIRST in found:
+        print(after_turns(found[FIRST]))
     if given.graph:
         again = found[FIRST][:: given.graph] if FIRST in found else []
         equal = sum(map(by_graph, again))

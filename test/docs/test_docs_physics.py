@@ -32,9 +32,10 @@ def test_a_run_is_verified_shown_and_simulated_again(tmp_path: Path) -> None:
 
 def test_many_worlds_make_a_table(tmp_path: Path) -> None:
     table = shown_commands.script(shown_commands.reduced(MANY), tmp_path)
-    header, _, row = table.splitlines()
+    header, _, row, turned = table.splitlines()
     assert header in PAGE.splitlines()
     assert row.startswith("| MuJoCo | 1 of 1 [20.7, 100.0] % |")
+    assert re.match(r"MuJoCo: \d of \d first contacts with a person who had turned ", turned)
 
 
 def test_a_missing_engine_costs_one_line(tmp_path: Path) -> None:
