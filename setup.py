@@ -70,11 +70,13 @@ setup(
         ],
         "orca": ["pyrvo>=0.4"],
         "parquet": ["pyarrow>=15"],
+        "physics": ["mujoco>=3.2,<4"],
         "test": [
             "cmaes>=0.11,<1",
             "distributed>=2024.1",
             "hypothesis>=6.100",
             "mealpy>=3.0.2,<4",
+            "mujoco>=3.2,<4",
             "niapy>=2.7,<3",
             "pyarrow>=15",
             "pybag-sdk>=0.13",

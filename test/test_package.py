@@ -25,6 +25,7 @@ from mfba_planner.core import shipped_files
 from mfba_planner.core.errors import InputError
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
+EXAMPLES = sorted((ROOT / "examples").rglob("*.py"))
 NODES = ("planner", "world_sim", "virtual_sensor", "recorder", "replay")
 COMMANDS = ("launcher", "mfba")
 
@@ -137,7 +138,7 @@ def test_what_decides_draws_no_hidden_random_numbers() -> None:
             assert not hidden.search(path.read_text(encoding="utf-8")), relative(path)
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=relative)
+@pytest.mark.parametrize("path", [*SOURCES, *EXAMPLES], ids=relative)
 def test_files_and_callbacks_stay_short(path: Path) -> None:
     lines = len(path.read_text(encoding="utf-8").splitlines())
     assert lines <= (150 if is_node(path) else 400)
@@ -158,7 +159,7 @@ def test_files_and_callbacks_stay_short(path: Path) -> None:
 
 
 def test_every_python_file_names_its_licence_first() -> None:
-    folders = ("bench", "launch", "mfba_planner", "test", "tools")
+    folders = ("bench", "examples", "launch", "mfba_planner", "test", "tools")
     files = [
         ROOT / "setup.py",
         *(path for name in folders for path in (ROOT / name).rglob("*.py")),

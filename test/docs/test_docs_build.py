@@ -24,6 +24,7 @@ OWN_TESTS = {
     "optimizer.md": "docs/test_docs_optimizer.py",
     "optimizers.md": "docs/test_docs_optimizers.py",
     "how-to/your-optimizer.md": "docs/test_docs_your_optimizer.py",
+    "how-to/physics.md": "docs/test_docs_physics.py",
     "how-to/import-worlds.md": "docs/test_docs_import_worlds.py",
 }
 

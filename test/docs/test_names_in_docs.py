@@ -23,7 +23,9 @@ IN_BACKTICKS = re.compile(r"`(?:[^`\s]* )?([\w./-]+\.py|[\w-]+(?:/[\w-]+)*/)`")
 OF_THE_READER = {"skirt.py", "my_swarm.py"}  # files that the reader writes
 # A class, a constant or a protocol in backticks: `BasePlanner`, `ROUNDS`.
 SYMBOL = re.compile(r"`([A-Z]\w{2,})`")
-FOLDERS = ("mfba_planner", "bench", "docs", "launch", "test", "tools", "config", "layout")
+FOLDERS = (
+    *("mfba_planner", "bench", "docs", "examples", "launch", "test", "tools", "config", "layout"),
+)
 EXISTING = [
     f"/{path.relative_to(ROOT)}{'/' if path.is_dir() else ''}"
     for path in (*ROOT.iterdir(), *(p for name in FOLDERS for p in (ROOT / name).rglob("*")))

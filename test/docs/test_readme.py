@@ -30,7 +30,8 @@ def test_mfba_commands_run_in_order(tmp_path: Path) -> None:
 
 
 def test_files_named_in_the_docs_exist() -> None:
-    named = re.compile(r"`((?:docs|config|test|tools|bench|launch)/[\w./-]+)`|\]\(([\w./-]+)\)")
+    folders = "docs|config|test|tools|bench|examples|launch"
+    named = re.compile(rf"`((?:{folders})/[\w./-]+)`|\]\(([\w./-]+)\)")
     found = {a or b for text in DOCS for a, b in named.findall(text)}
     assert len(found) >= 5
     places = ("", "docs", "docs/how-to")

@@ -73,6 +73,13 @@ REDUCED = {
     "python bench/tracking.py --memory 100000": "python bench/tracking.py --memory 20",
     "python bench/startup.py --rounds 3": "python bench/startup.py --rounds 1 --only help",
     "python bench/startup.py --imports verify": "python bench/startup.py --imports verify",
+    "python examples/mujoco_robot/run.py --world 1 --film --out runs/physics": (
+        "python examples/mujoco_robot/run.py --world 1 --time-limit 2 --out runs/physics"
+    ),
+    "python examples/mujoco_robot/many_worlds.py --graph 25": (
+        "python examples/mujoco_robot/many_worlds.py --worlds 1 --first 1 --workers 1 "
+        "--only MuJoCo"
+    ),
     "python bench/fleet.py": "python bench/fleet.py --seeds 1 --robots 3 --radius 3",
 }
 # Lines of a page with the name of the file for a block of YAML.
