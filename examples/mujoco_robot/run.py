@@ -48,7 +48,6 @@ from mfba_planner.verification.verify_bag import verify
 
 READY_TIMEOUT_S = 30.0
 SILENCE_S = 30.0  # without a decision
-INPUT_TIMEOUT_S = 0.25
 NODES = ("recorder", "virtual_sensor", "planner")
 ROBOT = Path(__file__).with_name("physics_node.py")
 
@@ -63,6 +62,7 @@ class RunOptions:
     kidnapped: bool = False
     lifted: Lifted = Lifted.JUMPS
     real_time: bool = False
+    input_timeout_s: float = 0.25  # in real time
     time_limit_s: float = TIME_LIMIT_S
     film: bool = False
 
@@ -174,7 +174,7 @@ def node_parameters(room: Room, options: RunOptions, bag: Path) -> dict[str, dic
     """Parameters of the project's nodes, as on a robot with a lidar."""
     params = planner_params(room)
     # Where time stands while the planner decides, no input gets old by itself.
-    timeout = {"input_timeout_s": INPUT_TIMEOUT_S if options.real_time else SILENCE_S}
+    timeout = {"input_timeout_s": options.input_timeout_s if options.real_time else SILENCE_S}
     return {
         "recorder": {
             "output": str(bag),

@@ -58,12 +58,16 @@ def test_the_graph_decides_as_the_planner_in_process_and_its_bag_verifies(tmp_pa
         assert len(colours) > 1000  # people, walls and floor, shaded
 
 
-def test_by_the_clock_the_robot_moves_and_stamps_are_those_of_the_clock(tmp_path: Path) -> None:
-    options = RunOptions(world=1, people=0, real_time=True, time_limit_s=SHORT_S)
+def test_by_the_clock_the_robot_turns_and_stamps_are_those_of_the_clock(tmp_path: Path) -> None:
+    # A busy machine is late, but not by so much that the robot is stopped.
+    options = RunOptions(
+        world=1, people=0, real_time=True, input_timeout_s=10.0, time_limit_s=SHORT_S
+    )
     run_graph(options, tmp_path / "run")
     recorded = read_episode(tmp_path / "run/bag")
     assert abs(recorded.ticks[-1].stamp_ns * 1e-9 - time.time()) < 60.0
-    assert distance(recorded.ticks[0].pose.position, recorded.ticks[-1].pose.position) > 0.1
+    # It turns to the goal first, which lies to its left.
+    assert max(tick.pose.yaw for tick in recorded.ticks) > 0.1
     with BagReader(tmp_path / "run/bag") as reader:
         counts = {name: topic.message_count for name, topic in reader.topics.items()}
     assert counts["/odom"] > 3 * counts["/scan"]
