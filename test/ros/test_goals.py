@@ -76,7 +76,7 @@ def test_a_goal_replaces_a_route_and_a_route_a_goal(graph: Graph) -> None:
     ("bad", "kind", "reason"),
     [
         (route(), "waypoints: value", "waypoints are empty; give at least one, or call"),
-        (route(A, B, frame="map"), "waypoints: frame", "waypoints is in frame 'map', not 'odom'"),
+        (route(A, B, frame="map"), "waypoints: frame", "waypoint 1 is in frame 'map', not 'odom'"),
         (route(A, (NAN, 0.0)), "waypoints: value", "waypoint 2 position holds nan"),
     ],
 )

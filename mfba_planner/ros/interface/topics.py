@@ -208,9 +208,18 @@ try:  # not among the PyPI wheels; published and recorded where it is installed
     from tf2_msgs.msg import TFMessage
 except ImportError:
     TF: Topic | None = None
+    TRANSFORMS: tuple[Topic, ...] = ()
 else:
     TF = Topic(name="/tf", type=TFMessage, writers=(WORLD_SIM,), qos=TICK_QOS, every_tick=True)
-    GRAPH += (TF,)
+    # Of any number of publishers, each of which latches its own.
+    TF_STATIC = Topic(
+        name="/tf_static",
+        type=TFMessage,
+        writers=(WORLD_SIM,),
+        qos=_reliable(100, DurabilityPolicy.TRANSIENT_LOCAL),
+    )
+    TRANSFORMS = (TF, TF_STATIC)
+    GRAPH += TRANSFORMS
 
 
 def expected_readers(topic: Topic, nodes: set[str]) -> set[str]:
