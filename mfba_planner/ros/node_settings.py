@@ -25,7 +25,7 @@ _SCAN_X = "where the lidar is on the robot, ahead of base_frame"
 _SCAN_Y = "where the lidar is on the robot, to the left of base_frame"
 _SCAN_YAW = "yaw of the scan's frame in base_frame"
 _SCAN_FLIPPED = "the lidar is mounted upside down"
-_SCAN_MOUNTING = (
+_SCAN_EXTRINSICS = (
     "where the pose of the lidar on the robot is from; auto: scan_x, scan_y, scan_yaw and "
     "scan_flipped if one of them is set, else tf where it is published"
 )
@@ -126,7 +126,7 @@ class VirtualSensorSettings:
     scan_y: float = option(0.0, _SCAN_Y, unit="m", minimum=-10.0, maximum=10.0)
     scan_yaw: float = option(0.0, _SCAN_YAW, unit="rad", minimum=-6.4, maximum=6.4)
     scan_flipped: bool = option(False, _SCAN_FLIPPED)
-    scan_extrinsics: ExtrinsicsSource = option(ExtrinsicsSource.AUTO, _SCAN_MOUNTING)
+    scan_extrinsics: ExtrinsicsSource = option(ExtrinsicsSource.AUTO, _SCAN_EXTRINSICS)
     scan_frame: str = option("", _SCAN_FRAME)
     scan_no_return: NoReturn = option(NoReturn.INF, _NO_RETURN)
     lockstep: bool = option(False, "pair odom with scan by stamp; false: newest odom")
@@ -167,7 +167,7 @@ class PlannerSettings:
     scan_y: float = option(0.0, _SCAN_Y, unit="m", minimum=-10.0, maximum=10.0)
     scan_yaw: float = option(0.0, _SCAN_YAW, unit="rad", minimum=-6.4, maximum=6.4)
     scan_flipped: bool = option(False, _SCAN_FLIPPED)
-    scan_extrinsics: ExtrinsicsSource = option(ExtrinsicsSource.AUTO, _SCAN_MOUNTING)
+    scan_extrinsics: ExtrinsicsSource = option(ExtrinsicsSource.AUTO, _SCAN_EXTRINSICS)
     scan_frame: str = option("", _SCAN_FRAME)
     scan_no_return: NoReturn = option(NoReturn.INF, _NO_RETURN)
     diagnostics_period_s: float = option(1.0, _DIAGNOSTICS, unit="s", minimum=0.01, maximum=3600.0)

@@ -102,8 +102,8 @@ def is_foreign(reader: BagReader) -> bool:
 def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResult:
     """Decide on every scan with the odometry of its stamp, or the newest recorded before it.
 
-    Same as virtual_sensor (source: scan) and planner on a replay of the bag, with the extrinsics of
-    the lidar by tf and the frame of the odometry as odom_frame. Raises BagError for a bag that
+    Same as virtual_sensor (source: scan) and planner on a replay of the bag, with the extrinsics
+    of the lidar by tf and the frame of the odometry as odom_frame. Raises BagError for a bag that
     cannot be read or has no goal, if topics must be named, for a lidar of unknown extrinsics, and
     where known_map finds no map.
     """

@@ -237,7 +237,7 @@ def test_scans_of_two_mountings_are_decided_and_named(tmp_path: Path, capsys: Ca
     messages = [transform(START_NS), rear, goal(START_NS, 0.0, 5.0), *steps(odom), *turns]
     path = write(tmp_path / "bag", messages)
     assert decide(path, "--out", str(tmp_path / "run")) == 0
-    assert "several mountings of a lidar" in capsys.readouterr().out
+    assert "lidars with several extrinsics" in capsys.readouterr().out
 
 
 def test_a_failure_leaves_no_directory(tmp_path: Path) -> None:

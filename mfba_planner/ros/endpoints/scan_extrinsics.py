@@ -33,8 +33,8 @@ class ScanExtrinsics:
         )
         if self.is_required and not self.reads_tf:
             raise ConfigError(
-                "parameter scan_extrinsics='tf': tf2_msgs is not installed here; install it, or set "
-                f"scan_extrinsics to parameters and {', '.join(PARAMETERS)}"
+                "parameter scan_extrinsics='tf': tf2_msgs is not installed here; install it, or "
+                f"set scan_extrinsics to parameters and {', '.join(PARAMETERS)}"
             )
 
     def robot_is(self, frame: str) -> None:
