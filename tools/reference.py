@@ -70,7 +70,7 @@ def topic_table() -> str:
     """Every topic: name, type, publishers, subscribers, QoS."""
     rows = []
     for topic in topics.GRAPH:
-        if topic is topics.TF:
+        if topic in topics.TRANSFORMS:
             continue  # only where tf2_msgs is installed: mentioned in TOPICS_TEXT
         package = topic.type.__module__.split(".")[0]
         latched = topic.qos.durability.short_key == "transient_local"

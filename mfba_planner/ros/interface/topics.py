@@ -204,22 +204,23 @@ GRAPH: tuple[Topic, ...] = (
     *PARAMETERS.values(),
 )
 
-try:  # not among the PyPI wheels; published and recorded where it is installed
-    from tf2_msgs.msg import TFMessage
-except ImportError:
-    TF: Topic | None = None
-    TRANSFORMS: tuple[Topic, ...] = ()
-else:
-    TF = Topic(name="/tf", type=TFMessage, writers=(WORLD_SIM,), qos=TICK_QOS, every_tick=True)
-    # Of any number of publishers, each of which latches its own.
-    TF_STATIC = Topic(
-        name="/tf_static",
-        type=TFMessage,
-        writers=(WORLD_SIM,),
-        qos=_reliable(100, DurabilityPolicy.TRANSIENT_LOCAL),
+
+def transform_topics() -> tuple[Topic, ...]:
+    """/tf and /tf_static where tf2_msgs is installed: it is not among the PyPI wheels."""
+    try:
+        from tf2_msgs.msg import TFMessage
+    except ImportError:
+        return ()
+    static_qos = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)  # of many publishers
+    writers = (WORLD_SIM,)
+    return (
+        Topic(name="/tf", type=TFMessage, writers=writers, qos=TICK_QOS, every_tick=True),
+        Topic(name="/tf_static", type=TFMessage, writers=writers, qos=static_qos),
     )
-    TRANSFORMS = (TF, TF_STATIC)
-    GRAPH += TRANSFORMS
+
+
+TRANSFORMS = transform_topics()
+GRAPH += TRANSFORMS
 
 
 def expected_readers(topic: Topic, nodes: set[str]) -> set[str]:
