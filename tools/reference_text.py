@@ -10,8 +10,8 @@ YAML_HEAD = """\
 # algorithm while the node runs.
 #
 # Check first: robot_radius_m, scan_x to scan_extrinsics, input_timeout_s and odom_frame, which
-# stand once, for both nodes; drive and speed_mps of planner. The robot stops when an input is older
-# than input_timeout_s: set it to at least twice the period of the slower of scan and odom.
+# stand once, for both nodes; drive and speed_mps of planner. The robot stops when an input is
+# older than input_timeout_s: set it to at least twice the period of the slower of scan and odom.
 """
 
 TOPICS_TEXT = """\

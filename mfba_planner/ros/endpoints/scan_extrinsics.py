@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import math
+import time
+
 from ...core.errors import ConfigError, FrameError
 from ...core.lidar_extrinsics import CENTRED, PARAMETERS, LidarExtrinsics
 from ...recording.planar_poses import lidar_extrinsics
@@ -10,6 +13,7 @@ from ..interface import topics
 from ..node_settings import ExtrinsicsSource, PlannerSettings, VirtualSensorSettings
 from .transform_subscription import TransformSubscription
 
+_DISCOVERY_S = 2.0  # until all publishers are known
 _REMEDY = f"publish it, or set {', '.join(PARAMETERS)}"
 
 
@@ -26,6 +30,8 @@ class ScanExtrinsics:
         self._transforms = transforms
         self._base_frame = self.base = settings.base_frame
         self._found: dict[str, LidarExtrinsics] = {}
+        # In lockstep all publishers have been discovered before the first tick.
+        self._discovered_s = -math.inf if settings.lockstep else time.monotonic() + _DISCOVERY_S
         source = settings.scan_extrinsics
         self.is_required = source is ExtrinsicsSource.TF
         self.reads_tf = bool(topics.TRANSFORMS) and (
@@ -52,11 +58,17 @@ class ScanExtrinsics:
             try:
                 found = lidar_extrinsics(self._transforms.tree, frame, self.base)
             except FrameError as error:
-                if not self.is_required and not self._transforms.is_published:
-                    return self._given  # a robot without tf
+                if self._is_without_tf():
+                    return self._given
                 raise FrameError(f"scan: {error}; {_REMEDY}") from None
             self._found[frame] = found
         return self._found[frame]
+
+    def _is_without_tf(self) -> bool:
+        """Whether no tf is to be expected: nothing publishes any."""
+        if self.is_required or time.monotonic() < self._discovered_s:
+            return False
+        return not self._transforms.is_published
 
     @property
     def text(self) -> str:
