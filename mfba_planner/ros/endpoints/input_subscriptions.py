@@ -96,6 +96,16 @@ class InputSubscriptions:
         self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
         self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
 
+    def text(self, params: PlannerParams) -> str:
+        """What decides and by what, for the node's first line."""
+        by, lidar = "sectors", ""
+        if params.reads_scan:
+            by, lidar = f"perception {params.perception.value}", f"; {self.extrinsics.text}"
+        return (
+            f"decides: {params.label}, {by}, {params.drive.value}, robot radius "
+            f"{params.robot_radius_m:g} m, {params.speed_mps:g} m/s{lidar}"
+        )
+
     def set_params(self, params: PlannerParams) -> None:
         """Use scans and a map, or not, from now on; params are the planner's."""
         self._params = params

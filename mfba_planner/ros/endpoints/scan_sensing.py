@@ -30,6 +30,15 @@ class ScanSensing:
         if settings.source is Source.SCAN and self.extrinsics.reads_tf:
             transforms.subscribe()
 
+    def text(self, sensor: SensorParams) -> str:
+        """What is measured, for the node's first line."""
+        s = self._settings
+        by = f"; {self.extrinsics.text}" if s.source is Source.SCAN else ""
+        return (
+            f"{sensor.sectors} sectors up to {sensor.sensing_range_m:g} m from {s.source.value}, "
+            f"robot radius {s.robot_radius_m:g} m{by}"
+        )
+
     def measure(self, message: Any, yaw_rad: float, sensor: SensorParams) -> Ranges:
         """The ranges by a scan of a robot with this yaw; InputError where it is refused."""
         s = self._settings

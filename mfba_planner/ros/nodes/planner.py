@@ -55,6 +55,7 @@ class PlannerNode(ManagedNode):
         self._outputs = PlannerPublishers(self, s, lambda: self.path_planner)
         self._inputs.subscribe()
         self.goals.subscribe()
+        self.announce(self._inputs.text(self.path_planner.params))
 
     def deactivate(self) -> None:
         """Command rest once, as no command follows."""

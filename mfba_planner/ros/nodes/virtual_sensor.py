@@ -54,6 +54,7 @@ class VirtualSensor(GraphNode):
         depth = PAIRED if self._by_stamp else NEWEST
         self._monitor.subscribe(topics.ODOM, self._on_odom, depth=depth, frame=s.odom_frame)
         self._monitor.subscribe(self._source, self._on_source, depth=depth, frame=s.scan_frame)
+        self.announce(self._scan_sensing.text(self.sensor))
         self.advertise_ready(names(s.wait_for))
 
     def _set_sensor(self, sensor: SensorParams) -> None:

@@ -165,6 +165,11 @@ class GraphNode(Node):
         text = json.dumps(parameters.values(self), sort_keys=True)
         self._parameters_publisher.publish(topic.type(data=text))
 
+    def announce(self, text: str) -> None:
+        """Log which topics the node listens to, and what it does with them."""
+        names = dict.fromkeys(subscription.topic_name for subscription in self._subscribed)
+        self.get_logger().info(f"listening to {', '.join(names)}; {text}")
+
     def missing(self) -> str:
         """What is missing before a first message would reach all peers; empty: nothing.
 
