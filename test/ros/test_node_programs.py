@@ -116,6 +116,7 @@ def test_a_misspelt_parameter_is_named(ros_env: dict[str, str]) -> None:
     arguments = parameters("sped_mps:=0.5", "use_sim_time:=false")
     planner = start("planner", *arguments, env={**ros_env, "RCUTILS_LOGGING_BUFFERED_STREAM": "1"})
     assert planner.stdout is not None
+    assert "[planner]: listening to " in planner.stdout.readline()
     line = planner.stdout.readline()
     assert line.endswith("[planner]: sped_mps: no such parameter; did you mean 'speed_mps'?\n")
     planner.terminate()
