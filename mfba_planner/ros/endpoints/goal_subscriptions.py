@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -18,6 +20,11 @@ from ..runtime.goal_queue import GoalQueue
 from ..runtime.refused_inputs import RefusedInputs
 from .transform_subscription import TransformSubscription
 
+_LONG_WAIT_S = 2.0
+_NO_GOAL = (
+    "no goal_pose was received, though it has a publisher; publish one, or play its message too "
+    "(`ros2 bag play --start-offset` skips latched ones, `ros2 run mfba_planner replay` does not)"
+)
 Convert = Callable[[], tuple[Point, ...]]
 
 
@@ -50,6 +57,7 @@ class GoalSubscriptions:
         """Forget all goals."""
         self.goal_queue = GoalQueue()
         self.any_received = False
+        self._waited_since_s = math.inf
         self._held: tuple[str, Convert] | None = None
         self.awaited = ""  # the transform that held goals wait for
 
@@ -67,8 +75,20 @@ class GoalSubscriptions:
         return self.goal_queue.goal
 
     def is_expected(self) -> bool:
-        """Whether goal_pose has a publisher, and no goal was received since this node started."""
-        return not self.any_received and self._node.count_publishers(topics.GOAL_POSE.name) > 0
+        """Whether goal_pose has a publisher, and no goal was received since this node started.
+
+        Ticks are not answered until then. If that lasts, a warning says so.
+        """
+        if self.any_received or not self._node.count_publishers(topics.GOAL_POSE.name):
+            self._waited_since_s = math.inf
+            return False
+        now_s = time.monotonic()
+        self._waited_since_s = min(self._waited_since_s, now_s)
+        if now_s - self._waited_since_s >= _LONG_WAIT_S:
+            self._node.get_logger().warning(
+                f"ticks are not answered: {self.awaited or _NO_GOAL}", throttle_duration_sec=5.0
+            )
+        return True
 
     def _log(self, text: str) -> None:
         self._node.get_logger().info(text)

@@ -75,11 +75,10 @@ class PlannerNode(ManagedNode):
         if self.is_active and not self.settings.lockstep:
             self.deactivate()
 
-    def missing(self) -> str:
-        """Besides the subscribers: the map and the goal, when ~/ready waits for peers."""
+    def awaits(self) -> str:
+        """The map, then the goal."""
         no_goal = "" if self.goals.goal_queue.goal else self.goals.awaited or "no goal_pose yet"
-        own = self._inputs.map.missing or no_goal
-        return super().missing() or (own if self._peers else "")
+        return self._inputs.map.missing or no_goal
 
     def _reset(self) -> None:
         self.path_planner.reset()

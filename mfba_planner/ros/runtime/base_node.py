@@ -186,11 +186,17 @@ class GraphNode(Node):
                 return f"{topic.name} waits for {', '.join(sorted(absent or expected))}"
         outputs = [made.topic_name for topic, made in self._advertised if topic.readers]
         inputs = [subscription.topic_name for subscription in self._subscribed]
-        return type_mismatch(self, [*outputs, *inputs])
+        mismatch = type_mismatch(self, [*outputs, *inputs])
+        return mismatch or (self.awaits() if self._peers else "")
+
+    def awaits(self) -> str:
+        """Which input the node waits for, "" for none; without peers it is ready all the same."""
+        return ""
 
     def _on_ready(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.message = self.missing()
-        response.success = not response.message
+        missing = self.missing()
+        response.message = missing or self.awaits()
+        response.success = not missing
         return response
 
     def count_callers(self) -> int:
