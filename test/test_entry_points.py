@@ -250,8 +250,8 @@ PathFinder.find_spec = lambda name, *rest: None if name in HIDDEN else found(nam
 def test_missing_packages_are_named_together_before_anything_else(program: str) -> None:
     code = f"HIDDEN = ('rich', 'matplotlib', 'scipy')\n{HIDE}\nsys.argv[1:] = ['case1']\n"
     expected = (
-        f"{program}: not installed: matplotlib, rich, scipy; run `pip install matplotlib rich "
-        "scipy`\n"
+        f"{program}: not installed: matplotlib, rich, scipy; run pip install matplotlib rich "
+        "scipy\n"
     )
     assert outcome(start(f"{code}sys.exit(entry_points.{program}())")) == (1, "", expected)
 
@@ -263,7 +263,7 @@ def test_a_node_names_missing_packages_only_where_it_needs_one() -> None:
     assert out is not None
     assert out.startswith("usage: recorder")
     code = f"HIDDEN = ('rich', 'eikonalfm')\n{HIDE}\n"
-    expected = "planner: not installed: eikonalfm, rich; run `pip install eikonalfm rich`\n"
+    expected = "planner: not installed: eikonalfm, rich; run pip install eikonalfm rich\n"
     code += "sys.argv[1:] = []\n"
     assert outcome(start(f"{code}sys.exit(entry_points.planner())")) == (1, "", expected)
 

@@ -27,4 +27,4 @@ def missing_packages(modules: Iterable[str] = tuple(REQUIRED)) -> str:
     names = [name for module, name in REQUIRED.items() if find_spec(module) is None]
     if all(REQUIRED[module] not in names for module in modules):
         return ""
-    return f"not installed: {', '.join(names)}; run `pip install {' '.join(names)}`"
+    return f"not installed: {', '.join(names)}; run pip install {' '.join(names)}"

@@ -138,8 +138,8 @@ def test_by_tf(
     assert tuple(one for _, one in found) == from_bag(bag, planner)
     straight = write(tmp_path / "straight", recording(MOUNTED["straight"]))
     check_alike([one for _, one in found], from_bag(straight, planner), planner)
-    told = [decision_field(message, "scan_extrinsics") for message, _ in found]
-    assert all(told) == (planner is PREDICTIVE)
+    recorded = [decision_field(message, "scan_extrinsics") for message, _ in found]
+    assert all(recorded) == (planner is PREDICTIVE)
 
 
 def test_a_recording_of_the_nodes_verifies(graph: Graph, tmp_path: Path, with_tf: Any) -> None:
