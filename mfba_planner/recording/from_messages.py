@@ -174,12 +174,13 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
 
 
 def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF) -> Scan:
-    """sensor_msgs/LaserScan to a Scan; beams that turn clockwise are put in reverse sequence.
+    """sensor_msgs/LaserScan to a Scan.
 
-    Raises FrameError for another frame, and InputError where the fields contradict each other.
-    perception.scan_to_sectors.sense_scan checks the ranges. As some drivers leave angle_max at
-    0 or one increment too far, it is only compared roughly, and not where both limits are 0.
-    no_return is the range by which the driver reports that nothing is there.
+    Beams that turn clockwise are put in reverse sequence, unless it is that of their times: then
+    the increment is below 0. no_return is the range by which the driver reports that nothing is
+    there. Raises FrameError for another frame, and InputError where the fields contradict each
+    other; perception.scan_to_sectors.sense_scan checks the ranges. As some drivers leave angle_max
+    at 0 or one increment too far, it is only compared roughly, and not where both limits are 0.
     """
     require_frame(message, frame, "scan", "scan_frame")
     count, increment = len(message.ranges), message.angle_increment
@@ -211,7 +212,7 @@ def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF
             f"{LONGEST_SCAN_S:g} s in all; check the lidar driver"
         )
     ranges = rep_117(message.ranges, message.range_max, no_return)
-    if increment < 0.0:
+    if increment < 0.0 and not time_s:
         first, increment, ranges = first + (count - 1) * increment, -increment, ranges[::-1]
     return Scan(
         ranges_m=ranges,

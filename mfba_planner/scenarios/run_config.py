@@ -149,7 +149,8 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     dated = {"use_sim_time": True} if not lockstep and config.speed_factor <= 1.0 else {}
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
     robot = config.scenario.robot
-    extrinsics = robot.lidar.extrinsics.parameters
+    # Never by tf: the first scan comes before it.
+    extrinsics = {**robot.lidar.extrinsics.parameters, "scan_extrinsics": "parameters"}
     radii = _radii(config.scenario)
     segments = config.scenario.segments_m if not robot.lidar.beams else ()
     return {
