@@ -23,7 +23,6 @@ from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.lidar_extrinsics import LidarExtrinsics
 from mfba_planner.core.option_specs import flatten
 from mfba_planner.core.planner_types import Decision, Mode, Scan
-from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_factory import params_for_method
 from mfba_planner.planning.planner_params import Method, PlannerParams
@@ -37,7 +36,7 @@ from mfba_planner.ros.nodes.planner import PlannerNode
 from mfba_planner.ros.nodes.recorder import Recorder
 from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.nodes.world_sim import WorldSim
-from mfba_planner.scenarios.run_config import Driver, RunConfig
+from mfba_planner.scenarios.run_config import RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.run_episode import simulate
@@ -248,22 +247,24 @@ def test_world_sim_publishes_where_its_lidar_is(graph: Graph, with_tf: Any) -> N
     assert found == pytest.approx((0.2, -0.1, 1.0, True))
 
 
-def test_a_simulated_run_does_not_depend_on_tf(
-    tmp_path: Path, domain_id: int, with_tf: Any
-) -> None:
-    lidar = Lidar(beams=360, x_m=0.1, flipped=True)
-    scenario = replace(load_scenario("case1"), start_m=(9.4, 4.2), goal_m=(9.6, 8.0))
-    for number, robot in enumerate((Robot(lidar=lidar), Robot(lidar=Lidar(beams=360)))):
-        config = RunConfig(
-            scenario=replace(scenario, robot=robot), planner=PREDICTIVE, seed=SEED,
-            driver=Driver.IN_PROCESS,
-        )  # fmt: skip
-        bag = tmp_path / f"bag{number}"
-        run_in_process(config, bag, domain_id=domain_id)
-        report = verify(bag)
-        assert report.is_identical, report.faults
-        expected = simulate(config.scenario, planner=PREDICTIVE, sensor=SensorParams(), seed=SEED)
-        assert report.recorded == expected.ticks
+def test_a_simulated_run_does_not_depend_on_tf(graph: Graph, with_tf: Any) -> None:
+    """A transform that is wrong changes nothing: the nodes of a run have parameters."""
+    robot = Robot(lidar=Lidar(beams=360, x_m=0.1, flipped=True))
+    scenario = replace(load_scenario("case1"), start_m=(9.4, 4.2), goal_m=(9.6, 8.0), robot=robot)
+    config = RunConfig(scenario=scenario, planner=PREDICTIVE, seed=SEED)
+    parameters = node_parameters(config, peers=())
+    graph.writer(topics.TRANSFORMS[1]).publish(static(with_tf, "base_scan", x=0.5))
+    decisions, sectors = graph.collect(topics.DECISION), graph.collect(topics.SECTORS)
+    graph.start(VirtualSensor, parameters["virtual_sensor"])
+    node = graph.start(PlannerNode, parameters["planner"])
+    world = graph.start(WorldSim, parameters["world_sim"])
+    graph.until(lambda: node.goals.goal_queue.goal is not None)
+    world.resume()
+    graph.until(lambda: world.over)
+    graph.settle()
+    found = [decision(message, sector_ranges(ring)) for message, ring in zip(decisions, sectors)]
+    expected = simulate(scenario, planner=PREDICTIVE, sensor=SensorParams(), seed=SEED)
+    assert tuple(found) == expected.ticks
 
 
 @pytest.mark.parametrize("first", [0, 5])
