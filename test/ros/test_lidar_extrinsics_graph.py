@@ -249,7 +249,7 @@ def test_world_sim_publishes_where_its_lidar_is(graph: Graph, with_tf: Any) -> N
 
 def test_a_simulated_run_does_not_depend_on_tf(graph: Graph, with_tf: Any) -> None:
     """A transform that is wrong changes nothing: the nodes of a run have parameters."""
-    robot = Robot(lidar=Lidar(beams=360, x_m=0.1, flipped=True))
+    robot = Robot(lidar=Lidar(beams=360))  # at the centre, as by default
     scenario = replace(load_scenario("case1"), start_m=(9.4, 4.2), goal_m=(9.6, 8.0), robot=robot)
     config = RunConfig(scenario=scenario, planner=PREDICTIVE, seed=SEED)
     parameters = node_parameters(config, peers=())
