@@ -151,6 +151,29 @@ def test_odometry_without_child_frame(tmp_path: Path) -> None:
     named = [backwards, GOAL, *steps(odom, lambda t: scan(t, wall(0)))]
     (tmp_path / "named").mkdir()
     assert decided(tmp_path / "named", named).digest == given.digest
+    (tmp_path / "base").mkdir()
+    assert decided(tmp_path / "base", messages, base_frame="base_link").digest == given.digest
+
+
+@pytest.mark.parametrize("with_static", [False, True])
+def test_a_lidar_whose_pose_is_in_tf_only(with_static: bool, tmp_path: Path) -> None:
+    """As of a robot_state_publisher that sends all of it again and again."""
+    static = transform(START_NS, "base_link", "mast", x=0.1)
+    parent = "mast" if with_static else "base_link"
+    mount: dict[str, Any] = {"x": 0.1, "yaw": 1.0, "roll": math.pi}
+
+    def on_tf(stamp: int) -> Recorded:
+        return transform(stamp, parent, "laser", topic="/tf", **mount)
+
+    found = decided(tmp_path, [static, GOAL, *steps(on_tf, odom, on_wall)])
+    assert found.notes == (
+        f"/tf: laser is at ({0.2 if with_static else 0.1}, 0) m in base_link, turned by 1 rad, "
+        "upside down",
+    )
+    (tmp_path / "static").mkdir()
+    same = transform(START_NS, "mast" if with_static else "base_link", "laser", **mount)
+    by_static = decided(tmp_path / "static", [static, same, GOAL, *steps(odom, on_wall)])
+    assert found.digest == by_static.digest
 
 
 def robot(name: str, goal_x: float, at_deg: int, yaw: float = 0.0) -> list[Recorded]:

@@ -74,7 +74,8 @@ class ScanExtrinsics:
     def text(self) -> str:
         """Where the extrinsics are from, for the node's first line."""
         if self.reads_tf:
-            return "lidar mounted as tf says"
+            without = "" if self.is_required else ", without tf at the centre"
+            return f"lidar mounted as tf says{without}"
         x, y, yaw, flipped = self._given
         return (
             f"lidar mounted at ({x:g}, {y:g}) m, yaw {yaw:g}{', upside down' if flipped else ''}"
