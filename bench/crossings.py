@@ -65,7 +65,6 @@ class Robot:
 def cross(scenario: Scenario, robot: Robot, seed: int) -> Episode:
     """Run a crossing."""
     factory = find_factory(robot.planner)
-    params = preset_of(factory, PlannerParams(speed_mps=robot.speed_mps))
     sensor, observe = SensorParams(), Perception("known")
     found: Observe = observe
     if robot.perception == "known":
@@ -75,8 +74,10 @@ def cross(scenario: Scenario, robot: Robot, seed: int) -> Episode:
         lidar = replace(
             base.lidar, beams=robot.beams, range_max_m=robot.range_m, fov_rad=robot.fov_rad
         )
-        scenario = replace(scenario, robot=replace(base, lidar=lidar))
+        fastest = max(base.max_speed_mps, robot.speed_mps)
+        scenario = replace(scenario, robot=replace(base, lidar=lidar, max_speed_mps=fastest))
         found = LidarPerception(robot.perception)
+    params = scenario.planner_params(preset_of(factory, PlannerParams(speed_mps=robot.speed_mps)))
     planner = factory(params, sensor, seed)
     return run(
         scenario, planner=params, sensor=sensor, seed=seed, path_planner=planner, observe=found

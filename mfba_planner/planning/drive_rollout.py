@@ -12,6 +12,7 @@ from .differential_drive import Speeds, brake
 from .turn_delay import TurnDelay
 
 FINE_STEPS, COARSE_TICKS = 6, 2  # steps of one tick, then steps of two
+LATE_S, LATE_TICKS = 3.0, 4  # and after so long of four
 LONGEST = 2.0  # horizons, waiting and turning included
 REACHED_M = 0.1  # at a waypoint the planner decides anew
 
@@ -58,7 +59,8 @@ class DriveRollout:
         (qx, qy), (gx, gy) = goal if wait_s else waypoint, goal
         found: list[Stretch] = []
         while driven < horizon_s and t < LONGEST * horizon_s:
-            h = tick_s if len(found) < FINE_STEPS else COARSE_TICKS * tick_s
+            ticks = COARSE_TICKS if t < LATE_S else LATE_TICKS
+            h = tick_s if len(found) < FINE_STEPS else ticks * tick_s
             dx, dy = qx - x, qy - y
             reached_m = max(REACHED_M, abs(v) * h)  # a longer step could pass it
             if dx * dx + dy * dy < reached_m * reached_m:
@@ -71,7 +73,8 @@ class DriveRollout:
             if reverse and abs(error) > 0.5 * math.pi:
                 error, sign = math.remainder(error + math.pi, 2.0 * math.pi), -1.0
             off = abs(error)
-            turn = math.copysign(min(brake(off, alpha, tick_s), fastest), error)
+            # Held for the step: with the shorter tick the heading would oscillate.
+            turn = math.copysign(min(brake(off, alpha, h), fastest), error)
             wanted = full * share if t < wait_s else full
             wanted = min(wanted, brake(math.hypot(gx - x, gy - y), accel, tick_s))
             wanted = sign * wanted * (1.0 - off / first_rad) if off < first_rad else 0.0

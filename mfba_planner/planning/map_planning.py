@@ -65,7 +65,9 @@ class MapPlanning:
     ) -> None:
         """Start with an empty map, beside the one that is known before the drive."""
         self._params, self._seed = params, seed
-        self._risk = risk.for_turning() if params.turns else risk
+        moving = risk.for_turning() if params.turns else risk
+        self._horizon_s = moving.horizon_s  # for what moves
+        self._risk = replace(moving, horizon_s=risk.horizon_s)
         self._search_m = search_m
         self.map = StaticMap(map_params)
         self._known_map: UnclearedMap | None = None
@@ -134,7 +136,7 @@ class MapPlanning:
         speed = params.speed_mps
         rollout = MapRollout(
             position, obs.pose.yaw + turn, speeds, params, params.robot_radius_m, speed,
-            tick_s, to_go, clearance, circles, self._risk.horizon_s,
+            tick_s, to_go, clearance, circles, self._horizon_s,
         )  # fmt: skip
         last = None
         if last_waypoint is not None:

@@ -169,8 +169,11 @@ class MapRollout:
         found[hit & (first <= paths.arrived)] += FORBIDDEN_M
         return found
 
-    def moving_risk(self, paths: Paths, risk: RiskParams) -> Array:
-        """Risk (m,) of circles that keep their velocities; the formula of TrajectoryCost."""
+    def moving_risk(self, paths: Paths, risk: RiskParams, horizon_s: float | None = None) -> Array:
+        """Risk (m,) of circles that keep their velocities; the formula of TrajectoryCost.
+
+        Within the rollout's own horizon, if no other is given: what moves may need a longer one.
+        """
         m = paths.x.shape[0]
         if self.alone:
             return np.zeros(m)
@@ -179,7 +182,7 @@ class MapRollout:
         ]
         rows = np.concatenate((self._circles, np.array(around)), axis=1)
         cx, cy, vx, vy, r, margin, close = rows.T[:, :, None, None]
-        h, tau = paths.step_s, risk.horizon_s
+        h, tau = paths.step_s, horizon_s or self._horizon_s
         t = np.cumsum(h) - h
         x = cx + vx * t - paths.x[:, :-1]
         y = cy + vy * t - paths.y[:, :-1]
@@ -215,5 +218,6 @@ class MapRollout:
         horizon_s = max(float(paths.driven_s[:, -1].max()), 0.1)
         brief = replace(risk, horizon_s=horizon_s, close_m=0.0, fast_close_s=0.0)
         standing = self.standing_risk(paths, brief, CONTACT_M) >= FORBIDDEN_M
-        found: Array = standing | (self.moving_risk(paths, brief) > 0.0)
+        moving = self.moving_risk(paths, brief, horizon_s) > 0.0
+        found: Array = standing | moving
         return found

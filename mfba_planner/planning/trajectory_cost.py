@@ -17,7 +17,7 @@ from .drive_rollout import DriveRollout
 
 _ROUNDING = 1.0 - 1e-9
 _TINY = 1e-12
-TURNING_MARGIN_M, TURNING_CLOSE = 0.15, 7.0
+TURNING_MARGIN_M, TURNING_CLOSE, TURNING_HORIZON = 0.15, 7.0, 5.0 / 3.0
 SLOW = 0.9  # share of the speed below which a candidate waits
 _Row = tuple[float, float, float, float, float, float, float, float, float, float]
 _by_clearance = itemgetter(0)
@@ -79,10 +79,14 @@ class RiskParams:
     def for_turning(self) -> RiskParams:
         """The weights of a base that cannot step aside when an obstacle beside it turns.
 
-        It passes at a distance, and rather drives on than into the margin.
+        It passes at a distance, rather drives on than into the margin, and looks further ahead:
+        it would flee from who overtakes it until turning aside is too late.
         """
         return replace(
-            self, margin_m=self.margin_m + TURNING_MARGIN_M, close_m=TURNING_CLOSE * self.close_m
+            self,
+            margin_m=self.margin_m + TURNING_MARGIN_M,
+            close_m=TURNING_CLOSE * self.close_m,
+            horizon_s=TURNING_HORIZON * self.horizon_s,
         )
 
 

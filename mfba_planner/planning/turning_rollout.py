@@ -19,7 +19,7 @@ from ..perception.bilinear_grid import BilinearGrid
 from ..perception.distance_field import DistanceField
 from .differential_drive import Speeds
 from .distance_to_go import DistanceToGo
-from .drive_rollout import COARSE_TICKS, LONGEST, REACHED_M
+from .drive_rollout import COARSE_TICKS, LATE_S, LATE_TICKS, LONGEST, REACHED_M
 from .trajectory_cost import SLOW
 
 Array = np.ndarray
@@ -28,7 +28,6 @@ CARROT_M = 0.4  # the base aims so far ahead along the shortest way
 SLOW_ROOM_M, SLOWEST = 0.15, 0.4  # room below which the base slows down, and to what
 TIGHT_M, PIVOT_RAD = 0.04, 0.15  # with so little room it turns in place, to within so much
 FINE_STEPS = 12  # of one tick; then come those of COARSE_TICKS, and of LATE_TICKS after LATE_S
-LATE_S, LATE_TICKS = 3.0, 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from dataclasses import fields
 from typing import TypeVar
 
+from ..core.errors import ConfigError
 from ..core.planner_types import Observation, PathPlanner
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import make_planner
@@ -38,6 +40,7 @@ def episode_generator(
     observe: Observe,
 ) -> Generator[Observation, None, Episode]:
     """run() as a generator: yields the observation before every decision."""
+    _check_robot(scenario, planner)
     world = World(scenario, planner.tick_ns, planner.goal_tolerance_m, seed)
     obs = observe(world, sensor)
     yield obs
@@ -60,6 +63,19 @@ def episode_generator(
     )
 
 
+def _check_robot(scenario: Scenario, planner: PlannerParams) -> None:
+    """Raise ConfigError for a planner that decides for another robot than the scenario's."""
+    own = scenario.planner_params(planner)
+    if own == planner:
+        return
+    for name in (item.name for item in fields(planner)):
+        if (given := getattr(planner, name)) != (value := getattr(own, name)):
+            raise ConfigError(
+                f"planner.{name} {given}: the scenario's robot has {value}; "
+                "take the options from Scenario.planner_params()"
+            )
+
+
 def run(
     scenario: Scenario,
     *,
@@ -76,7 +92,7 @@ def run(
     replaces Algorithm 1 but keeps speed, step length and tolerance of `planner`; observe makes
     its observations.
     """
-    planner = planner or PlannerParams()
+    planner = planner or scenario.planner_params(PlannerParams())
     path_planner = path_planner or supervised_algorithm_1(planner, seed)
     return run_to_end(
         episode_generator(

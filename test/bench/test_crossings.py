@@ -14,7 +14,8 @@ import pytest
 from project import ROOT
 
 from mfba_planner.core.geometry import Point, Pose2D
-from mfba_planner.core.planner_types import Decision, Mode
+from mfba_planner.core.planner_types import NANO, Decision, Mode
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.simulation.episode import Episode, Outcome
@@ -193,6 +194,29 @@ def test_a_passer_by_comes_from_every_side_and_meets_a_straight_driver(
     tracking = replace(straight, planner="predictive", range_m=3.5)
     passed = [crossings.judge((s, tracking, 0)) for s in scenarios[::4]]
     assert passed == [crossings.Ending.CLEAR] * 6
+
+
+@pytest.mark.parametrize(("speed_mps", "number"), [(2.0, 59), (2.5, 32), (2.5, 59)])
+def test_a_differential_base_turns_aside_before_it_is_overtaken(
+    bench: dict[str, ModuleType], speed_mps: float, number: int
+) -> None:
+    crossings, passer_by = bench["crossings"], bench["passer_by"]
+    robot = crossings.Robot(perception="lidar-differential", range_m=3.5)
+    scenario = passer_by.passing(speed_mps, 1.0, number, 60, 0)
+    found = crossings.cross(scenario, robot, number)
+    assert found.planner.drive is Drive.DIFFERENTIAL, "the planner knows its robot"
+    assert crossings.ending(found) is crossings.Ending.CLEAR
+
+
+def test_a_robot_is_given_a_base_for_its_speed(bench: dict[str, ModuleType]) -> None:
+    crossings, passer_by = bench["crossings"], bench["passer_by"]
+    robot = crossings.Robot(perception="lidar-differential", speed_mps=1.2)
+    found = crossings.cross(passer_by.passing(0.2, 1.2, 15, 60, 0), robot, 0)
+    driven = [
+        math.dist(a.pose.position, b.pose.position) / (found.planner.tick_ns * NANO)
+        for a, b in crossings.steps_driven(found)
+    ]
+    assert max(driven) == pytest.approx(1.2)
 
 
 def test_a_view_of_270_degrees_does_not_cover_what_comes_from_behind(

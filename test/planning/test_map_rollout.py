@@ -40,13 +40,13 @@ def rollout(
     yaw: float = 0.0,
     base: Base = OMNI,
     speeds: Speeds = REST,
+    horizon_s: float = RISK.horizon_s,
 ) -> tuple[MapRollout, DistanceToGo]:
     to_go = DistanceToGo(RouteParams(), RADIUS_M)
     to_go.update(1, known, position, goal)
     field = known.distance_field(position, 14.0, 0.05)
     made = MapRollout(
-        position, yaw, speeds, base, RADIUS_M, SPEED, TICK_S, to_go, field, circles,
-        RISK.horizon_s,
+        position, yaw, speeds, base, RADIUS_M, SPEED, TICK_S, to_go, field, circles, horizon_s,
     )  # fmt: skip
     return made, to_go
 
@@ -285,6 +285,18 @@ def test_the_risk_of_what_moves_is_the_one_by_sampling(
             max(sampled_risk(paths, row, circle, RISK, slack), far) for slack in (-1e-6, 0.0, 1e-6)
         ]
         assert 0.97 * min(expected) - 0.01 <= found <= 1.03 * max(expected) + 0.01
+
+
+@pytest.mark.parametrize(("horizon_s", "counts"), [(3.0, False), (5.0, True)])
+def test_what_moves_counts_within_the_horizon_of_the_rollout(
+    horizon_s: float, counts: bool
+) -> None:
+    """Met after 4 s of driving; the 3 s of the weights are for what stands."""
+    crossing = Circle(center_m=(3.2, -2.0), velocity_mps=(0.0, 0.5), radius_m=0.35)
+    for base in (OMNI, TURNS):
+        made, _ = rollout(PointMap(), (9.0, 0.0), crossing, base=base, horizon_s=horizon_s)
+        paths = through(made, (1.0, 0.0))
+        assert (float(made.moving_risk(paths, RISK)[0]) > 0.0) == counts
 
 
 @settings(max_examples=100, deadline=None)

@@ -11,6 +11,7 @@ from trip_samples import post, trip
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.planner_types import Mode, Observation
+from mfba_planner.core.robot_base import Drive
 from mfba_planner.evaluation.metrics import Result, evaluate, tick_clearances
 from mfba_planner.perception.sensory_vector import SensorParams, sense_circles
 from mfba_planner.planning.algorithm_1 import Algorithm1
@@ -19,6 +20,7 @@ from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.episode import Episode, Outcome, stamp_of
 from mfba_planner.simulation.obstacle_motion import Obstacle
 from mfba_planner.simulation.planner_observations import sense
+from mfba_planner.simulation.robot_model import Robot
 from mfba_planner.simulation.run_episode import run
 from mfba_planner.simulation.scenario import Scenario
 from mfba_planner.simulation.world import World, advance
@@ -26,6 +28,27 @@ from mfba_planner.swarm.bat_swarm import Algorithm, BatParams
 
 STRAIGHT = 12.0 * math.sqrt(2.0)  # 16.9706 m
 TASK: dict[str, Any] = {"name": "x", "start_m": (0.0, 0.0), "goal_m": (4.0, 0.0)}
+
+
+# --- the robot ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"robot_radius_m": 0.5}, r"planner.robot_radius_m 0.3: the scenario's robot has 0.5"),
+        (
+            {"robot": Robot(drive=Drive.DIFFERENTIAL)},
+            "planner.drive Drive.OMNIDIRECTIONAL: the scenario's robot has Drive.DIFFERENTIAL",
+        ),
+    ],
+)
+def test_a_planner_for_another_robot_is_refused(change: dict[str, Any], reason: str) -> None:
+    scenario = Scenario(**TASK, **change)
+    with pytest.raises(ConfigError, match=reason):
+        run(scenario, planner=PlannerParams())
+    own = scenario.planner_params(PlannerParams())
+    assert run(scenario, planner=own).ticks == run(scenario).ticks
 
 
 # --- the world --------------------------------------------------------------------------------
