@@ -11,7 +11,9 @@ from collections.abc import Callable
 from importlib import import_module
 from types import FrameType
 
-from mfba_planner.core.errors import MfbaError
+from mfba_planner.core.errors import ConfigError, MfbaError
+from mfba_planner.core.required_packages import missing_packages
+from mfba_planner.core.ros_arguments import split_ros_args
 from mfba_planner.core.standard_streams import open_closed_streams, require_stdout
 
 _PACKAGE = "mfba_planner"
@@ -109,11 +111,16 @@ def _exit_code_of(error: BaseException, program: str, interrupted: int) -> int:
 def _node(name: str) -> int:
     """Run a node, which ends with 0 on SIGINT and SIGTERM; its runtime handles both."""
     _start(on_sigint=0, on_sigterm=0)
-    code = run_and_return_exit_code(
-        lambda: int(import_module(f"mfba_planner.ros.nodes.{name}").main(sys.argv[1:])),
-        name,
-        interrupted=0,
-    )
+
+    def run() -> int:
+        if name != "replay":  # which has arguments of its own
+            own, _ = split_ros_args(sys.argv[1:])
+            import_module("mfba_planner.ros.node_help").check_arguments(name, own)
+        if name == "planner" and (missing := missing_packages(["eikonalfm"])):
+            raise ConfigError(missing)  # imported among walls only: too late on a robot
+        return int(import_module(f"mfba_planner.ros.nodes.{name}").main(sys.argv[1:]))
+
+    code = run_and_return_exit_code(run, name, interrupted=0)
     for signum in (signal.SIGINT, signal.SIGTERM):
         # A late signal must not change the exit code while the interpreter ends.
         signal.signal(signum, signal.SIG_IGN)
@@ -128,6 +135,8 @@ def _command(name: str, module: str) -> int:
 
     def run() -> int:
         require_stdout()
+        if missing := missing_packages():
+            raise ConfigError(missing)
         main = import_module(module).main
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, _unwind)
@@ -167,6 +176,8 @@ def _one_line(error: BaseException) -> str | None:
         name = error.filename or "output"
         return f"{name}: {error.strerror}; {_REMEDIES[error.errno]}"
     if isinstance(error, ImportError) and not (error.name or _PACKAGE).startswith(_PACKAGE):
+        if missing := missing_packages():
+            return missing
         return f"{error}; {_INSTALL}"
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
         return f"{error.object}: not UTF-8, as ROS 2 needs; rename that file or directory"

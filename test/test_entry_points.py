@@ -3,6 +3,7 @@
 
 import errno
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 from project import ROOT
 
 from mfba_planner.core.errors import BagError
+from mfba_planner.core.required_packages import REQUIRED
 from mfba_planner.entry_points import run_and_return_exit_code
 
 
@@ -235,3 +237,38 @@ def test_a_node_without_ros_fails_in_one_line(before: str, line: str) -> None:
     assert err.startswith(line)
     assert len(err.splitlines()) == 1
     assert "; " in err  # followed by a remedy
+
+
+HIDE = """
+from importlib.machinery import PathFinder
+found = PathFinder.find_spec
+PathFinder.find_spec = lambda name, *rest: None if name in HIDDEN else found(name, *rest)
+"""
+
+
+@pytest.mark.parametrize("program", ["mfba", "launcher"])
+def test_missing_packages_are_named_together_before_anything_else(program: str) -> None:
+    code = f"HIDDEN = ('rich', 'matplotlib', 'scipy')\n{HIDE}\nsys.argv[1:] = ['case1']\n"
+    expected = (
+        f"{program}: not installed: matplotlib, rich, scipy; run pip install matplotlib rich "
+        "scipy\n"
+    )
+    assert outcome(start(f"{code}sys.exit(entry_points.{program}())")) == (1, "", expected)
+
+
+def test_a_node_names_missing_packages_only_where_it_needs_one() -> None:
+    code = f"HIDDEN = ('rich', 'eikonalfm', 'yaml')\n{HIDE}\nsys.argv[1:] = ['--help']\n"
+    returncode, out, err = outcome(start(f"{code}sys.exit(entry_points.recorder())"))
+    assert (returncode, err) == (0, "")
+    assert out is not None
+    assert out.startswith("usage: recorder")
+    code = f"HIDDEN = ('rich', 'eikonalfm')\n{HIDE}\n"
+    expected = "planner: not installed: eikonalfm, rich; run pip install eikonalfm rich\n"
+    code += "sys.argv[1:] = []\n"
+    assert outcome(start(f"{code}sys.exit(entry_points.planner())")) == (1, "", expected)
+
+
+def test_what_is_required_is_what_setup_installs() -> None:
+    text = (ROOT / "setup.py").read_text(encoding="utf-8")
+    block = text[text.index("install_requires=[") : text.index("extras_require")]
+    assert set(re.findall(r'"([\w-]+)[<>=]', block)) == set(REQUIRED.values())

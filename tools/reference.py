@@ -24,14 +24,11 @@ from reference_text import PARAMETERS_TEXT, SERVICES, SERVICES_TEXT, TOPICS_TEXT
 
 from mfba_planner import cli
 from mfba_planner.core.option_specs import walk
-from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.planner_factory import DEFAULT_METHOD
-from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive_planner import preset
-from mfba_planner.ros import node_settings
+from mfba_planner.ros import node_help
 from mfba_planner.ros.interface import topics
 from mfba_planner.scenarios import yaml_schema
-from mfba_planner.simulation.robot_model import Robot
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES_FOLDER = ROOT / "docs/reference"
@@ -50,15 +47,7 @@ ROBOT: dict[str, dict[str, Any]] = {
         "recovery.enabled": True,
     },
 }
-NODES: dict[str, tuple[Any, ...]] = {
-    "planner": (node_settings.PlannerSettings(), PlannerParams()),
-    "virtual_sensor": (node_settings.VirtualSensorSettings(), SensorParams()),
-    "world_sim": (
-        node_settings.WorldSimSettings(),
-        node_settings.RobotParameters(robot=Robot()),
-    ),
-    "recorder": (node_settings.RecorderSettings(),),
-}
+NODES = node_help.PARAMETERS
 
 
 def topics_page() -> str:
@@ -70,7 +59,7 @@ def topic_table() -> str:
     """Every topic: name, type, publishers, subscribers, QoS."""
     rows = []
     for topic in topics.GRAPH:
-        if topic is topics.TF:
+        if topic in topics.TRANSFORMS:
             continue  # only where tf2_msgs is installed: mentioned in TOPICS_TEXT
         package = topic.type.__module__.split(".")[0]
         latched = topic.qos.durability.short_key == "transient_local"

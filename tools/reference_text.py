@@ -9,9 +9,9 @@ YAML_HEAD = """\
 # edit the copy and pass it as params_file:=FILE. `ros2 param set` changes the parameters of the
 # algorithm while the node runs.
 #
-# Check first: robot_radius_m, scan_yaw, input_timeout_s and odom_frame, which stand once, for both
-# nodes; drive and speed_mps of planner. The robot stops when an input is older than
-# input_timeout_s: set it to at least twice the period of the slower of scan and odom.
+# Check first: robot_radius_m, scan_x to scan_extrinsics, input_timeout_s and odom_frame, which
+# stand once, for both nodes; drive and speed_mps of planner. The robot stops when an input is
+# older than input_timeout_s: set it to at least twice the period of the slower of scan and odom.
 """
 
 TOPICS_TEXT = """\
@@ -24,8 +24,9 @@ Nodes: `world_sim` (the simulated world), `virtual_sensor` (sensory vector, eq. 
 In a fleet each robot has the topics of one robot below its own name (`robot0/odom`).
 
 **Frames** (REP-105, REP-103). Poses are in `odom`, velocities in `base_link`; the parameters
-`odom_frame` and `base_frame` change these names. `world_sim` also publishes `/tf` (`odom` to
-`base_link`) where `tf2_msgs` is installed.
+`odom_frame` and `base_frame` change these names. Where `tf2_msgs` is installed, `world_sim` also
+publishes `/tf` (`odom` to `base_link`) and `/tf_static` (`base_link` to `base_scan`), and
+`virtual_sensor` and `planner` read both (parameter `scan_extrinsics`).
 
 **Sectors.** Sector 1 starts at +x of the odom frame. Sectors count counter-clockwise and do not
 turn with the robot. `sectors` is the sensory vector with a stamp: one beam per sector, the range

@@ -21,7 +21,8 @@ Ranges = tuple[float, ...]
 class Scan:
     """A planar laser scan: beam k points along angle_min_rad + k * angle_increment_rad.
 
-    It was measured k * time_increment_s after the stamp; 0: all beams at once.
+    It was measured k * time_increment_s after the stamp; 0: all beams at once. Its beams begin at
+    origin_m, seen from the robot, in a frame aligned with that of the angles.
     """
 
     ranges_m: np.ndarray
@@ -30,6 +31,11 @@ class Scan:
     range_min_m: float
     range_max_m: float
     time_increment_s: float = 0.0
+    origin_m: Point = (0.0, 0.0)
+
+    def taken_from(self, pose: Pose2D) -> Pose2D:
+        """Where the beams begin, of a scan aligned with odom and a robot at this pose."""
+        return Pose2D(pose.x + self.origin_m[0], pose.y + self.origin_m[1], pose.yaw)
 
 
 class Mode(Enum):

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.events.process import ProcessExited
 from launch.launch_context import LaunchContext
 from launch.launch_description import LaunchDescription
 from launch.substitutions import LaunchConfiguration
@@ -21,7 +23,10 @@ def make_description(
     arguments: Mapping[str, LaunchArgument],
     node_starts: Callable[[Mapping[str, str]], list[NodeStart]],
 ) -> LaunchDescription:
-    """Declare the arguments and start the nodes; when one node ends, all are shut down."""
+    """Declare the arguments and start the nodes; when one node ends, all are shut down.
+
+    `ros2 launch` then returns 0, but 1 where that node ended with an error.
+    """
     declared = [
         DeclareLaunchArgument(
             name,
@@ -51,8 +56,15 @@ def _node(start: NodeStart, namespace: str) -> Node:
         parameters=[_keep_strings(start.parameters), *start.files],
         remappings=list(start.remaps),
         arguments=list(start.arguments),
-        on_exit=Shutdown(reason=f"{start.name} has ended"),
+        on_exit=partial(_on_exit, start.name),
     )
+
+
+def _on_exit(name: str, event: ProcessExited, context: LaunchContext) -> list[Shutdown]:
+    """Shut down. RuntimeError, after which `launch` does so and returns 1, for a failed node."""
+    if event.returncode and not context.is_shutdown:
+        raise RuntimeError(f"{name} ended with exit code {event.returncode}; see above")
+    return [Shutdown(reason=f"{name} has ended")]
 
 
 def _keep_strings(parameters: dict[str, Any]) -> dict[str, Any]:

@@ -82,6 +82,7 @@ REPLAY_ARGUMENTS = {
         "false", "start a planner that decides from the bag's odom and sectors", TRUE_OR_FALSE
     ),
     "params_file": LaunchArgument("", "a --params-file of that planner; empty: its defaults"),
+    "namespace": LaunchArgument("", "namespace of that planner, as of its topics in the bag"),
 }
 
 

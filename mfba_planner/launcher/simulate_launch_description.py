@@ -59,6 +59,7 @@ ARGUMENTS = {
     "speed_factor": LaunchArgument("1.0", "simulated seconds per wall second, in real time"),
     "record": LaunchArgument("false", "write a bag", _TRUE_OR_FALSE),
     "bag": LaunchArgument("", "bag directory to create; empty: a new one below ./runs"),
+    "namespace": LaunchArgument("", "namespace of all nodes and their topics"),
     "params_file": LaunchArgument(
         "", "a --params-file for all nodes; it overrides the other arguments"
     ),

@@ -7,12 +7,14 @@ import math
 
 import numpy as np
 
+from ..core.geometry import Point, rotated
 from ..core.planner_types import NANO, Scan
 
 TWO_PI = 2.0 * math.pi
 WIDEST_BEAM_RAD = math.radians(31.0)  # of 12 beams; fewer beams leave directions between them
 BODY_RAD = math.radians(60.0)
 NARROW_RAD = math.radians(15.0)
+_RING_M = 1.0  # from the robot: there it is judged which directions an offset lidar covers
 _WITHIN = 1.0 - 1e-6  # a beam in the middle of a sector does not touch the next one
 
 
@@ -36,15 +38,35 @@ def covered_sectors(scan: Scan, known: np.ndarray, sectors: int, first_rad: floa
     """Whether a known beam covers part of each of n equal sectors, the first from first_rad; (n,).
 
     A beam covers half the angle to its neighbours on both sides, at most half of WIDEST_BEAM_RAD.
+    Sectors are those around the robot; beams may begin beside it (Scan.origin_m).
     """
     width = TWO_PI / sectors
     half = 0.5 * min(abs(scan.angle_increment_rad), WIDEST_BEAM_RAD) * _WITHIN
     beams = np.flatnonzero(known)
     angles = scan.angle_min_rad + scan.angle_increment_rad * beams - first_rad
+    is_beside = scan.origin_m != (0.0, 0.0)
+    samples = (1 + is_beside) * math.ceil(2.0 * half / width)  # seen from beside, beams spread
     covered = np.zeros(sectors, dtype=bool)
-    for offset in np.linspace(-half, half, 2 + math.ceil(2.0 * half / width)):
-        covered[np.floor((angles + offset) / width).astype(np.int64) % sectors] = True
+    for offset in np.linspace(-half, half, 2 + samples):
+        directions = angles + offset
+        if is_beside:
+            directions = _from_robot(directions, rotated(scan.origin_m, -first_rad))
+        covered[np.floor(directions / width).astype(np.int64) % sectors] = True
     return covered
+
+
+def _from_robot(angles: np.ndarray, origin: Point) -> np.ndarray:
+    """Directions, from the robot, of where beams (n,) from an origin beside it reach the ring."""
+    ox, oy = origin
+    square = ox * ox + oy * oy
+    ring = max(_RING_M * _RING_M, 4.0 * square)
+    found = []
+    for angle in angles.tolist():  # math: every machine rounds alike
+        c, s = math.cos(angle), math.sin(angle)
+        along = ox * c + oy * s
+        length = math.sqrt(along * along + ring - square) - along
+        found.append(math.atan2(oy + length * s, ox + length * c))
+    return np.array(found)
 
 
 class ScanCoverage:

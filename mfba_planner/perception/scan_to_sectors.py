@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.geometry import rotated
+from ..core.lidar_extrinsics import CENTRED, LidarExtrinsics
 from ..core.planner_types import Ranges, Scan
 from .scan_coverage import covered_sectors, covers_a_full_turn, usable_beams
 from .sensory_vector import SensorParams, mark_sectors, single_precision
@@ -17,20 +19,46 @@ from .sensory_vector import SensorParams, mark_sectors, single_precision
 FULL_TURN_RAD = 1.01 * 2.0 * math.pi
 
 
-def aligned(scan: Scan, yaw_rad: float) -> Scan:
-    """The scan in a frame in which the scan's own frame has the yaw yaw_rad."""
-    return replace(scan, angle_min_rad=scan.angle_min_rad + yaw_rad)
+def aligned(scan: Scan, yaw_rad: float, extrinsics: LidarExtrinsics = CENTRED) -> Scan:
+    """The scan in a frame aligned with odom, in which the robot has the yaw yaw_rad."""
+    scan = _upright(scan, extrinsics)
+    return replace(
+        scan,
+        angle_min_rad=scan.angle_min_rad + (yaw_rad + extrinsics.yaw_rad),
+        origin_m=rotated(extrinsics.offset_m, yaw_rad),
+    )
 
 
-def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: SensorParams) -> Ranges:
+def _upright(scan: Scan, extrinsics: LidarExtrinsics) -> Scan:
+    """The scan as seen from above; its beams keep their sequence, which is that of their times."""
+    if not extrinsics.flipped:
+        return scan
+    first, step = -scan.angle_min_rad, -scan.angle_increment_rad
+    return replace(scan, angle_min_rad=first, angle_increment_rad=step)
+
+
+def sense_scan(
+    scan: Scan,
+    yaw_rad: float,
+    robot_radius_m: float,
+    params: SensorParams,
+    extrinsics: LidarExtrinsics = CENTRED,
+) -> Ranges:
     """Range per sector from a laser scan; every return is a point enlarged by the robot.
 
-    yaw_rad is the yaw of the scan's frame in the sectors' frame. As in REP-117, +inf is free
+    yaw_rad is the yaw of the robot in the sectors' frame. As in REP-117, +inf is free
     space and -inf an obstacle nearer than range_min (taken at range_min); NaN and values outside
     [range_min, range_max] tell nothing. A sector that no beam covers reads 0.0: it is not known
     to be free. Raises InputError for a scan without any usable beam or with unusable geometry.
     """
-    geometry = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m, yaw_rad)
+    scan, yaw_rad = _upright(scan, extrinsics), yaw_rad + extrinsics.yaw_rad
+    geometry = (
+        scan.angle_min_rad,
+        scan.angle_increment_rad,
+        scan.range_min_m,
+        yaw_rad,
+        *extrinsics.offset_m,
+    )
     if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:
         raise InputError(
             f"scan geometry angle_min={scan.angle_min_rad}, increment={scan.angle_increment_rad},"
@@ -52,12 +80,20 @@ def sense_scan(scan: Scan, yaw_rad: float, robot_radius_m: float, params: Sensor
         )
     hits = known & ~np.isposinf(r)
     d = np.where(near, scan.range_min_m, r)
-    hits &= np.where(hits, d, np.inf) - robot_radius_m <= params.sensing_range_m
+    ox, oy = rotated(extrinsics.offset_m, yaw_rad - extrinsics.yaw_rad)
+    reach_m = params.sensing_range_m + math.sqrt(ox * ox + oy * oy)
+    hits &= np.where(hits, d, np.inf) - robot_radius_m <= reach_m
     angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hits) + yaw_rad
     ranges = [math.inf] * params.sectors
     for distance_m, angle in zip(d[hits].tolist(), angles.tolist()):
+        if ox or oy:
+            x, y = ox + distance_m * math.cos(angle), oy + distance_m * math.sin(angle)
+            distance_m, angle = math.sqrt(x * x + y * y), math.atan2(y, x)
+            if distance_m - robot_radius_m > params.sensing_range_m:
+                continue
         mark_sectors(ranges, distance_m, robot_radius_m, angle)
     if not covers_a_full_turn(scan, known):
-        for sector in np.flatnonzero(~covered_sectors(scan, known, params.sectors, -yaw_rad)):
+        placed = replace(scan, origin_m=rotated(extrinsics.offset_m, -extrinsics.yaw_rad))
+        for sector in np.flatnonzero(~covered_sectors(placed, known, params.sectors, -yaw_rad)):
             ranges[sector] = 0.0
     return single_precision(ranges)

@@ -109,7 +109,7 @@ class BasePlanner:
             return Event.INVALID, f"refused input: none of {', '.join(self.inputs)}"
         if obs.scan is None or self._perception(obs) != "scan":
             return None
-        fault = too_fast_for_lidar(self.params, obs.scan.range_max_m)
+        fault = too_fast_for_lidar(self.params, obs.scan.range_max_m, obs.scan.origin_m)
         return (Event.INVALID, f"refused input: {fault}") if fault else None
 
     def straight(self, position: Point, target: Point, speed_mps: float) -> Point:

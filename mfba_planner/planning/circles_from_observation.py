@@ -34,7 +34,7 @@ class CirclesFromObservation:
             return predicted_circles(obs.circles, age_s) if age_s else obs.circles
         if obs.scan is None:
             return ()
-        self._tracker.update(stamp_ns, pose, obs.scan)
+        self._tracker.update(stamp_ns, obs.scan.taken_from(pose), obs.scan)
         return self._tracker.circles(obs.pose_ns, self._radius_m)
 
 

@@ -326,6 +326,7 @@ class Predictive(BasePlanner):
             known = self._memory.update(stamp_ns, pose.position, reach_m, obs.circles)
             return predicted_circles(known, (obs.pose_ns - stamp_ns) * NANO)
         if obs.scan is not None:
+            pose = obs.scan.taken_from(pose)
             self.tracker.update(stamp_ns, pose, obs.scan)
             self._coverage.update(stamp_ns, obs.scan)
             self._map_planning.update(stamp_ns, pose, self.tracker)

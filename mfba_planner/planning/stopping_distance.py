@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 
+from ..core.geometry import Point, distance
 from ..core.planner_types import NANO
 from .planner_params import PlannerParams
 
@@ -26,13 +27,19 @@ def _braking_m(params: PlannerParams) -> float:
     return 0.5 * speed_mps * speed_mps / params.max_accel_mps2 if params.turns else 0.0
 
 
-def too_fast_for_lidar(params: PlannerParams, range_max_m: float) -> str:
-    """Why the robot does not stop within a lidar's range, with the remedy; "" if it does."""
-    radius_m = params.robot_radius_m
+def too_fast_for_lidar(
+    params: PlannerParams, range_max_m: float, origin_m: Point = (0.0, 0.0)
+) -> str:
+    """Why the robot does not stop within a lidar's range, with the remedy; "" if it does.
+
+    Of a lidar beside the robot's centre the range counts from there on its other side.
+    """
+    offset_m = distance(origin_m, (0.0, 0.0))
+    radius_m, range_max_m = params.robot_radius_m, range_max_m - offset_m
     fault = _too_fast(params, range_max_m - radius_m)
     if not fault:
         return ""
-    farther_m = _up(radius_m + stopping_distance_m(params))
+    farther_m = _up(radius_m + offset_m + stopping_distance_m(params))
     observed = f"the lidar's range of {range_max_m:g} m less robot_radius_m={radius_m:g}"
     return (
         f"{fault}: {observed}; {_slower(params, range_max_m - radius_m)}a lidar of {farther_m:g} m"

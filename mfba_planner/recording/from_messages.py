@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from ..core.errors import FrameError, InputError
 from ..core.geometry import Point, Pose2D, rotated, yaw_from_quaternion
+from ..core.lidar_extrinsics import LidarExtrinsics
 from ..core.planner_types import Decision, Mode, Ranges, RefusalReason, Scan
 from ..core.robot_base import Base
 from ..perception.known_map import KnownMap, check_cells, known_map
@@ -22,6 +23,8 @@ from ..perception.no_return import NoReturn, rep_117
 from ..perception.occupancy_grid import OccupancyGrid
 from ..perception.sensory_vector import blind
 from ..planning.differential_drive import command
+from .planar_poses import plane_pose
+from .transform_tree import TransformTree, frame_name
 
 SECOND_NS = 1_000_000_000
 LONGEST_SCAN_S = 10.0  # from first to last beam
@@ -79,7 +82,7 @@ def pose2d(pose: Any, what: str) -> Pose2D:
 def require_frame(message: Any, frame: str, what: str, parameter: str = "odom_frame") -> None:
     """Raise FrameError for a message in another frame; an empty frame accepts any."""
     given = message.header.frame_id
-    if frame and given != frame:
+    if frame and frame_name(given) != frame_name(frame):
         raise FrameError(
             f"{what} is in frame {given!r}, not {frame!r}; transform it, or set {parameter}"
         )
@@ -91,29 +94,59 @@ def robot_pose(odometry: Any, frame: str = "") -> Pose2D:
     return pose2d(odometry.pose.pose, "odom")
 
 
-def goal_point(pose_stamped: Any, frame: str = "", what: str = "goal_pose") -> Point:
+def goal_point(
+    pose_stamped: Any,
+    frame: str = "",
+    what: str = "goal_pose",
+    tree: TransformTree | None = None,
+) -> Point:
     """geometry_msgs/PoseStamped to the goal position; its orientation is not used.
 
-    An empty frame_id is accepted. Raises InputError for NaN, inf or another frame.
+    An empty frame_id is accepted, and with a tree one that it connects with the frame. Raises
+    InputError for NaN or inf, and FrameError for another frame.
     """
-    if pose_stamped.header.frame_id:
+    position = _position(f"{what} position", pose_stamped.pose.position)
+    given = frame_name(pose_stamped.header.frame_id)
+    if not (given and frame) or given == frame_name(frame):
+        return position
+    if tree is None:
         require_frame(pose_stamped, frame, what)
-    return _position(f"{what} position", pose_stamped.pose.position)
+    try:
+        pose = plane_pose(tree or TransformTree(), given, frame)
+    except FrameError:
+        raise FrameError(
+            f"{what} is in frame {given!r}, not {frame!r}, and no tf gives the one in the other; "
+            f"start the localization that publishes it, or send {what} in {frame!r}"
+        ) from None
+    dx, dy = rotated(position, pose.yaw)
+    return (pose.x + dx, pose.y + dy)
 
 
-def waypoint_points(path: Any, frame: str = "") -> tuple[Point, ...]:
+def waypoint_points(
+    path: Any, frame: str = "", tree: TransformTree | None = None
+) -> tuple[Point, ...]:
     """nav_msgs/Path to a sequence of goals; InputError for no pose, NaN, inf or another frame.
 
-    A pose without frame_id is in the frame of the path.
+    A pose without frame_id is in the frame of the path. Raises InputError as goal_point().
     """
-    if path.header.frame_id:
-        require_frame(path, frame, "waypoints")
     if not path.poses:
         raise InputError("waypoints are empty; give at least one, or call planner/cancel")
     return tuple(
-        goal_point(pose, frame, f"waypoint {number}")
+        goal_point(
+            pose if pose.header.frame_id else _In(path.header, pose.pose),
+            frame,
+            f"waypoint {number}",
+            tree,
+        )
         for number, pose in enumerate(path.poses, start=1)
     )
+
+
+class _In(NamedTuple):
+    """A pose with the header of its path, as a PoseStamped."""
+
+    header: Any
+    pose: Any
 
 
 def obstacle_centers(pose_array: Any) -> list[Point]:
@@ -141,12 +174,13 @@ def sector_ranges(laser_scan: Any, frame: str = "") -> Ranges:
 
 
 def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF) -> Scan:
-    """sensor_msgs/LaserScan to a Scan; beams that turn clockwise are put in reverse sequence.
+    """sensor_msgs/LaserScan to a Scan.
 
-    Raises FrameError for another frame, and InputError where the fields contradict each other.
-    perception.scan_to_sectors.sense_scan checks the ranges. As some drivers leave angle_max at
-    0 or one increment too far, it is only compared roughly, and not where both limits are 0.
-    no_return is the range by which the driver reports that nothing is there.
+    Beams that turn clockwise are put in reverse sequence, unless it is that of their times: then
+    the increment is below 0. no_return is the range by which the driver reports that nothing is
+    there. Raises FrameError for another frame, and InputError where the fields contradict each
+    other; perception.scan_to_sectors.sense_scan checks the ranges. As some drivers leave angle_max
+    at 0 or one increment too far, it is only compared roughly, and not where both limits are 0.
     """
     require_frame(message, frame, "scan", "scan_frame")
     count, increment = len(message.ranges), message.angle_increment
@@ -178,7 +212,7 @@ def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF
             f"{LONGEST_SCAN_S:g} s in all; check the lidar driver"
         )
     ranges = rep_117(message.ranges, message.range_max, no_return)
-    if increment < 0.0:
+    if increment < 0.0 and not time_s:
         first, increment, ranges = first + (count - 1) * increment, -increment, ranges[::-1]
     return Scan(
         ranges_m=ranges,
@@ -272,6 +306,23 @@ def scan_timing(diagnostics: Any) -> tuple[int | None, Pose2D | None]:
         return int(stamp), Pose2D(x, y, yaw)
     except ValueError as error:
         raise InputError(f"planner/decision: malformed {error}; was it edited?") from None
+
+
+def extrinsics_fields(extrinsics: LidarExtrinsics) -> dict[str, str]:
+    """Key of planner/decision for a scan whose lidar is mounted as tf says."""
+    return {"scan_extrinsics": ",".join(repr(float(value)) for value in extrinsics)}
+
+
+def extrinsics_in(diagnostics: Any) -> LidarExtrinsics | None:
+    """Inverse of extrinsics_fields, None without it. InputError if malformed."""
+    text = decision_field(diagnostics, "scan_extrinsics")
+    if not text:
+        return None
+    try:
+        x, y, yaw, flipped = map(float, text.split(","))
+    except ValueError as error:
+        raise InputError(f"planner/decision: malformed {error}; was it edited?") from None
+    return LidarExtrinsics(x, y, yaw, bool(flipped))
 
 
 def decision(diagnostics: Any, ranges_m: Ranges) -> Decision:

@@ -67,4 +67,4 @@ def returns_of(scan: Scan, pose: Pose2D) -> np.ndarray:
     hit = np.isfinite(ranges) & (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)
     angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hit)
     points = np.column_stack((np.cos(angles), np.sin(angles))) * ranges[hit, None]
-    return (points + pose.position).astype(np.float32)
+    return (points + scan.taken_from(pose).position).astype(np.float32)

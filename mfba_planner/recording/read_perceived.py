@@ -35,6 +35,7 @@ def read_perceived(
                 scan = laser_scan(message.message)
             except InputError as error:
                 raise BagError(f"{reader.path}: {robot_topic(robot, SCAN)}: {error}") from None
-            yaw = pose.yaw + episodes[robot].scenario.robot.lidar.yaw_rad
-            found[robot].add(Perceived(stamp, returns_of(aligned(scan, yaw), pose)))
+            extrinsics = episodes[robot].scenario.robot.lidar.extrinsics
+            points = returns_of(aligned(scan, pose.yaw, extrinsics), pose)
+            found[robot].add(Perceived(stamp, points))
     return {name: tuple(choice.items) for name, choice in found.items()}

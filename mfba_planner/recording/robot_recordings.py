@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from ..core.errors import BagError, InputError
 from ..core.geometry import Point, Pose2D
+from ..core.lidar_extrinsics import LidarExtrinsics
 from ..core.option_specs import flatten, override
 from ..core.robot_base import Base
 from ..perception.no_return import NoReturn
@@ -20,7 +21,7 @@ from ..simulation.scenario import Scenario
 from .bag_reader import BagReader
 from .decisions_with_sectors import DECISION, require_decisions
 from .fleet_topics import NO_NAMESPACE, messages_by_robot
-from .from_messages import decision
+from .from_messages import decision, extrinsics_in
 from .run_setup import Setup
 
 T = TypeVar("T")
@@ -36,6 +37,7 @@ class Trip(NamedTuple):
     goal: Point
     first_ns: int
     last_ns: int
+    extrinsics: LidarExtrinsics | None = None  # of the lidar, where the decisions say it
 
 
 def robot_setups(
@@ -73,8 +75,9 @@ def _setup(
             reader.path.stem if robot == NO_NAMESPACE else robot,
             trip,
             planner,
-            Lidar(
-                beams=DEFAULT_BEAMS if has_lidar else 0, yaw_rad=float(given.get("scan_yaw", 0.0))
+            lidar_of(
+                trip.extrinsics or LidarExtrinsics.of_parameters(given),
+                DEFAULT_BEAMS if has_lidar else 0,
             ),
         ),
         sensor=_options(SensorParams(), sensing),
@@ -87,6 +90,17 @@ def _setup(
         scan_no_return=NoReturn(sensing.get("scan_no_return", NoReturn.INF.value)),
         is_simulated=False,
         start_ns=None if lockstep else trip.first_ns,
+    )
+
+
+def lidar_of(extrinsics: LidarExtrinsics, beams: int = DEFAULT_BEAMS) -> Lidar:
+    """A lidar with these extrinsics, else as any."""
+    return Lidar(
+        beams=beams,
+        x_m=extrinsics.x_m,
+        y_m=extrinsics.y_m,
+        yaw_rad=extrinsics.yaw_rad,
+        flipped=extrinsics.flipped,
     )
 
 
@@ -113,10 +127,12 @@ def read_trip(reader: BagReader, robot: str) -> Trip:
     """The trip of a robot: its first pose, and its last goal. Raises BagError."""
     start: Pose2D | None = None
     goal: Point | None = None
+    extrinsics: LidarExtrinsics | None = None
     first_ns = last_ns = 0
     for _, message in messages_by_robot(reader, [robot], [DECISION]):
         try:
             found = decision(message.message, ())
+            extrinsics = extrinsics or extrinsics_in(message.message)
         except InputError as error:
             raise BagError(f"{reader.path}: {error}") from None
         if start is None and all(map(math.isfinite, found.pose)):
@@ -124,7 +140,7 @@ def read_trip(reader: BagReader, robot: str) -> Trip:
         goal = found.goal or goal
         first_ns, last_ns = first_ns or found.stamp_ns, found.stamp_ns
     start = start or Pose2D(0.0, 0.0)
-    return Trip(start, apart(start, goal), first_ns, last_ns)
+    return Trip(start, apart(start, goal), first_ns, last_ns, extrinsics)
 
 
 def apart(start: Pose2D, goal: Point | None) -> Point:

@@ -45,11 +45,12 @@ def read_setups(reader: BagReader, given: Nodes | None = None) -> Setups:
     nodes: Any = configuration.get("nodes", {})
     facts: Any = configuration.get("run", {})
     try:
-        if WORLD_SIM not in nodes:
+        above = _namespace_of_world(nodes)
+        if above is None:
             setups = robot_setups(reader, nodes, facts)
             first = next(iter(setups.values()))
             return Setups(first.scenario, first.seed, setups)
-        world = nodes[WORLD_SIM]
+        world = nodes[above + WORLD_SIM]
         facts = configuration["run"]
         scenario = load_scenario(world["scenario_json"])
         names = scenario.robot_names
@@ -57,7 +58,8 @@ def read_setups(reader: BagReader, given: Nodes | None = None) -> Setups:
         run = after_triggers(scenario, recorded_moments(reader, names, world["tick_ns"]))
         worlds = scenarios_with_others(run, starts, world["tick_ns"]) if names else [run]
         setups = {}
-        for name, robot_scenario in zip(names or (NO_NAMESPACE,), worlds):
+        for member, robot_scenario in zip(names or (NO_NAMESPACE,), worlds):
+            name = f"{above}{member}".strip("/")
             prefix = f"{name}/" if name else ""
             planner, sensor = (nodes[prefix + node] for node in ("planner", "virtual_sensor"))
             setups[name] = Setup(
@@ -79,6 +81,13 @@ def read_setups(reader: BagReader, given: Nodes | None = None) -> Setups:
         raise BagError(
             f"{reader.path}: its configuration lacks {error}; record with `mfba run`"
         ) from None
+
+
+def _namespace_of_world(nodes: Nodes) -> str | None:
+    """The namespace of world_sim, as "" or "NAME/"; None without it."""
+    ends = (name.strip("/").rpartition(WORLD_SIM) for name in nodes)
+    spaces = [above for above, node, below in ends if node and not below]
+    return next((above for above in spaces if not above or above.endswith("/")), None)
 
 
 def read_setup(reader: BagReader) -> Setup:

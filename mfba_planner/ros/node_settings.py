@@ -19,8 +19,25 @@ _WAIT_FOR = "names of the nodes that ~/ready waits for, separated by commas"
 _WORLD_WAITS_FOR = f"{_WAIT_FOR}; tick 0 waits too, unless ~/pause (false) starts it"
 _NO_RETURN = "the range by which the lidar reports that nothing is there; inf: REP-117"
 _DIAGNOSTICS = "period of /diagnostics"
-_SCAN_FRAME = "frame that scans must be in, that of scan_yaw; empty: any"
+_SCAN_FRAME = "frame that scans must be in; empty: any"
+_BASE_FRAME = "frame of the robot (REP-105), where the odometry names none"
+_SCAN_X = "where the lidar is on the robot, ahead of base_frame"
+_SCAN_Y = "where the lidar is on the robot, to the left of base_frame"
+_SCAN_YAW = "yaw of the scan's frame in base_frame"
+_SCAN_FLIPPED = "the lidar is mounted upside down"
+_SCAN_EXTRINSICS = (
+    "where the pose of the lidar on the robot is from; auto: scan_x, scan_y, scan_yaw and "
+    "scan_flipped if one of them is set, else tf where it is published"
+)
 _HARDWARE = "hardware_id of /diagnostics, to tell robots apart"
+
+
+class ExtrinsicsSource(Enum):
+    """Where the pose of the lidar on the robot is from."""
+
+    AUTO = "auto"
+    PARAMETERS = "parameters"
+    TF = "tf"
 
 
 class Source(Enum):
@@ -105,13 +122,16 @@ class VirtualSensorSettings:
         "",
         "walls beside obstacles, [[x0, y0, x1, y1], ...] in odom_frame; a scan has its own",
     )
-    scan_yaw: float = option(
-        0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
-    )
+    scan_x: float = option(0.0, _SCAN_X, unit="m", minimum=-10.0, maximum=10.0)
+    scan_y: float = option(0.0, _SCAN_Y, unit="m", minimum=-10.0, maximum=10.0)
+    scan_yaw: float = option(0.0, _SCAN_YAW, unit="rad", minimum=-6.4, maximum=6.4)
+    scan_flipped: bool = option(False, _SCAN_FLIPPED)
+    scan_extrinsics: ExtrinsicsSource = option(ExtrinsicsSource.AUTO, _SCAN_EXTRINSICS)
     scan_frame: str = option("", _SCAN_FRAME)
     scan_no_return: NoReturn = option(NoReturn.INF, _NO_RETURN)
     lockstep: bool = option(False, "pair odom with scan by stamp; false: newest odom")
     odom_frame: str = option("odom", "frame the sectors are aligned with")
+    base_frame: str = option("base_link", _BASE_FRAME)
     input_timeout_s: float = option(
         1.0,
         "age at which odometry, sectors or scan are stale, since their arrival or by their stamps",
@@ -143,9 +163,11 @@ class PlannerSettings:
     map_period_s: float = option(
         1.0, "least time between two local_map; 0: none", unit="s", minimum=0.0, maximum=3600.0
     )
-    scan_yaw: float = option(
-        0.0, "yaw of the scan's frame in base_frame", unit="rad", minimum=-6.4, maximum=6.4
-    )
+    scan_x: float = option(0.0, _SCAN_X, unit="m", minimum=-10.0, maximum=10.0)
+    scan_y: float = option(0.0, _SCAN_Y, unit="m", minimum=-10.0, maximum=10.0)
+    scan_yaw: float = option(0.0, _SCAN_YAW, unit="rad", minimum=-6.4, maximum=6.4)
+    scan_flipped: bool = option(False, _SCAN_FLIPPED)
+    scan_extrinsics: ExtrinsicsSource = option(ExtrinsicsSource.AUTO, _SCAN_EXTRINSICS)
     scan_frame: str = option("", _SCAN_FRAME)
     scan_no_return: NoReturn = option(NoReturn.INF, _NO_RETURN)
     diagnostics_period_s: float = option(1.0, _DIAGNOSTICS, unit="s", minimum=0.01, maximum=3600.0)

@@ -81,7 +81,7 @@ class RunConfig:
 def _too_fast(scenario: Scenario, planner: PlannerParams, sensor: SensorParams) -> str:
     params, lidar = scenario.planner_params(planner), scenario.robot.lidar
     if lidar.beams and params.reads_scan:
-        return too_fast_for_lidar(params, lidar.range_max_m)
+        return too_fast_for_lidar(params, lidar.range_max_m, lidar.extrinsics.offset_m)
     return too_fast_for_sectors(params, sensor.sensing_range_m)
 
 
@@ -149,6 +149,8 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     dated = {"use_sim_time": True} if not lockstep and config.speed_factor <= 1.0 else {}
     viewed = common | {"view_period_s": 5.0 if lockstep else 0.2}
     robot = config.scenario.robot
+    # Never by tf: the first scan comes before it.
+    extrinsics = {**robot.lidar.extrinsics.parameters, "scan_extrinsics": "parameters"}
     radii = _radii(config.scenario)
     segments = config.scenario.segments_m if not robot.lidar.beams else ()
     return {
@@ -169,12 +171,12 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             "robot_radius_m": config.scenario.robot_radius_m,
             **({"obstacle_radii_m": radii} if radii else {}),
             **({"segments_m": segments_text(segments)} if segments else {}),
-            **({"source": "scan", "scan_yaw": robot.lidar.yaw_rad} if robot.lidar.beams else {}),
+            **({"source": "scan", **extrinsics} if robot.lidar.beams else {}),
         },
         "planner": viewed
         | dated
         | flatten(config.scenario.planner_params(config.planner))
-        | {"seed": config.seed, "scan_yaw": robot.lidar.yaw_rad}
+        | {"seed": config.seed, **extrinsics}
         | ({} if lockstep else {"input_timeout_s": timeout_s}),
     }
 

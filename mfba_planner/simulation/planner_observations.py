@@ -170,8 +170,14 @@ def _sensed(world: World, reading: Reading, params: SensorParams) -> Ranges:
                 position, circles, world.segments, scenario.robot_radius_m, params
             )
         return sense_circles(position, circles, params)
-    yaw = reading.received.yaw + world.scenario.robot.lidar.yaw_rad
-    return sense_scan(reading.scan, yaw, world.scenario.robot_radius_m, params)
+    scenario = world.scenario
+    return sense_scan(
+        reading.scan,
+        reading.received.yaw,
+        scenario.robot_radius_m,
+        params,
+        scenario.robot.lidar.extrinsics,
+    )
 
 
 def observe_sectors(world: World, sensor: SensorParams) -> Observation:
@@ -191,8 +197,7 @@ def observe_scan(world: World, sensor: SensorParams) -> Observation:
     obs, scan = observe_sectors(world, sensor), world.read().scan
     if scan is None or obs.refused:
         return obs
-    yaw = obs.pose.yaw + world.scenario.robot.lidar.yaw_rad
-    return replace(obs, scan=aligned(scan, yaw))
+    return replace(obs, scan=aligned(scan, obs.pose.yaw, world.scenario.robot.lidar.extrinsics))
 
 
 Observe = Callable[[World, SensorParams], Observation]

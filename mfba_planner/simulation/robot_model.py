@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass, field
 
 from ..core.errors import ConfigError
+from ..core.lidar_extrinsics import LidarExtrinsics
 from ..core.option_specs import check, option
 from ..core.robot_base import Base
 from .footprint import Footprint, parse_footprint
@@ -18,7 +19,7 @@ FULL_CIRCLE_RAD = round(2.0 * math.pi, 4)  # as written in scenario files; sligh
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lidar:
-    """A simulated lidar, its frame turned by yaw_rad against base_link."""
+    """A simulated lidar, and where its frame is in base_link."""
 
     beams: int = option(
         0, "number of beams; 0: none, the sectors come from obstacles", minimum=0, maximum=1080
@@ -29,6 +30,13 @@ class Lidar:
     range_max_m: float = option(
         3.5, "farther is +inf (REP-117)", unit="m", minimum=0.1, maximum=1000.0
     )
+    x_m: float = option(
+        0.0, "where its frame is in base_link, ahead", unit="m", minimum=-10.0, maximum=10.0
+    )
+    y_m: float = option(
+        0.0, "where its frame is in base_link, to the left", unit="m", minimum=-10.0, maximum=10.0
+    )
+    flipped: bool = option(False, "mounted upside down: its angles run clockwise")
     yaw_rad: float = option(
         0.0, "how its frame is turned in base_link", unit="rad", minimum=-6.4, maximum=6.4
     )
@@ -50,6 +58,11 @@ class Lidar:
                 f"range_min_m={self.range_min_m:g}: not below range_max_m={self.range_max_m:g}; "
                 "lower it"
             )
+
+    @property
+    def extrinsics(self) -> LidarExtrinsics:
+        """Where it is on the robot."""
+        return LidarExtrinsics(self.x_m, self.y_m, self.yaw_rad, self.flipped)
 
     @property
     def covered_rad(self) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.geometry import Point, Pose2D
+from ..core.geometry import Point, Pose2D, rotated
 from ..core.planner_types import Scan
 from ..core.segments import Segments
 from .obstacle_motion import Walls
@@ -122,14 +122,18 @@ def scan_at(
     a LaserScan.
     """
     turned, fov_rad = pose.yaw + lidar.yaw_rad, lidar.covered_rad
-    ranges = cast_rays(pose.position, circles, lidar.beams, math.inf, turned, fov_rad)
+    dx, dy = rotated(lidar.extrinsics.offset_m, pose.yaw)
+    origin = (pose.x + dx, pose.y + dy)
+    ranges = cast_rays(origin, circles, lidar.beams, math.inf, turned, fov_rad)
     if walls is not None and lidar.walls:
-        to_walls = cast_walls(pose.position, walls, lidar.beams, turned, fov_rad)
+        to_walls = cast_walls(origin, walls, lidar.beams, turned, fov_rad)
         ranges = np.minimum(ranges, to_walls)
     if segments is not None and segments.x.size:
-        near = segments.near(pose.position, lidar.range_max_m)
-        to_segments = cast_segments(pose.position, near, lidar.beams, turned, fov_rad)
+        near = segments.near(origin, lidar.range_max_m)
+        to_segments = cast_segments(origin, near, lidar.beams, turned, fov_rad)
         ranges = np.minimum(ranges, to_segments)
+    if lidar.flipped:  # the shares of the view lie on both sides of its x axis alike
+        ranges = ranges[::-1]
     increment = fov_rad / lidar.beams
     return Scan(
         ranges_m=limited(ranges, lidar),

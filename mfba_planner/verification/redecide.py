@@ -11,8 +11,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from ..core.errors import BagError, FrameError, InputError
+from ..core.errors import BagError, InputError
 from ..core.geometry import Point, Pose2D
+from ..core.lidar_extrinsics import LidarExtrinsics
 from ..core.planner_types import NANO, Decision, Mode, Ranges, RefusalReason, Scan, observe
 from ..perception.known_map import KnownMap
 from ..perception.no_return import NoReturn
@@ -27,17 +28,17 @@ from ..recording.configuration_attachment import has_configuration
 from ..recording.decisions_with_sectors import DECISION, SECTORS, robots_with_decisions
 from ..recording.fleet_topics import NO_NAMESPACE
 from ..recording.from_messages import (
-    goal_point,
     known_map_from,
     laser_scan,
     robot_pose,
     stamp_ns,
     value_or_refusal,
 )
+from ..recording.transform_tree import frame_name
 from ..simulation.decision_digest import digest
-from .lidar_extrinsics import TF_STATIC, TRANSFORMS, StaticFrames
 from .recorded_poses import RecordedPoses
 from .recorded_topics import named_or_only, of_robot, recorded, require_same_robot
+from .recorded_transforms import TF, TF_STATIC, TRANSFORMS, RecordedExtrinsics, RecordedTransforms
 
 ODOMETRY, SCAN, GOAL, GRID = (
     "nav_msgs/msg/Odometry",
@@ -52,15 +53,16 @@ FEWEST_SAMPLES, CLOCK_SAMPLES = 10, 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RedecideParams:
-    """Parameters that a recording lacks; goal and scan_yaw_rad None: as recorded."""
+    """Parameters that a recording lacks; goal and extrinsics None: as recorded."""
 
     robot_radius_m: float
     scan_no_return: NoReturn = NoReturn.INF
-    scan_yaw_rad: float | None = None
+    extrinsics: LidarExtrinsics | None = None
     goal: Point | None = None
     scan: str = ""
     odom: str = ""
     goal_topic: str = ""
+    base_frame: str = ""  # of the robot, where the odometry names none
     odom_frame: str = ""  # required frame of the odometry; "": that of the first message
     scan_frame: str = ""  # required frame of the scans; "": any
     planner: PlannerParams = field(default_factory=PlannerParams)
@@ -100,10 +102,10 @@ def is_foreign(reader: BagReader) -> bool:
 def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResult:
     """Decide on every scan with the odometry of its stamp, or the newest recorded before it.
 
-    Same as virtual_sensor (source: scan) and planner on a replay of the bag, with the lidar
-    extrinsics of /tf_static and the frame of the odometry as odom_frame. Raises BagError for a
-    bag that cannot be read or has no goal, if topics must be named, for unknown lidar extrinsics,
-    and where known_map finds no map.
+    Same as virtual_sensor (source: scan) and planner on a replay of the bag, with the extrinsics
+    of the lidar by tf and the frame of the odometry as odom_frame. Raises BagError for a bag that
+    cannot be read or has no goal, if topics must be named, for a lidar of unknown extrinsics, and
+    where known_map finds no map.
     """
     with BagReader(path) as reader:
         reader.check_data()
@@ -141,15 +143,18 @@ class RecordingDecider:
         self._reasons: Counter[str] = Counter()  # why it is
         self._ahead_s: list[float] = []  # scan stamps against odometry at the same log time
         first = next(m.message for m in reader.decoded([self.odom]))
-        self.frame = params.odom_frame or first.header.frame_id
-        self.base = first.child_frame_id
+        self.frame = params.odom_frame or frame_name(first.header.frame_id)
+        self.base = frame_name(first.child_frame_id) or params.base_frame
         self._poses = RecordedPoses(
             self._rising(self.odom),
             partial(value_or_refusal, partial(robot_pose, frame=self.frame)),
         )
-        self.goals, refused = self._goals()
+        transforms = RecordedTransforms(
+            reader, self._topics(TRANSFORMS, TF_STATIC), self._topics(TRANSFORMS, TF)
+        )
+        self.goals, refused = self._goals(transforms)
         self._notes = [refused] if refused else []
-        self._scan_yaw = _ScanYaw(reader, params, self.base, self._topics(TRANSFORMS, TF_STATIC))
+        self._extrinsics = RecordedExtrinsics(reader, transforms, self.base, params.extrinsics)
         planner = replace(params.planner, robot_radius_m=params.robot_radius_m)
         self._planner = make_planner(planner, params.sensor, params.seed)
         self.planner = self._planner.params
@@ -170,14 +175,14 @@ class RecordingDecider:
         return self._planner.local_map
 
     @property
-    def scan_yaw_rad(self) -> float:
-        """The yaw of the lidar of the last scan on the robot."""
-        return self._scan_yaw.last_rad
+    def extrinsics(self) -> LidarExtrinsics:
+        """Where the lidar of the last scan is on the robot."""
+        return self._extrinsics.last
 
     @property
     def has_same_extrinsics(self) -> bool:
-        """Whether all scans so far were of one mounting of a lidar, as parameters hold it."""
-        return self._scan_yaw.is_one
+        """Whether all scans so far had the same extrinsics, as parameters hold one."""
+        return self._extrinsics.is_one
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -188,7 +193,7 @@ class RecordingDecider:
     def notes(self) -> tuple[str, ...]:
         """What was left out or taken otherwise."""
         counts = (f"{count} {what}" for what, count in self._counts.items())
-        return (*self._notes, *self._scan_yaw.notes, *self._clock_notes(), *counts)
+        return (*self._notes, *self._extrinsics.notes, *self._clock_notes(), *counts)
 
     @property
     def nothing(self) -> str:
@@ -242,7 +247,7 @@ class RecordingDecider:
                 refusal = str(error)
         raise BagError(f"{self._reader.path}: known_map=true: {refusal}")
 
-    def _goals(self) -> tuple[list[tuple[int, Point]], str]:
+    def _goals(self, transforms: RecordedTransforms) -> tuple[list[tuple[int, Point]], str]:
         """(log time in ns, goal), sorted by time, and a note about those that are refused."""
         if self._params.goal is not None:
             return [(-1, self._params.goal)], ""
@@ -252,12 +257,7 @@ class RecordingDecider:
             names = [named_or_only(self._reader, GOAL, wanted, "--goal-topic")]
         else:
             names = self._topics(GOAL, GOAL_TOPIC)
-        goals, refused, refusal = [], 0, ""
-        for message in self._reader.decoded(names) if names else ():
-            try:
-                goals.append((message.log_time_ns, goal_point(message.message, self.frame)))
-            except InputError as error:  # the planner would refuse it as well
-                refused, refusal = refused + 1, str(error).split("; ")[0]
+        goals, refused, refusal = transforms.goals(names, self.frame)
         if goals:
             return goals, f"{refused} goals are refused: {refusal}" if refused else ""
         others = [name for name in all_names if name not in names]
@@ -306,8 +306,8 @@ class RecordingDecider:
         self._pose = observation.pose
         sensed = None
         if not observation.refused:
-            yaw = observation.pose.yaw + self._scan_yaw.yaw_rad(scan)
-            sensed = aligned(self._laser_scan(scan), yaw)
+            extrinsics = self._extrinsics.of(scan.header.frame_id)
+            sensed = aligned(self._laser_scan(scan), observation.pose.yaw, extrinsics)
             if self._params.planner.reads_scan:
                 observation = replace(observation, scan=sensed)
         decision = self._planner.plan(observation)
@@ -319,52 +319,11 @@ class RecordingDecider:
     def _measure(self, pose: Pose2D | RefusalReason, scan: Any) -> Ranges | RefusalReason:
         if isinstance(pose, str):
             return pose
-        params = self._params
-        yaw = pose.yaw + self._scan_yaw.yaw_rad(scan)
-        return value_or_refusal(
-            lambda x: sense_scan(self._laser_scan(x), yaw, params.robot_radius_m, params.sensor),
-            scan,
-        )
+        yaw, params = pose.yaw, self._params
+        extrinsics = self._extrinsics.of(scan.header.frame_id)
 
+        def sense(message: Any) -> Ranges:
+            read = self._laser_scan(message)
+            return sense_scan(read, yaw, params.robot_radius_m, params.sensor, extrinsics)
 
-class _ScanYaw:
-    """The yaw of each scan's lidar on the robot, as given or from /tf_static."""
-
-    def __init__(
-        self, reader: BagReader, params: RedecideParams, base: str, transforms: list[str]
-    ) -> None:
-        self.notes: list[str] = []
-        self._given_yaw_rad = params.scan_yaw_rad
-        self._path, self._frames = reader.path, StaticFrames(reader, transforms)
-        self._base = base
-        self._yaws: dict[str, float] = {}
-        self.last_rad = params.scan_yaw_rad or 0.0
-
-    @property
-    def is_one(self) -> bool:
-        """Whether all scans so far had the same yaw."""
-        return len(set(self._yaws.values())) < 2
-
-    def yaw_rad(self, scan: Any) -> float:
-        """Yaw of the frame of a scan. Raises BagError if it is unknown."""
-        if self._given_yaw_rad is not None:
-            return self._given_yaw_rad
-        frame = scan.header.frame_id
-        if frame not in self._yaws:
-            if frame and not self._base:
-                raise BagError(
-                    f"{self._path}: frame {frame!r}: the odometry has no child_frame_id, so the "
-                    "lidar's mounting on the robot is not known; give --scan-yaw"
-                )
-            try:
-                yaw, offset_m = self._frames.extrinsics(frame, self._base)
-            except FrameError as error:
-                raise BagError(f"{self._path}: {error}") from None
-            self._yaws[frame] = yaw
-            if yaw or offset_m:
-                self.notes.append(
-                    f"/tf_static: {frame} is rotated by {yaw:.4g} rad in {self._base}, "
-                    f"{offset_m:.4g} m from its origin: --robot-radius must include that"
-                )
-        self.last_rad = self._yaws[frame]
-        return self.last_rad
+        return value_or_refusal(sense, scan)

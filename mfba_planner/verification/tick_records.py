@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
-from ..core.errors import InputError
+from ..core.errors import FrameError, InputError
 from ..core.geometry import Point
 from ..perception.known_map import KnownMap
 from ..recording.bag_reader import BagReader, DecodedMessage
@@ -37,7 +37,7 @@ class TickRecords:
     """The ticks sorted by stamp; faults are errors of the bag, notes are not."""
 
     ticks: list[Tick]
-    goals: list[Point]
+    goals: list[Point | None]  # None: of another frame, which the planner may have transformed
     known_map: KnownMap | None = None  # the first that the planner did not refuse
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -120,9 +120,11 @@ def join_ticks(
     return records
 
 
-def _goals(topic: str, message: Any, frame: str) -> tuple[Point, ...]:
+def _goals(topic: str, message: Any, frame: str) -> Sequence[Point | None]:
     try:
         return (goal_point(message, frame),) if topic == GOAL else waypoint_points(message, frame)
+    except FrameError:
+        return [None] if topic == GOAL else [None] * len(message.poses)
     except InputError:  # the planner refused it too
         return ()
 

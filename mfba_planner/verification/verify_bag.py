@@ -58,6 +58,10 @@ from .tick_records import (
 
 Progress = Callable[[int, int], None]
 _BEFORE = "what the planner perceived before the recording began is not in the bag"
+_TRANSFORMED = (
+    "a goal of another frame is taken as it was decided on: it depends on the tf that the planner "
+    "had received"
+)
 _NOT_PERCEIVED = (
     f"{{count}} can be checked: {_BEFORE}; start the recorder before the planner, or send a new "
     "goal while it records"
@@ -170,8 +174,14 @@ def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Repor
             planner.reset()  # a new goal, even to the same point, or a cancel
             goal = goal if decision.goal else None
         if decision.goal != goal:
-            while goals and goal != decision.goal:
+            is_transformed = None in goals and decision.goal not in (None, *goals)
+            wanted = None if is_transformed else decision.goal
+            while goals and (goal != wanted or is_transformed):
                 goal = goals.popleft()
+                if goal is None and is_transformed:
+                    goal = decision.goal
+                    notes.append(_TRANSFORMED)
+                    break
             if goal != decision.goal and not decided and decision.goal:
                 notes.append("its first goal is older than the recording")
             elif goal != decision.goal:
@@ -237,10 +247,10 @@ def _with_scan(setup: Setup, tick: Tick, recorded: Decision, obs: Observation) -
         return obs
     pose_stamp_ns, scan_pose = scan_timing(tick.messages[DECISION])
     scan = laser_scan(tick.messages[SCAN], no_return=setup.scan_no_return)
-    yaw = (scan_pose or obs.pose).yaw + setup.scenario.robot.lidar.yaw_rad
+    yaw, extrinsics = (scan_pose or obs.pose).yaw, setup.scenario.robot.lidar.extrinsics
     return replace(
         obs,
-        scan=aligned(scan, yaw),
+        scan=aligned(scan, yaw, extrinsics),
         sensed=(obs.stamp_ns, scan_pose) if scan_pose else None,
         pose_stamp_ns=pose_stamp_ns,
     )
@@ -289,10 +299,10 @@ def _sectors_match_sensor(setup: Setup, tick: Tick, decision: Decision) -> bool:
         pose = robot_pose(tick.messages[ODOM])
         if lidar.beams:
             scan = laser_scan(tick.messages[SCAN], setup.scan_frame, setup.scan_no_return)
-            yaw = pose.yaw + lidar.yaw_rad
-            return (
-                sense_scan(scan, yaw, scenario.robot_radius_m, setup.sensor) == decision.ranges_m
+            ranges = sense_scan(
+                scan, pose.yaw, scenario.robot_radius_m, setup.sensor, lidar.extrinsics
             )
+            return ranges == decision.ranges_m
         centers = obstacle_centers(tick.messages[OBSTACLES])
     except InputError:
         return not decision.ranges_m  # a blind sensor has no ranges

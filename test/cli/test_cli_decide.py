@@ -237,7 +237,22 @@ def test_scans_of_two_mountings_are_decided_and_named(tmp_path: Path, capsys: Ca
     messages = [transform(START_NS), rear, goal(START_NS, 0.0, 5.0), *steps(odom), *turns]
     path = write(tmp_path / "bag", messages)
     assert decide(path, "--out", str(tmp_path / "run")) == 0
-    assert "several mountings of a lidar" in capsys.readouterr().out
+    assert "lidars with several extrinsics" in capsys.readouterr().out
+
+
+def test_where_the_lidar_is_can_be_given(tmp_path: Path, capsys: Capture) -> None:
+    """The same as by the recording's transform, and kept for `mfba verify`."""
+    mount = transform(START_NS, x=0.1, y=-0.2, yaw=1.0, roll=math.pi)
+    messages = [goal(START_NS, 0.0, 5.0), *steps(odom, lambda t: scan(t, wall(0)))]
+    by_tf = write(tmp_path / "tf", [mount, *messages])
+    given = write(tmp_path / "given", messages)
+    options = ["--scan-x", "0.1", "--scan-y", "-0.2", "--scan-yaw", "1.0", "--scan-flipped"]
+    assert decide(given, *options, "--out", str(tmp_path / "run")) == 0
+    assert decide(by_tf) == 0
+    digests = re.findall(r"digest (\w+)", capsys.readouterr().out)
+    assert len(digests) == 2
+    assert digests[0] == digests[1]
+    assert cli.main(["verify", str(tmp_path / "run")]) == 0
 
 
 def test_a_failure_leaves_no_directory(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ QUOTED = MESSAGE.findall(OURS)
 # Whatever these raise or note has its line on the page.
 OF_A_START = (
     "core/broken_library.py",
+    "core/required_packages.py",
     "core/standard_streams.py",
     "entry_points.py",
     "launcher/ros_domain.py",

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -35,6 +35,12 @@ class Node:
     remappings: Sequence[tuple[str, str]] = ()
     arguments: Sequence[str] = ()
     on_exit: Any = None
+
+    def ended(self, returncode: int, *, is_shutdown: bool = False) -> Any:
+        """The action that launch takes when the process has ended."""
+        event = SimpleNamespace(returncode=returncode)
+        (action,) = self.on_exit(event, SimpleNamespace(is_shutdown=is_shutdown))
+        return action
 
     @property
     def full_name(self) -> str:
@@ -98,6 +104,8 @@ _NAMES: dict[str, dict[str, Any]] = {
         "OpaqueFunction": _Function,
         "Shutdown": _Shutdown,
     },
+    "launch.events": {},
+    "launch.events.process": {"ProcessExited": object},
     "launch.launch_context": {"LaunchContext": dict},
     "launch.launch_description": {"LaunchDescription": _Description},
     "launch.substitutions": {"LaunchConfiguration": _Configuration},

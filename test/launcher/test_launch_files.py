@@ -175,28 +175,27 @@ def test_launch_file_is_what_launch_expects(name: str) -> None:
     assert [node.name for node in nodes] == STARTED[name]
     for node in nodes:
         assert (node.package, node.executable) == ("mfba_planner", node.name)
-        assert node.on_exit.reason == f"{node.name} has ended", "when one ends, all are shut down"
+        assert node.ended(0).reason == f"{node.name} has ended", "when one ends, all are shut down"
+        # launch itself ends with 1 after an exception, and with 0 after a shutdown.
+        with pytest.raises(RuntimeError, match=f"^{node.name} ended with exit code 1; see above"):
+            node.ended(1)
+        assert node.ended(1, is_shutdown=True).reason == f"{node.name} has ended"
 
 
 def test_the_xml_launch_file_declares_and_starts_the_same() -> None:
     root = ElementTree.parse(LAUNCH / "planner.launch.xml").getroot()
-    declared = {a.get("name"): (a.get("default"), a.get("description")) for a in root.iter("arg")}
-    shipped = "$(find-pkg-share mfba_planner)/config/planner.yaml"
+    given = root.findall("arg")
+    declared = {a.get("name"): (a.get("default"), a.get("description")) for a in given}
     assert declared == {
-        name: (
-            argument.default or (shipped if name == "params_file" else ""),
-            argument.description,
-        )
+        name: (argument.default, argument.description)
         for name, argument in PLANNER_ARGUMENTS.items()
     }
-    names = ("scan", "odom", "cmd_vel", "goal_pose", "waypoints", "map")
-    starts = robot_nodes(by_default(PLANNER_ARGUMENTS) | {name: f"my_{name}" for name in names})
-    for start, node in zip(starts, root.iter("node"), strict=True):
-        assert (node.get("exec"), node.get("name")) == (start.name, start.name)
-        in_xml = {param.get("name") for param in node.iter("param") if param.get("name")}
-        assert in_xml == set(start.parameters)
-        remaps = [(remap.get("from"), f"my_{remap.get('from')}") for remap in node.iter("remap")]
-        assert remaps == list(start.remaps)
+    (included,) = root.iter("include")
+    folder = "$(find-pkg-share mfba_planner)/launch"
+    assert included.get("file") == f"{folder}/planner.launch.py"
+    passed = [(argument.get("name"), argument.get("value")) for argument in included.iter("arg")]
+    assert passed == [(name, f"$(var {name})") for name in PLANNER_ARGUMENTS]
+    assert [child.tag for child in root if child.tag != "arg"] == ["include"], "and nothing else"
 
 
 def by_default(arguments: Any) -> dict[str, str]:
@@ -242,6 +241,14 @@ def test_replay_gets_valid_command_line_arguments() -> None:
     assert (settings.inputs_of, settings.wait_for_subscribers) == (("planner",), ())
     with pytest.raises(InputError, match=r"^bag:= is empty; give a bag"):
         replay_nodes(by_default(REPLAY_ARGUMENTS))
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_launch_file_has_a_namespace(name: str) -> None:
+    given = {"namespace": "robot1"} | ({"bag": "runs/mine/bag"} if name == "replay" else {})
+    assert {node.full_name for node in launched(f"{name}.launch.py", given)} == {
+        f"robot1/{node}" for node in STARTED[name]
+    }
 
 
 @pytest.mark.parametrize("namespace", ["", "robot1"])

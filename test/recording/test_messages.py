@@ -28,6 +28,7 @@ from sensor_msgs.msg import LaserScan
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D, rotated, wrap_angle
 from mfba_planner.core.planner_types import Decision, Mode
+from mfba_planner.perception.scan_beams import BeamReader
 from mfba_planner.perception.sensory_vector import SensorParams, sensory_vector
 from mfba_planner.recording import from_messages
 from mfba_planner.ros.interface import to_messages
@@ -442,6 +443,19 @@ def test_a_scan_that_contradicts_itself_is_refused_in_one_line(
 ) -> None:
     with pytest.raises(InputError, match=line):
         from_messages.laser_scan(a_scan(**changes))
+
+
+def test_a_clockwise_beam_keeps_its_time() -> None:
+    """Of 8 beams clockwise from ahead the third, on the right, is measured third."""
+    message = a_scan(
+        8, angle_min=0.0, angle_increment=-0.25 * math.pi, angle_max=-1.75 * math.pi,
+        time_increment=0.01,
+    )  # fmt: skip
+    message.ranges = [5.0, 5.0, 1.0, 5.0, 5.0, 5.0, 5.0, 5.0]
+    beams = BeamReader().read(Pose2D(0.0, 0.0), (0.0, 0.0, 0.0), from_messages.laser_scan(message))
+    nearest = int(beams.range_m.argmin())
+    assert (beams.cos[nearest], beams.sin[nearest]) == pytest.approx((0.0, -1.0), abs=1e-6)
+    assert beams.time_s[nearest] == pytest.approx(0.02)
 
 
 def test_a_scan_s_time_between_beams_is_kept() -> None:

@@ -30,6 +30,7 @@ from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.paper import readings_of_paper
 from mfba_planner.recording.from_messages import decision as read_decision
+from mfba_planner.ros.endpoints import goal_subscriptions
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import path_msg
 from mfba_planner.scenarios.run_config import Driver, RunConfig
@@ -76,7 +77,7 @@ def test_a_goal_replaces_a_route_and_a_route_a_goal(graph: Graph) -> None:
     ("bad", "kind", "reason"),
     [
         (route(), "waypoints: value", "waypoints are empty; give at least one, or call"),
-        (route(A, B, frame="map"), "waypoints: frame", "waypoints is in frame 'map', not 'odom'"),
+        (route(A, B, frame="map"), "waypoints: frame", "waypoint 1 is in frame 'map', not 'odom'"),
         (route(A, (NAN, 0.0)), "waypoints: value", "waypoint 2 position holds nan"),
     ],
 )
@@ -125,6 +126,22 @@ def test_after_cancel_it_rests_until_the_next_goal(graph: Graph) -> None:
     done = graph.call(Trigger, "planner/cancel")
     assert (done.success, done.message) == (False, "there was no goal")
     assert mode(harness.decide(goal(*GOAL), odom(3), sectors(3))) is Mode.PATH_GENERATION
+
+
+def test_a_goal_that_was_skipped_is_asked_for(
+    graph: Graph, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As `ros2 bag play --start-offset` does: goal_pose is offered, but nothing is sent."""
+    monkeypatch.setattr(goal_subscriptions, "_LONG_WAIT_S", 0.0)
+    harness = PlannerHarness(graph, LOCKSTEP, at=None)
+    assert harness.decide_all(odom(1), sectors(1)) == []
+    response = graph.call(Trigger, "planner/ready")
+    assert (response.success, response.message) == (True, "no goal_pose yet")
+    assert "ticks are not answered: no goal_pose was received" in "".join(capfd.readouterr())
+    harness.goal.publish(goal(*A))
+    graph.settle()
+    assert graph.call(Trigger, "planner/ready").message == ""
+    assert fields(harness.decide(odom(2), sectors(2)))["goal"] == "1.0,0.0"
 
 
 def test_the_same_goal_again_is_new_only_after_arrival(graph: Graph) -> None:

@@ -40,6 +40,7 @@ TRACKING = replace(preset(PAPER), method=Method.PREDICTIVE)
 AHEAD = replace(TRACKING, perception=PerceptionInput.SECTORS)
 TURNING = Robot(drive=Drive.DIFFERENTIAL)
 SCANNING = replace(TURNING, lidar=Lidar(beams=360, yaw_rad=1.0))
+MOUNTED = Lidar(beams=360, x_m=0.12, y_m=-0.05, yaw_rad=1.0, flipped=True)
 NOISY = replace(
     SCANNING,
     noise=Noise(
@@ -50,7 +51,9 @@ NOISY = replace(
 ROBOTS = {
     "turning": TURNING,
     "scanning": SCANNING,
+    "mounted": replace(TURNING, lidar=MOUNTED),
     "noisy": NOISY,
+    "noisy, mounted": replace(NOISY, lidar=MOUNTED),
     "omnidirectional": replace(NOISY, drive=Drive.OMNIDIRECTIONAL),
 }
 

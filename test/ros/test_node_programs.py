@@ -2,6 +2,7 @@
 """The nodes as programs: an error is one line and exit code 1, signals end them without output."""
 
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -12,11 +13,13 @@ from launched_programs import PROGRAM, ROOT
 from nav_msgs.msg import Path as PathMsg
 from ros_graph import Graph
 
+from mfba_planner.core.option_specs import walk
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import CHUNK_BYTES
 from mfba_planner.recording.recover import recover
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import path_msg
+from mfba_planner.ros.node_help import PARAMETERS
 
 PARAMS_FILE = "/**: {ros__parameters: {bat.population: 1}}\n"
 
@@ -113,6 +116,7 @@ def test_a_misspelt_parameter_is_named(ros_env: dict[str, str]) -> None:
     arguments = parameters("sped_mps:=0.5", "use_sim_time:=false")
     planner = start("planner", *arguments, env={**ros_env, "RCUTILS_LOGGING_BUFFERED_STREAM": "1"})
     assert planner.stdout is not None
+    assert "[planner]: listening to " in planner.stdout.readline()
     line = planner.stdout.readline()
     assert line.endswith("[planner]: sped_mps: no such parameter; did you mean 'speed_mps'?\n")
     planner.terminate()
@@ -183,3 +187,51 @@ def test_signals_at_random_moments_are_quiet() -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.splitlines()[-1] == "30 of 30 ended well"
+
+
+@pytest.mark.parametrize("node", ["planner", "virtual_sensor", "world_sim", "recorder"])
+def test_help_answers_instead_of_starting_a_node(ros_env: dict[str, str], node: str) -> None:
+    # With a middleware that does not exist no node could start.
+    process = start(node, "--help", env={**ros_env, "RMW_IMPLEMENTATION": "rmw_none"})
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "")
+    assert out.startswith(f"usage: {node} [-h] [--ros-args ...]")
+    documented = {name for settings in PARAMETERS[node] for name, _, _ in walk(settings)}
+    assert set(re.findall(r"^  ([a-z_0-9.]+) \(", out, re.MULTILINE)) == documented
+
+
+def test_an_unknown_argument_is_refused(ros_env: dict[str, str]) -> None:
+    line = refused("planner", "--speed", "1.0", "--ros-args", "-p", "seed:=1", env=ros_env)
+    assert line == "planner: --speed: unknown argument; known: --help"
+    line = refused("recorder", "runs/mine", env=ros_env)
+    assert line == "recorder: runs/mine: unknown argument; see `recorder --help`"
+
+
+@pytest.mark.parametrize(
+    ("node", "given", "line"),
+    [
+        (
+            "planner",
+            ["method:=predictive", "scan_x:=0.1", "scan_flipped:=true"],
+            "[planner]: listening to /scan, /odom, /sectors, /goal_pose, /waypoints; decides: "
+            "predictive, perception auto, omnidirectional, robot radius 0.3 m, 0.785 m/s; lidar "
+            "mounted at (0.1, 0) m, yaw 0, upside down\n",
+        ),
+        (
+            "virtual_sensor",
+            ["source:=scan", "robot_radius_m:=0.25"],
+            "[virtual_sensor]: listening to /odom, /scan; 12 sectors up to 0.8 m from scan, robot "
+            "radius 0.25 m; lidar mounted at (0, 0) m, yaw 0\n",
+        ),
+    ],
+)
+def test_a_node_says_what_it_listens_to_and_what_decides(
+    ros_env: dict[str, str], node: str, given: list[str], line: str
+) -> None:
+    env = {**ros_env, "RCUTILS_LOGGING_BUFFERED_STREAM": "1"}
+    process = start(node, *parameters(*given), env=env)
+    assert process.stdout is not None
+    found = process.stdout.readline()
+    process.terminate()
+    process.communicate(timeout=60)
+    assert found.endswith(line)

@@ -4,11 +4,11 @@
 import pytest
 
 from mfba_planner.core.errors import ConfigError
+from mfba_planner.core.ros_arguments import split_ros_args
 from mfba_planner.ros.replaying.replay_arguments import (
     CLOCK_HZ,
     ReplaySettings,
     parse,
-    split_ros_args,
 )
 
 

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.perception.scan_to_sectors import aligned
+from mfba_planner.recording.perceived import returns_of
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.obstacle_motion import Walls
-from mfba_planner.simulation.robot_model import Lidar
+from mfba_planner.simulation.robot_model import FULL_CIRCLE_RAD, Lidar
 from mfba_planner.simulation.simulated_lidar import rays, scan_at
 
 FRONT = math.radians(270.0)
@@ -56,6 +58,29 @@ def test_a_beam_has_the_range_in_the_direction_that_the_scan_gives_it(
         x = (3.0 if c > 0.0 else -2.0) / c if abs(c) > 1e-9 else math.inf
         y = (4.0 if s > 0.0 else -1.0) / s if abs(s) > 1e-9 else math.inf
         assert found == pytest.approx(min(x, y), rel=1e-3)
+
+
+@given(
+    x_m=st.floats(-0.9, 0.9),
+    y_m=st.floats(-0.9, 0.9),
+    yaw_rad=st.floats(-3.0, 3.0),
+    turned_rad=st.floats(-3.0, 3.0),
+    fov_rad=st.sampled_from([FULL_CIRCLE_RAD, 4.0]),
+    flipped=st.booleans(),
+)
+def test_the_returns_of_a_lidar_anywhere_on_the_robot_lie_on_the_walls(
+    x_m: float, y_m: float, yaw_rad: float, turned_rad: float, fov_rad: float, flipped: bool
+) -> None:
+    lidar = Lidar(
+        beams=90, fov_rad=fov_rad, x_m=x_m, y_m=y_m, yaw_rad=turned_rad, flipped=flipped,
+        range_max_m=20.0, walls=True, range_min_m=0.0,
+    )  # fmt: skip
+    pose = Pose2D(0.3, 1.2, yaw_rad)
+    scan = aligned(scan_at(pose, lidar, [], WALLS), pose.yaw, lidar.extrinsics)
+    points = returns_of(scan, pose)
+    assert len(points) == 90
+    to_walls = np.abs(points[:, [0, 0, 1, 1]] - [3.0, -2.0, 4.0, -1.0]).min(axis=1)
+    assert to_walls.max() < 1e-3
 
 
 def test_what_is_behind_is_not_in_the_scan() -> None:

@@ -23,6 +23,7 @@ from foreign_bags import (
 )
 
 from mfba_planner.core.errors import BagError
+from mfba_planner.core.lidar_extrinsics import LidarExtrinsics
 from mfba_planner.perception.no_return import NoReturn
 from mfba_planner.verification.recorded_topics import of_robot
 from mfba_planner.verification.redecide import RedecideParams, RedecideResult, redecide_recording
@@ -51,16 +52,69 @@ def test_a_goal_in_another_frame_is_refused(tmp_path: Path) -> None:
     in_map = goal(START_NS, 5.0, 0.0, frame="map")
     text = refusal(tmp_path, [MOUNT, in_map, *steps(odom, on_wall)])
     assert text == (
-        "no goal_pose can be used: goal_pose is in frame 'map', not 'odom'; give one with "
-        "--goal X Y, in metres in 'odom'"
+        "no goal_pose can be used: goal_pose is in frame 'map', not 'odom', and no tf gives the "
+        "one in the other; give one with --goal X Y, in metres in 'odom'"
     )
+
+
+def goals_of(found: RedecideResult) -> list[tuple[float, float] | None]:
+    """The goals that were decided for, in mm, each once."""
+    goals = [
+        tick.goal and (round(tick.goal[0], 3), round(tick.goal[1], 3)) for tick in found.decided
+    ]
+    return list(dict.fromkeys(goals))
+
+
+def map_to_odom(stamp: int) -> Recorded:
+    """The odometry began 10 m ahead of the map's origin, turned to the left."""
+    return transform(stamp, "map", "odom", x=10.0, yaw=math.pi / 2, topic="/tf")
+
+
+def test_a_goal_in_another_frame_is_transformed_by_tf(tmp_path: Path) -> None:
+    in_map = goal(START_NS, 5.0, 0.0, frame="map")
+    first, *others = steps(map_to_odom)
+    messages = [MOUNT, in_map, *others, *steps(odom, on_wall)]
+    found = decided(tmp_path, messages)
+    # It waits for the first transform: that of the second tick.
+    assert goals_of(found) == [None, (0.0, 5.0)]
+    assert found.decided[1].goal is not None
+    assert found.notes == ()
+    (tmp_path / "slash").mkdir()
+    slash = goal(START_NS, 5.0, 0.0, frame="/map")
+    all_of_it = decided(tmp_path / "slash", [MOUNT, slash, first, *messages[2:]])
+    assert goals_of(all_of_it) == [(0.0, 5.0)]
+
+
+def test_the_newest_goal_counts_while_tf_is_missing(tmp_path: Path) -> None:
+    goals = [
+        goal(START_NS, 5.0, 0.0, frame="map"),
+        goal(START_NS + 1, 8.0, 0.0, frame="map"),
+        goal(START_NS + 10 * SECOND, 2.0, 3.0),
+    ]
+    late = map_to_odom(START_NS + 2 * SECOND)
+    found = decided(tmp_path, [MOUNT, *goals, late, *steps(odom, on_wall, count=120)])
+    assert goals_of(found) == [None, (0.0, 2.0), (2.0, 3.0)]
+    assert found.notes == (
+        "1 goals are refused: goal_pose is in frame 'map', not 'odom', and no tf gives the one in "
+        "the other",
+    )
+
+
+def test_a_static_transform_counts_from_the_start(tmp_path: Path) -> None:
+    in_map = goal(START_NS, 5.0, 0.0, frame="map")
+    static = transform(START_NS + SECOND, "map", "odom", x=1.0)
+    found = decided(tmp_path, [MOUNT, static, in_map, *steps(odom, on_wall)])
+    assert goals_of(found) == [(4.0, 0.0)]
 
 
 def test_goals_in_several_frames(tmp_path: Path) -> None:
     in_map = goal(START_NS, 9.0, 9.0, frame="map")
     found = decided(tmp_path, [MOUNT, in_map, GOAL, *steps(odom, on_wall)])
     assert {tick.goal for tick in found.decided} == {(5.0, 0.0)}
-    assert found.notes == ("1 goals are refused: goal_pose is in frame 'map', not 'odom'",)
+    assert found.notes == (
+        "1 goals are refused: goal_pose is in frame 'map', not 'odom', and no tf gives the one in "
+        "the other",
+    )
 
 
 def test_odometry_in_map_takes_goals_in_map(tmp_path: Path) -> None:
@@ -70,7 +124,7 @@ def test_odometry_in_map_takes_goals_in_map(tmp_path: Path) -> None:
     goals = [goal(START_NS, 5.0, 0.0, frame="map")]
     found = decided(tmp_path, [MOUNT, *goals, *steps(in_map, on_wall)])
     assert len(found.decided) == 20
-    assert "not 'map'; give one with --goal" in refusal(
+    assert "not 'map', and no tf gives the one in the other; give one with --goal" in refusal(
         tmp_path / "b", [MOUNT, GOAL, *steps(in_map, on_wall)]
     )
 
@@ -89,14 +143,37 @@ def test_odometry_without_child_frame(tmp_path: Path) -> None:
     backwards = transform(START_NS, yaw=math.pi)
     messages = [backwards, GOAL, *steps(lambda t: odom(t, child=""), lambda t: scan(t, wall(0)))]
     assert refusal(tmp_path, messages) == (
-        "frame 'laser': the odometry has no child_frame_id, so the lidar's mounting on the robot "
-        "is not known; give --scan-yaw"
+        "frame 'laser': the odometry has no child_frame_id, so the lidar's pose on the robot "
+        "is not known; give --scan-x, --scan-y, --scan-yaw, --scan-flipped"
     )
     (tmp_path / "given").mkdir()
-    given = decided(tmp_path / "given", messages, scan_yaw_rad=math.pi)
+    given = decided(tmp_path / "given", messages, extrinsics=LidarExtrinsics(yaw_rad=math.pi))
     named = [backwards, GOAL, *steps(odom, lambda t: scan(t, wall(0)))]
     (tmp_path / "named").mkdir()
     assert decided(tmp_path / "named", named).digest == given.digest
+    (tmp_path / "base").mkdir()
+    assert decided(tmp_path / "base", messages, base_frame="base_link").digest == given.digest
+
+
+@pytest.mark.parametrize("with_static", [False, True])
+def test_a_lidar_whose_pose_is_in_tf_only(with_static: bool, tmp_path: Path) -> None:
+    """As of a robot_state_publisher that sends all of it again and again."""
+    static = transform(START_NS, "base_link", "mast", x=0.1)
+    parent = "mast" if with_static else "base_link"
+    mount: dict[str, Any] = {"x": 0.1, "yaw": 1.0, "roll": math.pi}
+
+    def on_tf(stamp: int) -> Recorded:
+        return transform(stamp, parent, "laser", topic="/tf", **mount)
+
+    found = decided(tmp_path, [static, GOAL, *steps(on_tf, odom, on_wall)])
+    assert found.notes == (
+        f"/tf: laser is at ({0.2 if with_static else 0.1}, 0) m in base_link, turned by 1 rad, "
+        "upside down",
+    )
+    (tmp_path / "static").mkdir()
+    same = transform(START_NS, "mast" if with_static else "base_link", "laser", **mount)
+    by_static = decided(tmp_path / "static", [static, same, GOAL, *steps(odom, on_wall)])
+    assert found.digest == by_static.digest
 
 
 def robot(name: str, goal_x: float, at_deg: int, yaw: float = 0.0) -> list[Recorded]:

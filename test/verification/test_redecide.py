@@ -18,6 +18,7 @@ from sensor_msgs.msg import LaserScan
 
 from mfba_planner import cli
 from mfba_planner.core.errors import BagError, ConfigError, MfbaError
+from mfba_planner.core.lidar_extrinsics import CENTRED, LidarExtrinsics
 from mfba_planner.core.planner_types import Mode
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
@@ -155,7 +156,10 @@ def test_robot_radius_and_scan_yaw_change_the_sectors(tmp_path: Path) -> None:
 
     assert bits(robot_radius_m=0.3) == []
     assert bits(robot_radius_m=0.45) == [1, 12]
-    assert bits(robot_radius_m=0.45, scan_yaw_rad=math.pi / 2) == [3, 4]
+    turned = LidarExtrinsics(yaw_rad=math.pi / 2)
+    assert bits(robot_radius_m=0.45, extrinsics=turned) == [3, 4]
+    # 1.2 m ahead of a lidar 0.4 m behind the centre is 0.8 m ahead of the robot.
+    assert bits(robot_radius_m=0.3, extrinsics=LidarExtrinsics(x_m=-0.4)) == [1, 12]
 
 
 def test_stamps_that_go_back_and_refused_inputs_are_named(tmp_path: Path) -> None:
@@ -243,47 +247,55 @@ ORIGIN = (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("transforms", "yaw"),
+    ("transforms", "extrinsics"),
     [
-        ([("base_link", "laser", LEVEL, ORIGIN)], 0.0),
-        ([("base_link", "laser", LEFT, ORIGIN)], 0.5),
-        ([("base_link", "laser", tuple(3.0 * x for x in LEFT), ORIGIN)], 0.5),
-        ([("base_link", "mast", LEFT, (0.2, 0.0)), ("mast", "laser", LEFT, (0.0, 0.1))], 1.0),
+        ([("base_link", "laser", LEVEL, ORIGIN)], (0.0, 0.0, 0.0)),
+        ([("base_link", "laser", LEFT, ORIGIN)], (0.0, 0.0, 0.5)),
+        ([("base_link", "laser", tuple(3.0 * x for x in LEFT), ORIGIN)], (0.0, 0.0, 0.5)),
+        ([("base_link", "mast", LEFT, (0.2, 0.0)), ("mast", "laser", LEFT, (0.0, 0.1))],
+         (0.1, 0.0, 1.0)),
         ([("footprint", "laser", LEFT, ORIGIN), ("footprint", "base_link", LEVEL, ORIGIN)],
-         0.5),
-        ([("laser", "base_link", LEFT, ORIGIN)], -0.5),
+         (0.0, 0.0, 0.5)),
+        ([("laser", "base_link", LEFT, (0.1, 0.0))], (0.0, 0.1, -0.5)),
         ([("base_link", "laser", LEVEL, ORIGIN), ("base_link", "laser", LEFT, ORIGIN)],
-         0.5),
+         (0.0, 0.0, 0.5)),
         # Two lidars one above the other, both upside down: the upper one is level.
-        ([("base_link", "low", UPSIDE_DOWN, ORIGIN), ("low", "laser", UPSIDE_DOWN, ORIGIN)], 0.0),
+        ([("base_link", "low", UPSIDE_DOWN, ORIGIN), ("low", "laser", UPSIDE_DOWN, ORIGIN)],
+         (0.0, 0.0, 0.0)),
+        # Rolled, then turned: its x axis points to the right, as (LEFT, then UPSIDE_DOWN) tells.
+        ([("base_link", "low", UPSIDE_DOWN, (0.1, 0.0)), ("low", "laser", LEFT, ORIGIN)],
+         (0.1, 0.0, -0.5, True)),
+        ([("/base_link", "/laser", LEFT, (0.0, 0.1))], (0.0, 0.1, 0.5)),
     ],
 )  # fmt: skip
-def test_tf_static_gives_the_yaw_of_the_lidar(
-    transforms: list[Any], yaw: float, tmp_path: Path
+def test_tf_static_gives_the_extrinsics_of_the_lidar(
+    transforms: list[Any], extrinsics: tuple[float, ...], tmp_path: Path
 ) -> None:
-    """The obstacle on beam 0 is in the sector of the lidar's yaw."""
+    """The yaw is in units of pi; the obstacle is on beam 0."""
+    x, y, yaw, *flipped = extrinsics
+    found = LidarExtrinsics(x, y, yaw * math.pi, *map(bool, flipped))
     path = bag_with_extrinsics(tmp_path / "bag", *transforms)
     (decided,) = redecide_recording(path, ROBOT).decided
-    given = replace(ROBOT, scan_yaw_rad=yaw * math.pi)
+    given = replace(ROBOT, extrinsics=found)
     (expected,) = redecide_recording(path, given).decided
     assert any(decided.vs)
     assert decided.vs == expected.vs
     assert decided.ranges_m == pytest.approx(expected.ranges_m, abs=1e-6)
-    (unrotated,) = redecide_recording(path, replace(ROBOT, scan_yaw_rad=0.0)).decided
-    assert (decided.vs == unrotated.vs) == (yaw == 0.0)
+    (centred,) = redecide_recording(path, replace(ROBOT, extrinsics=CENTRED)).decided
+    assert (decided.vs == centred.vs) == (extrinsics[:3] == (0.0, 0.0, 0.0))
 
 
-def test_the_offset_of_the_lidar_is_noted(tmp_path: Path) -> None:
+def test_the_extrinsics_of_the_lidar_is_noted(tmp_path: Path) -> None:
     transforms = (
         ("base_link", "mast", LEFT, (0.2, 0.0)),
         ("mast", "laser", LEFT, (0.15, 0.0)),
     )
     found = redecide_recording(bag_with_extrinsics(tmp_path / "bag", *transforms), ROBOT)
     # 0.2 m ahead, then 0.15 m ahead of the mast, which is to the left.
-    assert found.notes == (
-        "/tf_static: laser is rotated by 3.142 rad in base_link, 0.25 m from its origin: "
-        "--robot-radius must include that",
-    )
+    assert found.notes == ("/tf: laser is at (0.2, 0.15) m in base_link, turned by 3.142 rad",)
+    upside_down = ("base_link", "laser", UPSIDE_DOWN, ORIGIN)
+    found = redecide_recording(bag_with_extrinsics(tmp_path / "flipped", upside_down), ROBOT)
+    assert found.notes == ("/tf: laser is at (0, 0) m in base_link, turned by 0 rad, upside down",)
     level = bag_with_extrinsics(tmp_path / "level", ("base_link", "laser", LEVEL, ORIGIN))
     assert redecide_recording(level, ROBOT).notes == ()
 
@@ -292,10 +304,9 @@ def test_the_offset_of_the_lidar_is_noted(tmp_path: Path) -> None:
     ("transforms", "message"),
     [
         ([("base_link", "camera", LEVEL, ORIGIN)],
-         "frame 'laser': no /tf_static gives its pose in 'base_link'; give --scan-yaw"),
+         "frame 'laser': no /tf_static or /tf gives its pose in 'base_link'; give --scan-x, "),
         ([("a", "laser", LEVEL, ORIGIN), ("b", "base_link", LEVEL, ORIGIN)], "no /tf_static"),
         ([("laser", "a", LEVEL, ORIGIN), ("a", "laser", LEVEL, ORIGIN)], "no /tf_static"),
-        ([("base_link", "laser", UPSIDE_DOWN, ORIGIN)], "tilted against 'base_link'"),
         ([("base_link", "laser", (0.0, 0.1, 0.0, 0.9), ORIGIN)], "tilted against 'base_link'"),
         ([("base_link", "laser", (0.0, 0.0, 0.0, 0.0), ORIGIN)], "tilted against 'base_link'"),
     ],
@@ -313,8 +324,7 @@ def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["verify", str(FOREIGN)]) == 0
     expected = redecide_recording(FOREIGN, ROBOT)
     assert capsys.readouterr().out == (
-        "note: /tf_static: laser is rotated by 0 rad in base_link, 0.1 m from its origin: "
-        "--robot-radius must include that\n"
+        "note: /tf: laser is at (0.1, 0) m in base_link, turned by 0 rad\n"
         f"modes: obstacle_avoidance 67, path_generation 66\n"
         f"computed: 133 decisions, digest {expected.digest}\n"
     )

@@ -21,11 +21,10 @@ from ...recording.perceived import (
     TrackedCircle,
     returns_of,
 )
-from ...recording.robot_recordings import Trip, apart, trip_scenario
+from ...recording.robot_recordings import Trip, apart, lidar_of, trip_scenario
 from ...recording.run_setup import Setup
 from ...simulation.decision_digest import Digest
 from ...simulation.episode import Episode
-from ...simulation.robot_model import DEFAULT_BEAMS, Lidar
 from ...verification.redecide import DecidedScan, RecordingDecider, RedecideParams
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ class DecidedRun:
             return
         if not self._decider.has_same_extrinsics:
             print(
-                "note: the scans are of several mountings of a lidar, and parameters hold one: "
+                "note: the scans are of lidars with several extrinsics, and parameters hold one: "
                 "`mfba verify` of this run will find other decisions"
             )
         episode = self._setup().episode(tuple(self._ticks.items))
@@ -143,7 +142,7 @@ class DecidedRun:
         start, planner = self._first.pose, self._decider.planner
         goal = apart(start, self._decider.goals[-1][1])
         trip = Trip(start, goal, self._first.stamp_ns, self._last.stamp_ns)
-        lidar = Lidar(beams=DEFAULT_BEAMS, yaw_rad=self._decider.scan_yaw_rad)
+        lidar = lidar_of(self._decider.extrinsics)
         return Setup(
             scenario=trip_scenario(self._name, trip, planner, lidar),
             sensor=self._params.sensor,
@@ -160,7 +159,7 @@ class DecidedRun:
         params, decider = self._params, self._decider
         lidar = {
             "odom_frame": decider.frame,
-            "scan_yaw": decider.scan_yaw_rad,
+            **decider.extrinsics.parameters,
             "scan_no_return": params.scan_no_return.value,
             "lockstep": False,
         }

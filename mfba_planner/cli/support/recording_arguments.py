@@ -11,6 +11,7 @@ from typing import Any
 
 from ...core.errors import ConfigError
 from ...core.geometry import Point
+from ...core.lidar_extrinsics import PARAMETERS, LidarExtrinsics
 from ...core.option_specs import flatten, override
 from ...perception.no_return import NoReturn
 from ...perception.sensory_vector import SensorParams
@@ -19,7 +20,7 @@ from ...recording.params_file import read_params_file
 from ...verification.redecide import RedecideParams
 
 NAMES = (
-    "goal", "goal_topic", "seed", "robot_radius", "scan_yaw", "scan_no_return", "scan", "odom",
+    "goal", "goal_topic", "seed", "robot_radius", *PARAMETERS, "scan_no_return", "scan", "odom",
 )  # fmt: skip
 PLANNER, SENSOR = "planner", "virtual_sensor"
 NODES = (PLANNER, SENSOR)
@@ -40,11 +41,22 @@ def add_to(group: Any) -> None:
         metavar="M",
         help="radius of the robot, m, added to every lidar return (default: 0.3)",
     )
+    for name, what in (("x", "ahead of"), ("y", "to the left of")):
+        group.add_argument(
+            f"--scan-{name}", type=float, metavar="M",
+            help=f"the lidar, m {what} the robot's centre (default: from /tf_static, /tf)",
+        )  # fmt: skip
     group.add_argument(
         "--scan-yaw",
         type=float,
         metavar="RAD",
-        help="yaw of the scan's frame in the robot's, rad (default: from /tf_static)",
+        help="yaw of the scan's frame in the robot's, rad (default: from /tf_static, /tf)",
+    )
+    group.add_argument(
+        "--scan-flipped",
+        action="store_true",
+        default=None,
+        help="the lidar is upside down (default: from /tf_static, /tf)",
     )
     group.add_argument(
         "--scan-no-return",
@@ -92,21 +104,26 @@ def redecide_params(
     from ...ros.node_settings import VirtualSensorSettings  # a bag of mfba does not need it
 
     both = {**given.get(PLANNER, {}), **given.get(SENSOR, {})}
-    yaw = parsed.scan_yaw if parsed.scan_yaw is not None else both.get("scan_yaw")
+    extrinsics = {
+        name: value
+        for name in PARAMETERS
+        if (value := _first(getattr(parsed, name), both.get(name))) is not None
+    }
     values = {
         "robot_radius_m": _first(parsed.robot_radius, both.get("robot_radius_m")),
-        "scan_yaw": yaw,
         "scan_no_return": _first(parsed.scan_no_return, both.get("scan_no_return")),
+        **extrinsics,
     }
     settings = VirtualSensorSettings(**{k: v for k, v in values.items() if v is not None})
     return RedecideParams(
         robot_radius_m=settings.robot_radius_m,
-        scan_yaw_rad=yaw,
+        extrinsics=LidarExtrinsics.of_parameters(extrinsics) if extrinsics else None,
         scan_no_return=settings.scan_no_return,
         goal=_goal(parsed.goal),
         goal_topic=parsed.goal_topic or "",
         scan=parsed.scan or "",
         odom=parsed.odom or "",
+        base_frame=str(both.get("base_frame", "")),
         odom_frame=str(both.get("odom_frame", "")),
         scan_frame=str(both.get("scan_frame", "")),
         planner=planner,

@@ -11,11 +11,13 @@ from functools import partial
 from typing import Any
 
 from ...core.errors import InputError
+from ...core.lidar_extrinsics import CENTRED
 from ...core.planner_types import Observation, Scan
 from ...perception.near_returns import blind_ring
 from ...perception.scan_to_sectors import aligned
 from ...planning.planner_params import PerceptionInput, PlannerParams
 from ...recording.from_messages import (
+    extrinsics_fields,
     laser_scan,
     robot_pose,
     scan_fields,
@@ -32,6 +34,8 @@ from ..runtime.stale_inputs import NewestInputs
 from ..runtime.stamp_pairing import StampPairs
 from .known_map_subscription import KnownMapSubscription
 from .planner_diagnostics import PlannerDiagnostics
+from .scan_extrinsics import ScanExtrinsics
+from .transform_subscription import TransformSubscription
 
 MOST_HELD = 1000
 
@@ -51,6 +55,7 @@ class InputSubscriptions:
         refused_inputs: RefusedInputs,
         monitor: InputMonitor,
         diagnostics: PlannerDiagnostics,
+        transforms: TransformSubscription,
         on_inputs: Callable[[Inputs], None],
     ) -> None:
         """Subscribe to nothing yet."""
@@ -62,6 +67,8 @@ class InputSubscriptions:
         self.map = KnownMapSubscription(
             node, settings.odom_frame, refused_inputs, diagnostics, self._deliver_held
         )
+        self._transforms, self.extrinsics = transforms, ScanExtrinsics(settings, transforms)
+        self._extrinsics = CENTRED  # of the newest scan
         self.range_max_m = 0.0  # of the newest sectors
         self.fields: dict[str, str] = {}  # of planner/decision: see scan_fields
         self.reset()
@@ -89,6 +96,16 @@ class InputSubscriptions:
         self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
         self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
 
+    def text(self, params: PlannerParams) -> str:
+        """What decides and by what, for the node's first line."""
+        by, lidar = "sectors", ""
+        if params.reads_scan:
+            by, lidar = f"perception {params.perception.value}", f"; {self.extrinsics.text}"
+        return (
+            f"decides: {params.label}, {by}, {params.drive.value}, robot radius "
+            f"{params.robot_radius_m:g} m, {params.speed_mps:g} m/s{lidar}"
+        )
+
     def set_params(self, params: PlannerParams) -> None:
         """Use scans and a map, or not, from now on; params are the planner's."""
         self._params = params
@@ -96,12 +113,15 @@ class InputSubscriptions:
             self.map.subscribe(params)
         if params.reads_scan and self._is_subscribed and not self._is_subscribed_to_scan:
             frame = self._settings.scan_frame
+            if self.extrinsics.reads_tf:
+                self._transforms.subscribe()
             self._monitor.subscribe(topics.SCAN, self._on_scan, depth=PAIRED, frame=frame)
             self._is_subscribed_to_scan = True
 
     def unsubscribed(self) -> None:
         """The node has destroyed all subscriptions."""
         self._is_subscribed = self._is_subscribed_to_scan = False
+        self._transforms.unsubscribed()
         self.map.reset()
 
     def stale(self, timeout_s: float) -> Inputs | None:
@@ -122,14 +142,17 @@ class InputSubscriptions:
         pose = inputs.sensed[1] if inputs.sensed else observation.pose
         if inputs.sensed:
             self.fields = scan_fields(inputs.pose_stamp_ns, pose)
+        if self.extrinsics.reads_tf:
+            self.fields |= extrinsics_fields(self._extrinsics)
         return replace(
             observation,
-            scan=aligned(inputs.scan, pose.yaw + self._settings.scan_yaw),
+            scan=aligned(inputs.scan, pose.yaw, self._extrinsics),
             sensed=inputs.sensed,
             pose_stamp_ns=inputs.pose_stamp_ns,
         )
 
     def _on_odom(self, message: Any) -> None:
+        self.extrinsics.robot_is(message.child_frame_id)
         fault = self._check("odom", message)
         if fault is not None:
             self._receive("odom", message, robot_pose, self._pairs.add_odom, fault)
@@ -178,14 +201,20 @@ class InputSubscriptions:
             return
         if pair is not None:
             (sectors, fault), (scan, scan_fault) = pair
-            convert = partial(laser_scan, no_return=self._settings.scan_no_return)
             converted, conversion_fault = self._convert(
-                "scan", scan, convert, self._settings.scan_frame
+                "scan", scan, self._mounted_scan, self._settings.scan_frame
             )
             if not conversion_fault:
-                self._monitor.scan_note = blind_ring(converted, self._params.robot_radius_m)
+                in_base = aligned(converted, 0.0, self._extrinsics)
+                self._monitor.scan_note = blind_ring(in_base, self._params.robot_radius_m)
             fault = fault or scan_fault or conversion_fault
             self._receive_sectors(sectors, fault, None if fault else converted)
+
+    def _mounted_scan(self, message: Any, frame: str) -> Scan:
+        """The scan, once it is known where its lidar is mounted."""
+        scan = laser_scan(message, frame, self._settings.scan_no_return)
+        self._extrinsics = self.extrinsics.of(message.header.frame_id)
+        return scan
 
     def _receive_sectors(self, message: Any, fault: str, scan: Scan | None = None) -> None:
         self.range_max_m = message.range_max

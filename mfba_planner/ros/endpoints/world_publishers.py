@@ -44,7 +44,13 @@ class WorldPublishers:
         self._outcome = node.advertise(topics.OUTCOME)
         self._trail = node.advertise(topics.TRAIL)
         self._markers = node.advertise(topics.MARKERS)
-        self._tf = node.advertise(topics.TF) if topics.TF else None
+        self._tf = None
+        if topics.TRANSFORMS:
+            self._tf, self._tf_static = map(node.advertise, topics.TRANSFORMS)
+            if self._scan:
+                self._tf_static.publish(
+                    markers.lidar_tf_msg(robot.lidar, self._base_frame, self._scan_frame)
+                )
         self._positions: deque[Point] = deque(maxlen=TRAIL_POINTS)
         self._view = markers.RateLimit(settings.view_period_s)
 

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from geometry_msgs.msg import Point as PointMsg
-from geometry_msgs.msg import Transform, TransformStamped, Vector3
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ...core.geometry import Point, bearing, towards
+from ...core.geometry import Point, bearing, quaternion_from_yaw, towards
 from ...core.planner_types import NANO, Decision, Mode, Ranges
+from ...simulation.robot_model import Lidar
 from ...simulation.world import World
 from .to_messages import pose_msg, set_header
 
@@ -140,16 +141,24 @@ def _fan(namespace: str, position: Point, ranges_m: Ranges, reach_m: float) -> M
 
 def tf_msg(odom: Odometry) -> Any:
     """Odom -> base_link; only called where tf2_msgs is installed."""
+    p = odom.pose.pose.position
+    place = Vector3(x=p.x, y=p.y, z=p.z)
+    return _tf_message(odom.header, odom.child_frame_id, place, odom.pose.pose.orientation)
+
+
+def lidar_tf_msg(lidar: Lidar, base_frame: str, scan_frame: str) -> Any:
+    """Base_link -> base_scan; only called where tf2_msgs is installed."""
+    s, c = quaternion_from_yaw(lidar.yaw_rad)
+    place = Vector3(x=lidar.x_m, y=lidar.y_m, z=0.0)
+    rotation = Quaternion(x=c, y=s, w=0.0) if lidar.flipped else Quaternion(z=s, w=c)
+    return _tf_message(Header(frame_id=base_frame), scan_frame, place, rotation)
+
+
+def _tf_message(header: Header, frame: str, place: Vector3, rotation: Quaternion) -> Any:
     from tf2_msgs.msg import TFMessage
 
-    p = odom.pose.pose.position
-    transform = TransformStamped(
-        header=odom.header,
-        child_frame_id=odom.child_frame_id,
-        transform=Transform(
-            translation=Vector3(x=p.x, y=p.y, z=p.z), rotation=odom.pose.pose.orientation
-        ),
-    )
+    pose = Transform(translation=place, rotation=rotation)
+    transform = TransformStamped(header=header, child_frame_id=frame, transform=pose)
     return TFMessage(transforms=[transform])
 
 

@@ -204,13 +204,23 @@ GRAPH: tuple[Topic, ...] = (
     *PARAMETERS.values(),
 )
 
-try:  # not among the PyPI wheels; published and recorded where it is installed
-    from tf2_msgs.msg import TFMessage
-except ImportError:
-    TF: Topic | None = None
-else:
-    TF = Topic(name="/tf", type=TFMessage, writers=(WORLD_SIM,), qos=TICK_QOS, every_tick=True)
-    GRAPH += (TF,)
+
+def transform_topics() -> tuple[Topic, ...]:
+    """/tf and /tf_static where tf2_msgs is installed: it is not among the PyPI wheels."""
+    try:
+        from tf2_msgs.msg import TFMessage
+    except ImportError:
+        return ()
+    static_qos = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)  # of many publishers
+    writers = (WORLD_SIM,)
+    return (
+        Topic(name="/tf", type=TFMessage, writers=writers, qos=TICK_QOS, every_tick=True),
+        Topic(name="/tf_static", type=TFMessage, writers=writers, qos=static_qos),
+    )
+
+
+TRANSFORMS = transform_topics()
+GRAPH += TRANSFORMS
 
 
 def expected_readers(topic: Topic, nodes: set[str]) -> set[str]:

@@ -41,8 +41,9 @@ class PlannerNode(ManagedNode):
         monitor = InputMonitor(self, s, refused, params.input_timeout_s, self._on_time_set_back)
         self._diagnostics = PlannerDiagnostics(self, s, refused, monitor)
         self._inputs = InputSubscriptions(
-            self, s, params, refused, monitor, self._diagnostics, self._on_inputs
-        )
+            self, s, params, refused, monitor, self._diagnostics, self.goals.transforms,
+            self._on_inputs,
+        )  # fmt: skip
         self._reset()
         self._timer = self.create_wall_timer(self._watch_period_s(), self._on_timer)
         self.enter_life_cycle(s.autostart)
@@ -54,6 +55,7 @@ class PlannerNode(ManagedNode):
         self._outputs = PlannerPublishers(self, s, lambda: self.path_planner)
         self._inputs.subscribe()
         self.goals.subscribe()
+        self.announce(self._inputs.text(self.path_planner.params))
 
     def deactivate(self) -> None:
         """Command rest once, as no command follows."""
@@ -73,11 +75,10 @@ class PlannerNode(ManagedNode):
         if self.is_active and not self.settings.lockstep:
             self.deactivate()
 
-    def missing(self) -> str:
-        """Besides the subscribers: the map and the goal, when ~/ready waits for peers."""
-        no_goal = "" if self.goals.goal_queue.goal else "no goal_pose yet"
-        own = self._inputs.map.missing or no_goal
-        return super().missing() or (own if self._peers else "")
+    def awaits(self) -> str:
+        """The map, then the goal."""
+        no_goal = "" if self.goals.goal_queue.goal else self.goals.awaited or "no goal_pose yet"
+        return self._inputs.map.missing or no_goal
 
     def _reset(self) -> None:
         self.path_planner.reset()

@@ -28,7 +28,7 @@ from ..interface.serialized_message import has_header, header_stamp_ns, type_nam
 from ..node_settings import RecorderSettings, names
 from ..runtime.base_node import GraphNode
 from ..runtime.drain_subscriptions import drain
-from ..runtime.parameter_client import NodeParameters, ParameterClient
+from ..runtime.parameter_client import NodeParameters, ParameterClient, with_full_names
 from ..runtime.polled_subscriptions import Deliver, PolledSubscriptions, SerializedMessage
 from ..runtime.spin_node import spin_node
 
@@ -103,18 +103,19 @@ class Recorder(GraphNode):
         self.writer.flush_if_due(time.monotonic_ns())
 
     def attach_parameters(self, values: NodeParameters) -> None:
-        """Write the nodes' parameters and the facts of the run into the bag, once."""
+        """Write the nodes' parameters and the run's facts into the bag, once."""
         if not self._attached:
             self._attached = True
             for name in [name for name in self._types if self.count_publishers(name)]:
                 self._add_topic(name)
-            attach_configuration(self.writer, {"nodes": values, "run": self._facts})
+            found = with_full_names(values, self.get_namespace())
+            attach_configuration(self.writer, {"nodes": found, "run": self._facts})
             self.writer.flush()
 
     def missing(self) -> str:
         """The nodes whose parameters are not in the bag yet."""
-        pending = ", ".join(self._parameter_client.pending)
-        return f"parameters of {pending} not read yet" if pending else ""
+        pending = self._parameter_client.pending
+        return f"parameters of {', '.join(pending)} not read yet" if pending else ""
 
     def drain(self, executor: Executor) -> None:
         """Record what was sent already."""
@@ -128,9 +129,8 @@ class Recorder(GraphNode):
         """Write what was received or is held and finish the bag."""
         for _ in range(2):  # what was sent during the first poll waits for the second
             self._polled.poll()
-        now_ns = time.time_ns()  # no /clock was received
         for name, held in self._held:
-            self._write(name, held, now_ns)
+            self._write(name, held, time.time_ns())  # no /clock was received
         self.attach_parameters(self._parameter_client.values)
         self.writer.close()
 

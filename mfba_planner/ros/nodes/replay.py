@@ -9,8 +9,9 @@ from typing import Any
 from rclpy.executors import Executor
 from std_srvs.srv import Trigger
 
+from ...core.ros_arguments import split_ros_args
 from ..replaying.bag_player import Phase, Player
-from ..replaying.replay_arguments import ReplaySettings, parse, split_ros_args
+from ..replaying.replay_arguments import ReplaySettings, parse
 from ..runtime.base_node import SPIN_S, GraphNode
 from ..runtime.spin_node import spin_node
 

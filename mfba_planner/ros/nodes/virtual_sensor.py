@@ -10,12 +10,11 @@ from ...core.errors import InputError
 from ...core.geometry import Pose2D
 from ...core.planner_types import Ranges
 from ...core.segments import Segments
-from ...perception.near_returns import blind_ring
-from ...perception.scan_to_sectors import sense_scan
 from ...perception.sense_segments import sense_circles_and_segments
 from ...perception.sensory_vector import SensorParams, enlarged_radii, sensory_vector
-from ...recording.from_messages import laser_scan, obstacle_centers, robot_pose, stamp_ns
+from ...recording.from_messages import obstacle_centers, robot_pose, stamp_ns
 from ...scenarios.scenario_json import parse_segments
+from ..endpoints.scan_sensing import ScanSensing
 from ..endpoints.sensor_diagnostics import SensorDiagnostics
 from ..interface import parameters, topics
 from ..interface.to_messages import sectors_msg, sensory_vector_msg
@@ -51,9 +50,11 @@ class VirtualSensor(GraphNode):
         self._diagnostics = SensorDiagnostics(
             self, s, self._refused_inputs, self._monitor, self._source.name
         )
+        self._scan_sensing = ScanSensing(self, s, self._monitor)
         depth = PAIRED if self._by_stamp else NEWEST
         self._monitor.subscribe(topics.ODOM, self._on_odom, depth=depth, frame=s.odom_frame)
         self._monitor.subscribe(self._source, self._on_source, depth=depth, frame=s.scan_frame)
+        self.announce(self._scan_sensing.text(self.sensor))
         self.advertise_ready(names(s.wait_for))
 
     def _set_sensor(self, sensor: SensorParams) -> None:
@@ -67,6 +68,7 @@ class VirtualSensor(GraphNode):
 
     def _on_odom(self, message: Any) -> None:
         stamp, (fault, is_ordered) = stamp_ns(message.header.stamp), self._check("odom", message)
+        self._scan_sensing.extrinsics.robot_is(message.child_frame_id)
         try:
             self._pose = None if fault else robot_pose(message)
         except InputError as error:
@@ -121,9 +123,7 @@ class VirtualSensor(GraphNode):
         """Convert obstacles or scan and measure; InputError where it is refused."""
         s = self.settings
         if s.source is Source.SCAN:
-            scan = laser_scan(message, s.scan_frame, s.scan_no_return)
-            self._monitor.scan_note = blind_ring(scan, s.robot_radius_m)
-            return sense_scan(scan, pose.yaw + s.scan_yaw, s.robot_radius_m, self.sensor)
+            return self._scan_sensing.measure(message, pose.yaw, self.sensor)
         centers = obstacle_centers(message)
         radii = enlarged_radii(len(centers), self.radii, s.robot_radius_m)
         circles = zip(centers, radii)

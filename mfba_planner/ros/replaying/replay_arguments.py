@@ -71,20 +71,6 @@ class ReplaySettings:
             )
 
 
-def split_ros_args(args: list[str]) -> tuple[list[str], list[str]]:
-    """Replay's own arguments, and those from --ros-args to -- or the end.
-
-    rcl must not get replay's own: it would read FROM:=TO as a deprecated remap rule.
-    """
-    own_and_ros: tuple[list[str], list[str]] = ([], [])
-    is_ros = False
-    for arg in args:
-        starts, ends = arg == "--ros-args", is_ros and arg == "--"
-        is_ros = (is_ros or starts) and not ends
-        own_and_ros[is_ros or ends].append(arg)
-    return own_and_ros
-
-
 def parse(args: list[str]) -> ReplaySettings:
     """Settings from a command line without ROS arguments. Raises ConfigError."""
     parser = Parser(

@@ -167,6 +167,11 @@ class GraphNode(Node):
         text = json.dumps(parameters.values(self), sort_keys=True)
         self._parameters_publisher.publish(topic.type(data=text))
 
+    def announce(self, text: str) -> None:
+        """Log which topics the node listens to, and what it does with them."""
+        names = dict.fromkeys(subscription.topic_name for subscription in self._subscribed)
+        self.get_logger().info(f"listening to {', '.join(names)}; {text}")
+
     def missing(self) -> str:
         """What is missing before a first message would reach all peers; empty: nothing.
 
@@ -183,11 +188,17 @@ class GraphNode(Node):
                 return f"{topic.name} waits for {', '.join(sorted(absent or expected))}"
         outputs = [made.topic_name for topic, made in self._advertised if topic.readers]
         inputs = [subscription.topic_name for subscription in self._subscribed]
-        return type_mismatch(self, [*outputs, *inputs])
+        mismatch = type_mismatch(self, [*outputs, *inputs])
+        return mismatch or (self.awaits() if self._peers else "")
+
+    def awaits(self) -> str:
+        """Which input the node waits for, "" for none; without peers it is ready all the same."""
+        return ""
 
     def _on_ready(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.message = self.missing()
-        response.success = not response.message
+        missing = self.missing()
+        response.message = missing or self.awaits()
+        response.success = not missing
         return response
 
     def count_callers(self) -> int:

@@ -90,3 +90,8 @@ class ParameterClient:
     def _on_values(self, node: str, names: list[str], future: Any) -> None:
         values = map(parameter_value_to_python, future.result().values)
         self.values[node] = {name: parameters.plain(value) for name, value in zip(names, values)}
+
+
+def with_full_names(values: NodeParameters, namespace: str) -> NodeParameters:
+    """The same with the nodes' names below the root, of a client in this namespace."""
+    return {f"{namespace}/{name}".strip("/"): found for name, found in values.items()}

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command lines of nodes: their own arguments, and those of ROS."""
+
+from __future__ import annotations
+
+
+def split_ros_args(args: list[str]) -> tuple[list[str], list[str]]:
+    """A program's own arguments, and those from --ros-args to -- or the end.
+
+    rcl must not get a program's own: it would read FROM:=TO as a deprecated remap rule.
+    """
+    own_and_ros: tuple[list[str], list[str]] = ([], [])
+    is_ros = False
+    for arg in args:
+        starts, ends = arg == "--ros-args", is_ros and arg == "--"
+        is_ros = (is_ros or starts) and not ends
+        own_and_ros[is_ros or ends].append(arg)
+    return own_and_ros
