@@ -28,7 +28,7 @@ from planner_in_process import (
     stamp_at,
 )
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from robot_model_xml import LIDAR_Z_M
 
@@ -37,7 +37,7 @@ from mfba_planner.core.planner_types import Scan
 from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.ros.interface.markers import tf_msg
 from mfba_planner.ros.interface.to_messages import odometry_msg, scan_msg
-from mfba_planner.ros.interface.topics import CMD_VEL, ODOM, SCAN, TF
+from mfba_planner.ros.interface.topics import CMD_VEL, ODOM, SCAN, TRANSFORMS
 from mfba_planner.ros.runtime.spin_node import StopFlag, make_executor
 
 ODOM_FRAME, BASE_FRAME, SCAN_FRAME = "odom", "base_link", "base_scan"
@@ -86,11 +86,12 @@ class PhysicsNode(Node):
         qos = QoSProfile(depth=50)
         self._odom = self.create_publisher(ODOM.type, ODOM.name, qos)
         self._scan = self.create_publisher(SCAN.type, SCAN.name, qos)
-        self._tf = self.create_publisher(TF.type, TF.name, qos) if TF else None
-        if TF:
-            latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-            self._static = self.create_publisher(TF.type, "/tf_static", latched)
-            self._static.publish(TF.type(transforms=[lidar_on_base()]))
+        self._tf = None
+        if TRANSFORMS:
+            moving, static = TRANSFORMS
+            self._tf = self.create_publisher(moving.type, moving.name, qos)
+            self._static = self.create_publisher(static.type, static.name, static.qos)
+            self._static.publish(static.type(transforms=[lidar_on_base()]))
         else:
             self.get_logger().info("tf2_msgs is not installed: no /tf, no /tf_static")
         self.create_subscription(TwistStamped, CMD_VEL.name, self._on_cmd_vel, qos)

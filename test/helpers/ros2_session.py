@@ -141,7 +141,8 @@ class Session:
             received.clear()
         with Program("replay", *args, cwd=self.cwd, more_env=self.env, installed=True) as replay:
             self.graph.until(lambda: replay.process.poll() is not None, TIMEOUT_S)
-            assert (replay.end(), replay.stderr) == (0, "")
+            code = replay.end()
+            assert (code, replay.stderr) == (0, ""), replay.stderr
             assert "played" in replay.stdout
         if decides:
             with BagReader(self.cwd / bag) as recording:

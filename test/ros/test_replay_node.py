@@ -316,8 +316,11 @@ def test_sensor_and_planner_decide_on_every_scan_of_the_foreign_bag(
 ) -> None:
     decisions, vectors = graph.collect(topics.DECISION), graph.collect(topics.SENSORY_VECTOR)
     sectors = graph.collect(topics.SECTORS)
-    graph.start(VirtualSensor, {"source": "scan", "lockstep": True, "wait_for": "planner"})
-    graph.start(PlannerNode, {"lockstep": True})
+    # Its /tf_static says so; the nodes read it only where tf2_msgs is installed.
+    extrinsics = {"scan_x": 0.1}
+    sensing = {"source": "scan", "lockstep": True, "wait_for": "planner"}
+    graph.start(VirtualSensor, {**sensing, **extrinsics})
+    graph.start(PlannerNode, {"lockstep": True, **extrinsics})
     nodes = "--inputs-of virtual_sensor planner --wait-for-subscribers"
     play(graph, start(graph, FOREIGN, f"{line} {nodes}"), timeout_s=60.0)
     graph.until(lambda: len(decisions) >= 133)
