@@ -64,4 +64,4 @@ class _ReadyCall:
         response = self._future.result()
         if not response.success:
             self._future = None
-        return str(response.message)
+        return "" if response.success else str(response.message)
