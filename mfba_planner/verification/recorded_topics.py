@@ -35,11 +35,14 @@ def named_or_only(
 ) -> str:
     """The topic of a type that is wanted, the only one, or that nearest to another topic.
 
-    Raises BagError where that is none, or more than one.
+    The sectors of our own virtual_sensor are scans too, and only taken if wanted. Raises BagError
+    where that is none, or more than one.
     """
     found = recorded(reader, type_name)
     if wanted in found:
         return wanted
+    if not wanted:
+        found = [name for name in found if not _is_of_virtual_sensor(reader, name)] or found
     if wanted:
         problem = "has no message" if wanted in reader.topics else "not one of"
         raise BagError(
@@ -57,6 +60,11 @@ def named_or_only(
             f"name one with {option}"
         )
     return nearest[0]
+
+
+def _is_of_virtual_sensor(reader: BagReader, name: str) -> bool:
+    above, _, last = name.rpartition("/")
+    return last == "sectors" and f"{above}/sensory_vector" in reader.topics
 
 
 def require_same_robot(reader: BagReader, type_name: str, scan: str, odom: str) -> None:

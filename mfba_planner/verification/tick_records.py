@@ -67,11 +67,12 @@ def join_ticks(
     frame: str = "",
     *,
     inputs: Sequence[str],
+    is_simulated: bool = True,
 ) -> TickRecords:
     """Join a robot's messages into ticks; tick_ns is the tick duration, None in real time.
 
     `frame` is the required frame of goals, "" for any. `inputs` are the topics that a decision
-    needs to be decided again.
+    needs to be decided again. A robot that is not simulated may have no topic of obstacles.
     """
     by_topic: dict[str, list[Any]] = {name: [] for name in TICK_TOPICS}
     records = TickRecords(ticks=[], goals=[])
@@ -116,7 +117,9 @@ def join_ticks(
     if tick_ns:
         also = [SCAN] if by_topic[SCAN] else []
         also += [] if TWIST in not_joined else [TWIST]
-        _check_gaps(records, tick_ns, (*STAMPED, *also))
+        is_left_out = not is_simulated and not by_topic[OBSTACLES]
+        needed = [topic for topic in STAMPED if not (is_left_out and topic == OBSTACLES)]
+        _check_gaps(records, tick_ns, (*needed, *also))
     return records
 
 

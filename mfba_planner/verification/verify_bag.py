@@ -132,7 +132,11 @@ def verify_each(
         setup = setups[name]
         tick_ns = setup.planner.tick_ns if setup.lockstep else None
         tick_records = join_ticks(
-            messages.pop(name), tick_ns, setup.odom_frame, inputs=_inputs(setup)
+            messages.pop(name),
+            tick_ns,
+            setup.odom_frame,
+            inputs=_inputs(setup),
+            is_simulated=setup.is_simulated,
         )
         found[name] = _check(setup, tick_records, progress)
     return found

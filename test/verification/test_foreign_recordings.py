@@ -14,6 +14,7 @@ from foreign_bags import (
     START_NS,
     Recorded,
     goal,
+    made,
     odom,
     scan,
     steps,
@@ -174,6 +175,20 @@ def test_a_lidar_whose_pose_is_in_tf_only(with_static: bool, tmp_path: Path) -> 
     same = transform(START_NS, "mast" if with_static else "base_link", "laser", **mount)
     by_static = decided(tmp_path / "static", [static, same, GOAL, *steps(odom, on_wall)])
     assert found.digest == by_static.digest
+
+
+def test_the_sectors_of_our_sensor_are_no_second_lidar(tmp_path: Path) -> None:
+    trip = [MOUNT, GOAL, *steps(odom, on_wall)]
+    sectors = steps(lambda t: scan(t, [0.5] * 12, topic="/sectors"))
+    vector = Recorded("/sensory_vector", START_NS, made("std_msgs/msg/String", data=""))
+    assert "2 topics of sensor_msgs/msg/LaserScan" in refusal(tmp_path, [*trip, *sectors])
+    names = ("alone", "ours", "wanted")
+    for name in names:
+        (tmp_path / name).mkdir()
+    alone = decided(tmp_path / "alone", trip)
+    ours = [*trip, *sectors, vector]
+    assert decided(tmp_path / "ours", ours).digest == alone.digest
+    assert decided(tmp_path / "wanted", ours, scan="/sectors").digest != alone.digest
 
 
 def robot(name: str, goal_x: float, at_deg: int, yaw: float = 0.0) -> list[Recorded]:

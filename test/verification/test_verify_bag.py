@@ -46,6 +46,24 @@ def test_an_unedited_bag_is_identical(bag: Path) -> None:
     assert report.digest == digest(expected)
 
 
+def test_a_robot_in_lockstep_needs_no_obstacles(bag: Path, tmp_path: Path) -> None:
+    """Its nodes without world_sim; a simulated run without them was edited."""
+
+    def without_obstacles(messages: list[RawMessage]) -> list[RawMessage]:
+        return [message for message in messages if message.topic != "/obstacles"]
+
+    def without_world(content: Any) -> Any:
+        del content["nodes"]["world_sim"]
+        return content
+
+    robot = rewrite(bag, tmp_path / "robot", without_obstacles, configure=without_world)
+    report = verify(robot)
+    assert (report.is_identical, report.faults) == (True, ())
+    assert report.digest == verify(bag).digest
+    faults = verify(rewrite(bag, tmp_path / "simulated", without_obstacles)).faults
+    assert any("/obstacles" in fault for fault in faults)
+
+
 def flip_range(message: Any) -> None:
     message.ranges[3] = 0.5 if math.isinf(message.ranges[3]) else math.inf
 
