@@ -89,11 +89,14 @@ def run(
     """The core driver: Algorithm 1 from start to goal or time limit, without ROS.
 
     go_on is called with the world after every decision; False ends the run. path_planner
-    replaces Algorithm 1 but keeps speed, step length and tolerance of `planner`; observe makes
-    its observations.
+    replaces Algorithm 1 but keeps speed, step length and tolerance of `planner`, which must then
+    be for the scenario's robot (Scenario.planner_params; else ConfigError); observe makes its
+    observations.
     """
-    planner = planner or scenario.planner_params(PlannerParams())
-    path_planner = path_planner or supervised_algorithm_1(planner, seed)
+    planner = planner or PlannerParams()
+    if path_planner is None:
+        planner = scenario.planner_params(planner)
+        path_planner = supervised_algorithm_1(planner, seed)
     return run_to_end(
         episode_generator(
             scenario, planner, sensor or SensorParams(), seed, go_on, path_planner, observe

@@ -46,9 +46,10 @@ TASK: dict[str, Any] = {"name": "x", "start_m": (0.0, 0.0), "goal_m": (4.0, 0.0)
 def test_a_planner_for_another_robot_is_refused(change: dict[str, Any], reason: str) -> None:
     scenario = Scenario(**TASK, **change)
     with pytest.raises(ConfigError, match=reason):
-        run(scenario, planner=PlannerParams())
+        run(scenario, planner=PlannerParams(), path_planner=Algorithm1(PlannerParams(), 0))
     own = scenario.planner_params(PlannerParams())
-    assert run(scenario, planner=own).ticks == run(scenario).ticks
+    assert run(scenario, planner=own, path_planner=Algorithm1(own, 0)).planner == own
+    assert run(scenario).planner == own, "without a planner of one's own"
 
 
 # --- the world --------------------------------------------------------------------------------
