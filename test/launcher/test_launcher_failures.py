@@ -75,7 +75,7 @@ def test_missing_middleware_is_one_line(tmp_path: Path) -> None:
 
 def test_node_that_refuses_its_arguments_is_named(tmp_path: Path) -> None:
     done = complete("launcher", "--virtual-sensor-args=-p sectors:=2", cwd=tmp_path)
-    assert done.process.returncode == 1
+    assert done.process.returncode == 1, done.stderr
     assert only_line(done) == (
         "launcher: virtual_sensor ended (exit code 1); last line: virtual_sensor: "
         "sectors=2: out of range; give a value in [3, 3600]\n"
