@@ -6,10 +6,11 @@ from typing import Any, TypeVar
 
 import rclpy
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from waiting import spin_until
 
 from mfba_planner.ros.interface.topics import Topic
@@ -18,6 +19,7 @@ from mfba_planner.ros.runtime.spin_node import make_executor
 
 N = TypeVar("N", bound=GraphNode)
 SETTLE_SPINS = 40  # delivery within a process is synchronous: two spins deliver one message
+LATCHED_TIMEOUT_S = 30.0  # but a reader that came later gets its first messages from a thread
 
 
 class Graph:
@@ -86,8 +88,18 @@ class Graph:
 
     def settle(self) -> None:
         """Spin until all messages are delivered and their callbacks have run."""
+        for publisher in self._latched():
+            assert publisher.wait_for_all_acked(Duration(seconds=LATCHED_TIMEOUT_S))
         for _ in range(SETTLE_SPINS):
             self.executor.spin_once(timeout_sec=0.0)
+
+    def _latched(self) -> list[Publisher]:
+        return [
+            publisher
+            for node in (self.probe, *self.nodes)
+            for publisher in node.publishers
+            if publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        ]
 
     def call(self, service_type: Any, name: str, request: Any = None) -> Any:
         """Call a service and return its response."""

@@ -177,6 +177,7 @@ class Sensor:
         self._sectors = graph.collect(topics.SECTORS)
         given = {"source": "scan", "lockstep": True, "robot_radius_m": RADIUS_M, **parameters}
         self.node = graph.start(VirtualSensor, given)
+        graph.settle()  # what tf said before is known first
 
     def nearest(self) -> float:
         """The nearest range by a beam that meets something 0.9 m ahead of the lidar."""
