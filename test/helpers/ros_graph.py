@@ -33,9 +33,12 @@ class Graph:
         self.nodes: list[GraphNode] = []
 
     def start(self, node_type: type[N], /, parameters: dict[str, Any], **options: Any) -> N:
-        """Construct a node with these parameters and add it to the executor."""
+        """Construct a node with these parameters, have it told what is latched, and add it."""
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         node = node_type(context=self.context, parameter_overrides=overrides, **options)
+        for publisher in self.probe.publishers:
+            if publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                assert publisher.wait_for_all_acked(Duration(seconds=LATCHED_TIMEOUT_S))
         self.executor.add_node(node)
         self.nodes.append(node)
         return node
@@ -88,18 +91,8 @@ class Graph:
 
     def settle(self) -> None:
         """Spin until all messages are delivered and their callbacks have run."""
-        for publisher in self._latched():
-            assert publisher.wait_for_all_acked(Duration(seconds=LATCHED_TIMEOUT_S))
         for _ in range(SETTLE_SPINS):
             self.executor.spin_once(timeout_sec=0.0)
-
-    def _latched(self) -> list[Publisher]:
-        return [
-            publisher
-            for node in (self.probe, *self.nodes)
-            for publisher in node.publishers
-            if publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        ]
 
     def call(self, service_type: Any, name: str, request: Any = None) -> Any:
         """Call a service and return its response."""
