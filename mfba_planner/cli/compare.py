@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.errors import ConfigError
+from ..core.input_files import read_input
 from ..core.option_specs import did_you_mean
 from ..core.output_files import new_run_directory, write_same
 from ..evaluation.comparison.comparison_groups import Group, groups
@@ -311,7 +312,7 @@ def _update(
     names = []
     for name in _PICTURES:
         names.append(f"images/{path.stem}-{name}")
-        replace_file(path.parent / names[-1], (directory / name).read_bytes())
+        replace_file(path.parent / names[-1], read_input(directory / name))
     block = page_block(found, spec.against, facts, names)
     replace_file(path, fill(page, {_BLOCK: block}).encode())
 

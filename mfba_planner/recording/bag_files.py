@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..core.errors import BagError
+from ..core.input_files import MOST_YAML_BYTES, read_input_text
 from . import bag_metadata as metadata
 from .bag_metadata import BagMetadata
 from .mcap_index import GIVE_BAG
@@ -78,7 +79,7 @@ def _without_metadata(path: Path) -> BagFiles:
 
 def _with_metadata(metadata_path: Path) -> BagFiles:
     try:
-        text = metadata_path.read_text(encoding="utf-8")
+        text = read_input_text(metadata_path, MOST_YAML_BYTES)
     except UnicodeDecodeError as error:
         raise BagError(
             f"{metadata_path}: not UTF-8 text; give the .mcap or .db3 file itself"

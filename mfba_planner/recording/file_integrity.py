@@ -11,6 +11,7 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from ..core.errors import BagError
+from ..core.input_files import open_input
 from .mcap_records import MAGIC
 
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offset start, summary CRC
@@ -25,7 +26,7 @@ def check_data(path: Path, shown: Path | None = None) -> bool:
     Raises BagError on a mismatch, which names the file `shown`. Holds one block in memory.
     """
     name = shown or path
-    with path.open("rb") as stream:
+    with open_input(path) as stream:
         size = stream.seek(0, os.SEEK_END)
         tail_bytes = _FOOTER.size + len(MAGIC)
         stream.seek(max(0, size - tail_bytes))

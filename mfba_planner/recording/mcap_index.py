@@ -10,6 +10,7 @@ from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, ChunkIndex, Footer, Header, MetadataIndex, Statistics
 
 from ..core.errors import BagError
+from ..core.input_files import open_input
 from .mcap_file import McapFile, Piece
 from .mcap_records import FRAME, MAGIC, body_stream, frames, reading
 from .mcap_walk import walk
@@ -27,7 +28,7 @@ def open_file(path: Path, *, salvage: bool = False, shown: Path | None = None) -
     """
     source, path = path, shown or path
     try:
-        stream = source.open("rb")
+        stream = open_input(source)
     except OSError as error:
         raise BagError(f"{path}: cannot be read ({error.strerror}); {GIVE_BAG}") from error
     try:

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 import zstandard
 
 from ..core.errors import BagError
+from ..core.input_files import open_input
 from .mcap_index import GIVE_BAG, open_file
 from .storage_file import StorageFile
 
@@ -46,7 +47,7 @@ def open_storage(path: Path, stack: ExitStack, *, salvage: bool) -> StorageFile:
 
 def _head(path: Path) -> bytes:
     try:
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
             return stream.read(16)
     except OSError as error:
         raise BagError(f"{path}: cannot be read ({error.strerror}); {GIVE_BAG}") from error
@@ -65,7 +66,7 @@ def _decompress(path: Path, folder: Path, *, salvage: bool) -> Path:
     """The decompressed file; with `salvage` as much of it as there is."""
     target = folder / path.stem
     try:
-        with path.open("rb") as compressed, target.open("wb") as plain:
+        with open_input(path) as compressed, target.open("wb") as plain:
             reader = zstandard.ZstdDecompressor().stream_reader(compressed)
             while block := reader.read(_COPY_BYTES):
                 plain.write(block)

@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from ..core.errors import ConfigError
+from ..core.input_files import MOST_YAML_BYTES, read_input_text
 from . import yaml_text
 
 PARAMETERS = "ros__parameters"
@@ -22,7 +23,7 @@ def read_params_file(path: Path, nodes: tuple[str, ...]) -> dict[str, dict[str, 
     Raises ConfigError for a file that cannot be read, or holds none of these nodes.
     """
     try:
-        content = yaml_text.load(path.read_text(encoding="utf-8"))
+        content = yaml_text.load(read_input_text(path, MOST_YAML_BYTES))
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise ConfigError(f"--params-file {path}: {reason}; {_GIVE}") from None

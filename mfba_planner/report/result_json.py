@@ -16,6 +16,7 @@ import numpy as np
 
 from mfba_planner import __version__
 from mfba_planner.core.errors import InputError
+from mfba_planner.core.input_files import read_input_text
 from mfba_planner.core.option_specs import flatten
 from mfba_planner.core.output_files import write_new
 from mfba_planner.evaluation.metrics import Result, evaluate
@@ -96,7 +97,7 @@ def write_result(path: Path, data: Mapping[str, Any]) -> None:
 def read_result(path: Path) -> dict[str, Any]:
     """Read a result file; InputError for anything else."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_input_text(path)
     except UnicodeDecodeError:
         raise _refused(path, "not a text file") from None
     except OSError as error:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..core.errors import ConfigError
 from ..core.geometry import Point
+from ..core.input_files import open_input
 from ..perception.known_map import COARSEST_M, FARTHEST_M, FINEST_M, MOST_CELLS
 from .map_outline import outline
 
@@ -115,10 +116,9 @@ def _read_occupied(path: Path, mode: str, negate: bool, threshold: float) -> Arr
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), open_input(path) as file:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(path)
-        with image:
+            image = Image.open(file)
             width, height = image.size
             if width * height > MOST_CELLS:
                 raise Image.DecompressionBombError

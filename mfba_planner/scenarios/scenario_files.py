@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import ConfigError
+from ..core.input_files import MOST_YAML_BYTES
 from ..core.option_specs import did_you_mean
 from ..core.shipped_files import scenario_names, scenario_path
 from ..simulation.scenario import Scenario
@@ -48,6 +49,9 @@ def parse_scenario(text: str, origin: str, directory: Path = Path()) -> Scenario
 
     Raises ConfigError naming origin, value, reason and remedy.
     """
+    if len(text) > MOST_YAML_BYTES:
+        most = MOST_YAML_BYTES // 10**6
+        raise ConfigError(f"{origin}: more than {most} MB; give fewer or simpler obstacles")
     data = _plain(text, origin)
     if data is None:
         raise ConfigError(f"{origin}: empty; {EXAMPLE}")

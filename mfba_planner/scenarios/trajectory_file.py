@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import ConfigError
+from ..core.input_files import read_input
 from ..simulation.recorded_motion import MOST_KNOTS
 
 COLUMNS = ("t_s", "x_m", "y_m")
@@ -40,14 +42,14 @@ def read_trajectory(path: Path) -> list[list[float]]:
     """The points [t, x, y] of a CSV file. Raises ConfigError, naming file and line."""
     points: list[list[float]] = []
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            for number, row in enumerate(csv.reader(file), start=1):
-                words = [word.strip() for word in row]
-                if not any(words) or (not points and tuple(words) == COLUMNS):
-                    continue
-                points.append(_point(words, f"{path} line {number}"))
-                if len(points) > MOST_KNOTS:
-                    raise ConfigError(f"{path}: more than {MOST_KNOTS} points; give fewer")
+        lines = io.StringIO(read_input(path).decode("utf-8-sig"), newline="")
+        for number, row in enumerate(csv.reader(lines), start=1):
+            words = [word.strip() for word in row]
+            if not any(words) or (not points and tuple(words) == COLUMNS):
+                continue
+            points.append(_point(words, f"{path} line {number}"))
+            if len(points) > MOST_KNOTS:
+                raise ConfigError(f"{path}: more than {MOST_KNOTS} points; give fewer")
     except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise ConfigError(f"trajectory {path}: {reason}; {_GIVE}") from None

@@ -75,7 +75,7 @@ def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     bomb = tmp_path / "p.world.gz"
     bomb.write_bytes(gzip.compress(b" " * 3_000_000))
     (found,) = import_files([bomb], ImportOptions())
-    assert "more than 2 MB; take a part" in found.error
+    assert "more than 2 MB; give a readable file, or a part" in found.error
     bomb.write_bytes(gzip.compress(GOOD.encode())[:40])
     (found,) = import_files([bomb], ImportOptions())
     assert "not a text file; give a readable file" in found.error

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ...core.errors import InputError, OutputError
+from ...core.input_files import read_input_text
 from ...core.output_files import write_new
 from ...report.tables.markdown import fill
 
@@ -15,7 +16,7 @@ from ...report.tables.markdown import fill
 def read_page(path: Path, names: Iterable[str]) -> str:
     """The page's text; raises, before the long runs, if it lacks the marks of a block."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_input_text(path)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise InputError(

@@ -14,6 +14,7 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import OutputError
+from ...core.input_files import read_input_text
 from ...core.output_files import write_new
 from .chunk import Chunk, Columns
 
@@ -73,7 +74,7 @@ class Store:
 def read_chunk(directory: Path, name: str) -> Columns | None:
     """The columns of the chunk of that name; None when missing or damaged."""
     try:
-        data = json.loads((directory / CHUNKS / f"{name}.json").read_text(encoding="utf-8"))
+        data = json.loads(read_input_text(directory / CHUNKS / f"{name}.json"))
         columns: Columns = data["columns"]
         whole = data["sha256"] == digest(columns)
     except (OSError, ValueError, TypeError, KeyError):
@@ -99,10 +100,15 @@ def manifest(
 def read_manifest(directory: Path, command: str) -> dict[str, Any]:
     """Read the manifest of a directory of results. Raises OutputError."""
     try:
-        found = json.loads((directory / MANIFEST).read_text(encoding="utf-8"))
+        found = json.loads(read_input_text(directory / MANIFEST))
     except (FileNotFoundError, NotADirectoryError):
         raise OutputError(
             f"{directory}: not empty and no results of `{command}` ({MANIFEST} is missing); "
+            f"{_ANOTHER}"
+        ) from None
+    except OSError as error:
+        raise OutputError(
+            f"{directory}: {MANIFEST} cannot be read ({(error.strerror or str(error)).lower()}); "
             f"{_ANOTHER}"
         ) from None
     except ValueError:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import ConfigError
+from ...core.input_files import read_input_text
 from ...planning.planner_params import PlannerParams
 from ...scenarios.scenario_files import load_scenario
 from ...scenarios.scenario_json import scenario_to_json
@@ -169,8 +170,8 @@ def _check(scenario: Scenario, path: Path, found: Mapping[str, Path]) -> None:
 
 def _is_map(path: Path) -> bool:
     with suppress(OSError, ValueError):
-        if path.suffix != ".json" and path.stat().st_size <= _LARGEST_MAP_YAML:
-            return len(set(_MAP.findall(path.read_text(encoding="utf-8")))) == 3
+        if path.suffix != ".json":
+            return len(set(_MAP.findall(read_input_text(path, _LARGEST_MAP_YAML)))) == 3
     return False
 
 

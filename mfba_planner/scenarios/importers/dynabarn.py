@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import ConfigError
+from ...core.input_files import read_input_text
 from .imported import Imported, ImportOptions, Plain, Source, check_count, number, numbers, rounded
 
 START_M, GOAL_M = (11.0, 0.0), (-9.0, 0.0)
@@ -78,7 +79,7 @@ def motion_of_plugin(file_name: str, folder: Path) -> Plain | None:
     for path in places:
         if path.is_file():
             try:
-                return _of_source(path.read_text(encoding="utf-8"))
+                return _of_source(read_input_text(path))
             except (ConfigError, OSError, ValueError) as error:
                 raise ConfigError(f"plugin {path.name}: {error}") from None
     return None

@@ -15,12 +15,13 @@ from typing import Any
 import yaml
 
 from ...core.errors import ConfigError
+from ...core.input_files import MOST_BYTES, at_most, open_input
 from ...core.option_specs import did_you_mean
 from ..scenario_files import parse_scenario
 from .arena import read_arena
 from .dynabarn import read_dynabarn
 from .gazebo_world import read_world
-from .imported import MOST_BYTES, Imported, ImportOptions, Plain, Source
+from .imported import Imported, ImportOptions, Plain, Source
 from .ir_sim import read_ir_sim
 from .people_recording import read_csv, read_eth_ucy
 
@@ -105,14 +106,12 @@ def _read(path: Path, options: ImportOptions, format_name: str | None) -> Import
 def _text(path: Path) -> str:
     """The text of a file, also .gz. Raises ConfigError where it is too large or no text."""
     try:
-        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-        if len(data) > MOST_BYTES:
-            raise ConfigError(f"more than {MOST_BYTES // 10**6} MB; take a part of the file")
-        return data.decode("utf-8-sig")
+        with open_input(path) as file:
+            plain = gzip.GzipFile(fileobj=file) if path.suffix == ".gz" else file
+            return at_most(plain.read(MOST_BYTES + 1), path, MOST_BYTES).decode("utf-8-sig")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigError(f"{reason}; give a readable file") from None
+        raise ConfigError(f"{reason}; give a readable file, or a part of it") from None
 
 
 def _ending(path: Path) -> str:

@@ -14,7 +14,6 @@ from ...core.option_specs import check, option
 
 Plain = dict[str, Any]  # a scenario as plain data, as a YAML file holds it
 MOST_OBSTACLES = 5000
-MOST_BYTES = 100_000_000
 DIGITS = 6  # of metres and seconds
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from ...core.errors import ConfigError
+from ...core.input_files import MOST_YAML_BYTES
 from .imported import (
     Imported,
     ImportOptions,
@@ -81,6 +82,8 @@ def read_ir_sim(source: Source, options: ImportOptions) -> Imported:
 
 
 def _yaml(text: str) -> Plain:
+    if len(text) > MOST_YAML_BYTES:
+        raise ConfigError(f"more than {MOST_YAML_BYTES // 10**6} MB; take a part of the file")
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in C where it is built
     try:
         data = yaml.load(text, Loader=loader)
