@@ -89,6 +89,44 @@ def test_mistakes_give_one_line(args: list[str], reason: str, here: Path, capsys
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("planner", "reason"),
+    [
+        ("os:system", "the factory raised TypeError (system() takes at most 1 argument"),
+        ("math:hypot", "the factory raised TypeError (must be real number, not PlannerParams)"),
+        ("os:sep", "the factory raised TypeError ('str' object is not callable)"),
+        ("faulty_planners:TwoArguments", "the factory raised TypeError (TwoArguments.__init__()"),
+        ("faulty_planners:makes_nothing", "the factory made NoneType, which has no method plan("),
+        ("faulty_planners:makes_a_class", "the factory made the class Straight, which has no"),
+        ("faulty_planners:WithoutPlan", "the factory made WithoutPlan, which has no method plan("),
+        ("faulty_planners:PlanWithoutInput", "its method plan cannot be called with an observ"),
+        ("faulty_planners:WrongInputs", "the factory raised TypeError ('int' object is not iter"),
+        ("faulty_planners:WrongPreset", "the factory raised TypeError (object of type"),
+    ],
+)
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("sim", "open.yaml"),
+        ("sweep", "open.yaml", "--workers", "1"),
+        ("sweep", "random-3", "--worlds", "1"),
+        ("show", "random-3/0/NAME/0"),
+    ],
+)
+def test_what_makes_no_planner_is_refused_before_a_run(
+    command: tuple[str, ...], planner: str, reason: str, here: Path, capsys: Capture
+) -> None:
+    given = [*command, "--planner", planner]
+    if command[0] == "show":
+        given = ["show", command[1].replace("NAME", planner)]
+    assert mfba(*given) == 1
+    err = capsys.readouterr().err
+    assert f"planner {planner}: {reason}" in err
+    assert "; give MODULE:NAME of something that is called with PlannerParams, Sens" in err
+    assert err.count("\n") == 1
+    assert not Path("runs").exists()
+
+
 def test_a_fleet_has_one_of_the_two_planners_of_the_graph(here: Path, capsys: Capture) -> None:
     assert mfba("sim", "swap", "--planner", "orca") == 1
     assert "--planner orca: of one robot" in capsys.readouterr().err

@@ -97,3 +97,47 @@ class Unmakeable(Straight):
         if seed:
             raise KeyError("seed")
         super().__init__(params, sensor, seed)
+
+
+class TwoArguments:
+    """As a factory it takes too few arguments."""
+
+    def __init__(self, params: PlannerParams, sensor: SensorParams) -> None:
+        """Nothing."""
+
+    def plan(self, obs: Observation) -> Decision:
+        raise NotImplementedError
+
+
+class WithoutPlan:
+    """Takes what a planner takes, and has no plan()."""
+
+    def __init__(self, *_: object) -> None:
+        """Nothing."""
+
+
+class PlanWithoutInput(WithoutPlan):
+    def plan(self) -> None:
+        """Takes no observation."""
+
+
+class WrongInputs(WithoutPlan):
+    inputs = 5
+
+    def plan(self, obs: Observation) -> Decision:
+        raise NotImplementedError
+
+
+class WrongPreset(WithoutPlan):
+    preset = len
+
+    def plan(self, obs: Observation) -> Decision:
+        raise NotImplementedError
+
+
+def makes_nothing(*_: object) -> None:
+    """A factory that forgets to return its planner."""
+
+
+def makes_a_class(*_: object) -> type[Straight]:
+    return Straight

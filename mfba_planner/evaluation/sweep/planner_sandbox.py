@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
+from inspect import signature
 from time import perf_counter_ns
 
 from ...core.errors import MfbaError
@@ -43,6 +45,8 @@ class PlannerSandbox:
             raise
         except Exception as error:
             raise PlannerFault(_raised(error)) from error
+        if fault := fault_of_planner(made):
+            raise PlannerFault(fault)
         return made
 
     def plan(self, obs: Observation) -> Decision:
@@ -75,6 +79,20 @@ class PlannerSandbox:
         if speed > self._limit_mps:
             return f"speed {speed:.4g} m/s exceeds the limit of {self._limit_mps:.4g} m/s"
         return ""
+
+
+def fault_of_planner(made: object) -> str:
+    """Why what a factory has made is no planner, "" if it is one."""
+    plan = getattr(made, "plan", None)
+    if isinstance(made, type) or not callable(plan):
+        name = f"the class {made.__name__}" if isinstance(made, type) else type(made).__name__
+        return f"the factory made {name}, which has no method plan(observation)"
+    with suppress(ValueError):  # of some functions in C nothing is known
+        try:
+            signature(plan).bind(None)
+        except TypeError as error:
+            return f"its method plan cannot be called with an observation ({error})"
+    return ""
 
 
 def _raised(error: Exception) -> str:

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
-from ...core.errors import ConfigError
+from ...core.errors import ConfigError, MfbaError
 from ...core.named_import import import_named
 from ...core.option_specs import Scalar, did_you_mean, flatten
 from ...core.planner_types import PathPlanner
@@ -22,15 +23,19 @@ from ...simulation.lidar_perception import (
 )
 from ...simulation.planner_observations import INPUTS, Observe, Perception
 from ...simulation.scenario import Scenario
+from ...swarm.optimizer import raised
 from ..suites import Suite, suite
 from ..suites.named_suites import SPEED_MPS
 from ..suites.scenario_suite import ScenarioSet
+from .planner_sandbox import fault_of_planner
 
 PATIENCE_S, LONGEST_S = 60.0, 86_400.0
 DEFAULT_PERCEPTION = "lidar"
 # What a planner can be given instead of its input, as listed in reports and in --help.
 PERCEIVED = dict.fromkeys(LIDAR_PERCEPTIONS, "scan") | INPUTS
 PERCEPTIONS = tuple(PERCEIVED)
+_CALLED_WITH = "PlannerParams, SensorParams and a seed"
+_GIVE = f"give MODULE:NAME of something that is called with {_CALLED_WITH}, and makes a planner"
 
 
 class Run(NamedTuple):
@@ -181,8 +186,7 @@ class SweepSpec:
             raise ConfigError("--planner: none given; name at least one")
         for k, name in enumerate(self.planners):
             setting = self.setting_of(name)
-            planner = setting.make_planner(Run(self.suite, 0, name, 0))
-            _check_inputs(name, getattr(planner, "inputs", ()), setting.perception)
+            _check_inputs(name, _inputs_of(name, setting), setting.perception)
             if name in self.planners[:k]:
                 raise ConfigError(f"--planner {name}: given twice; name each planner once")
 
@@ -211,6 +215,28 @@ class SweepSpec:
         ]
 
 
+def _inputs_of(name: str, setting: Setting) -> Sequence[str]:
+    """What a planner reads, () for what it does not say. Raises ConfigError for none."""
+    with _as_config_error(name):
+        planner = make_planner(name, setting.params, setting.sensor, seed=0)
+        if fault := fault_of_planner(planner):
+            raise ConfigError(f"planner {name}: {fault}; {_GIVE}")
+        return [str(name) for name in getattr(planner, "inputs", ())]
+
+
+@contextmanager
+def _as_config_error(name: str) -> Iterator[None]:
+    """Turn what the code of MODULE:NAME raises into a ConfigError; a bug of ours stays one."""
+    try:
+        yield
+    except MfbaError:
+        raise
+    except Exception as error:
+        if ":" not in name:
+            raise
+        raise ConfigError(f"planner {name}: {raised('the factory', error)}; {_GIVE}") from error
+
+
 def _check_inputs(planner: str, inputs: Sequence[str], perception: str) -> None:
     """Raise ConfigError for a planner that could not observe any obstacle."""
     if not inputs or "sectors" in inputs or PERCEIVED[perception] in inputs:
@@ -232,15 +258,19 @@ def make_planner(name: str, params: PlannerParams, sensor: SensorParams, seed: i
 
 def own_preset(name: str, params: PlannerParams) -> PlannerParams:
     """The preset parameters of a planner, else the given ones. Raises as make_planner()."""
-    return preset_of(_factory(name), params)
+    factory = _factory(name)
+    with _as_config_error(name):
+        found = preset_of(factory, params)
+        if not isinstance(found, PlannerParams):
+            raise TypeError(f"preset gave {type(found).__name__}, not PlannerParams")
+        return found
 
 
 def _factory(name: str) -> Factory:
     """The factory of a planner: a registered name, or MODULE:NAME."""
     if ":" not in name:
         return find_factory(name)
-    called_with = "PlannerParams, SensorParams and a seed"
-    factory: Factory = import_named("planner", name, name, called_with)
+    factory: Factory = import_named("planner", name, name, _CALLED_WITH)
     return factory
 
 
