@@ -6,8 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.errors import ConfigError
-from ..core.output_files import new_file
+from ..core.output_files import file_type, new_file
 from ..report.animation_options import AnimationOptions
 from .support.load_episodes import named_episodes
 from .support.progress_bar import progress_bar
@@ -26,7 +25,10 @@ def main(args: list[str]) -> int:
     parser.add_argument(
         "path", type=Path, metavar="BAG|RESULT", help="run or bag directory, or file"
     )
-    parser.add_argument("out", type=Path, metavar="OUT", help="file to create: .webp or .gif")
+    parser.add_argument(
+        "out", type=file_type("animation", ".webp", ".gif"), metavar="OUT",
+        help="file to create: .webp or .gif",
+    )  # fmt: skip
     parser.add_argument(
         "--fps", type=float, default=usual.fps, metavar="N",
         help=f"frames per second (default: {usual.fps:g})",
@@ -47,20 +49,15 @@ def main(args: list[str]) -> int:
     parser.add_robots()
     found = parser.parse(args)
     # Pillow and matplotlib take their time: not for --help.
-    from ..report.animation import SUFFIXES, animation_bytes
+    from ..report.animation import animation_bytes
 
-    suffix = found.out.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ConfigError(
-            f"{found.out}: unknown kind of animation; give a name that ends in .webp or .gif"
-        )
     options = AnimationOptions(
         fps=found.fps, speed=found.speed, width_px=found.width, max_bytes=found.max_bytes
     )
     with new_file(found.out) as file:
         runs, roster, *_ = named_episodes([found.path], found.robots)
         with progress_bar("drawing") as progress:
-            data = animation_bytes(runs, roster, suffix, options, progress)
+            data = animation_bytes(runs, roster, found.out.suffix.lower(), options, progress)
         file.write(data)
     print(f"wrote {found.out}")
     return 0

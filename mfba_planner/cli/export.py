@@ -7,12 +7,11 @@ import csv
 import io
 from collections.abc import Iterator
 from itertools import chain, islice
-from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..core.argument_parser import Parser
 from ..core.errors import BagError, ConfigError
-from ..core.output_files import bag_in, new_file
+from ..core.output_files import bag_in, file_type, new_file
 from ..recording.bag_reader import BagReader
 from ..recording.decisions_with_sectors import robots_with_decisions
 from ..recording.decisions_without_inputs import print_omissions
@@ -32,13 +31,13 @@ def main(args: list[str]) -> int:
         epilog="columns:\n" + "\n".join([*lines, "  range_1 ...  range of each sector, m"]),
     )
     parser.add_bag()
-    parser.add_argument("table", type=Path, metavar="FILE", help="a .csv or .parquet to create")
+    parser.add_argument(
+        "table", type=file_type("table", *_WRITERS), metavar="FILE",
+        help="a .csv or .parquet to create",
+    )  # fmt: skip
     parser.add_robots()
     parsed = parser.parse(args)
-    writers = {".csv": _write_csv, ".parquet": _write_parquet}
-    write = writers.get(parsed.table.suffix)
-    if write is None:
-        raise ConfigError(f"{parsed.table}: unknown table format; give a name in .csv or .parquet")
+    write = _WRITERS[parsed.table.suffix.lower()]
     omitted: dict[str, str] = {}
     with BagReader(bag_in(parsed.bag)) as reader:
         robots = select_robots(reader.path, robots_with_decisions(reader), parsed.robots)
@@ -86,3 +85,6 @@ def _write_parquet(file: BinaryIO, names: list[str], rows: Iterator[Row]) -> int
             writer.write_table(pyarrow.table(columns, schema=schema))
             count += len(batch)
     return count
+
+
+_WRITERS = {".csv": _write_csv, ".parquet": _write_parquet}

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from ..core.argument_parser import Parser
-from ..core.output_files import bag_in
+from ..core.output_files import bag_in, file_type
 from ..recording.decisions_without_inputs import print_omissions
 from ..recording.read_episode import read_recording
 from ..recording.read_perceived import read_perceived
@@ -16,7 +14,9 @@ def main(args: list[str]) -> int:
     """Draw a bag's run."""
     parser = Parser(prog="mfba picture", description="Draw the run of a bag, as `mfba run` does.")
     parser.add_bag()
-    parser.add_argument("png", type=Path, metavar="PNG", help="file to create")
+    parser.add_argument(
+        "png", type=file_type("picture", ".png"), metavar="PNG", help=".png to create"
+    )
     parser.add_robots()
     parsed = parser.parse(args)
     bag = bag_in(parsed.bag)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.output_files import refuse_existing
+from ..core.output_files import file_type, refuse_existing
 from .support.load_episodes import add_paths, named_episodes
 
 _DESCRIPTION = """Write runs as one HTML file; it needs no network and no ROS.
@@ -22,7 +22,7 @@ def main(args: list[str]) -> int:
     add_paths(parser)
     parser.add_argument(
         "--out",
-        type=Path,
+        type=file_type("page", ".html"),
         metavar="HTML",
         default=Path("report.html"),
         help="file to create (default: report.html)",

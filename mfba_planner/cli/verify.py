@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.errors import BagError, ConfigError
-from ..core.output_files import bag_in
+from ..core.output_files import bag_in, file_type
 from ..launcher.set_option import add_set_argument, with_settings
 from ..recording.bag_reader import BagReader
 from ..recording.configuration_attachment import has_configuration
@@ -43,8 +43,9 @@ def main(args: list[str]) -> int:
     )  # fmt: skip
     add_set_argument(parser)
     parser.add_argument(
-        "--picture", type=Path, metavar="PNG", help="with --set: file to create, with both trails"
-    )
+        "--picture", type=file_type("picture", ".png"), metavar="PNG",
+        help="with --set: file to create, with both trails",
+    )  # fmt: skip
     verify_foreign_bag.add_arguments(parser)
     recording_arguments.add_params_file(parser)
     parsed = parser.parse(args)

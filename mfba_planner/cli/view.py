@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from ..core.argument_parser import Parser
+from ..core.output_files import file_type
 from .support.load_episodes import add_paths, named_episodes
 
 _DESCRIPTION = """Show runs in Rerun's viewer (pip install 'mfba_planner[view]'): the moving world,
@@ -18,7 +17,7 @@ def main(args: list[str]) -> int:
     add_paths(parser)
     parser.add_argument(
         "--save",
-        type=Path,
+        type=file_type("recording for Rerun", ".rrd"),
         metavar="RRD",
         help="write this file instead of opening the viewer; open it with `rerun RRD`",
     )

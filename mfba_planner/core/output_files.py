@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from .errors import OutputError
+from .errors import ConfigError, OutputError
 
 
 def new_run_directory(root: Path = Path("runs"), stem: str = "run") -> Path:
@@ -25,6 +25,22 @@ def refuse_existing(path: Path) -> Path:
     if path.exists() or path.is_symlink():
         raise OutputError(f"{path}: exists and is never overwritten; choose another --out")
     return path
+
+
+def file_type(kind: str, *suffixes: str) -> Callable[[str], Path]:
+    """A `type` of argparse: the path of a file to create, whose suffix says what is written.
+
+    It raises ConfigError for another suffix; upper case is the same.
+    """
+
+    def path_of(text: str) -> Path:
+        path = Path(text)
+        if path.suffix.lower() not in suffixes:
+            ends = " or ".join(suffixes)
+            raise ConfigError(f"{path}: unknown kind of {kind}; give a name that ends in {ends}")
+        return path
+
+    return path_of
 
 
 def bag_in(path: Path) -> Path:

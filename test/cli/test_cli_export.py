@@ -80,7 +80,9 @@ def test_a_blind_sensor_leaves_nan_not_fewer_columns(bag: Path, tmp_path: Path) 
 
 def test_mistakes_give_one_line_and_no_file(bag: Path, tmp_path: Path) -> None:
     for name in ("run.xlsx", "run"):
-        with pytest.raises(ConfigError, match=r"unknown table format; give a name in \.csv"):
+        with pytest.raises(
+            ConfigError, match=r"unknown kind of table; give a name that ends in \.csv"
+        ):
             cli.main(["export", str(bag), str(tmp_path / name)])
     with pytest.raises(OutputError, match="cannot be written"):
         cli.main(["export", str(bag), str(tmp_path / "no" / "run.csv")])
