@@ -10,6 +10,7 @@ from ..core.argument_parser import Parser
 from ..core.errors import ConfigError
 from ..core.option_specs import did_you_mean
 from ..core.output_files import new_run_directory, refuse_existing, write_new
+from ..launcher.run_directory import RunDirectory
 from ..report.figures.paper_figures import FIGURES, FORMATS, render
 from .support.progress_bar import progress_bar
 
@@ -40,9 +41,10 @@ def main(args: list[str]) -> int:
         for count, name in enumerate(names):
             show(count, len(names))
             files |= {f"{name}.{form}": data for form, data in render(name, forms).items()}
-    out.mkdir(parents=True)
-    for name, data in files.items():
-        write_new(out / name, data)
+    directory = RunDirectory(out)
+    with directory.discarded_on_error():
+        for name, data in files.items():
+            write_new(out / name, data)
     print(f"wrote {out}: {', '.join(files)}")
     return 0
 

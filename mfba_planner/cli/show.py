@@ -27,6 +27,7 @@ from ..evaluation.sweep.sweep_spec import (
     read_run,
 )
 from ..evaluation.sweep.table_columns import Row, run_row
+from ..launcher.run_directory import RunDirectory
 from ..simulation.triggers import with_triggers
 
 _DESCRIPTION = """Repeat a run of a sweep and explain its outcome.
@@ -91,7 +92,9 @@ def _show_run(swept: ReadSweep | None, argument: str, out: Path | None, *, bag: 
     if row is not None and not _is_same(row, run_row(run, completed)):
         lines.append("note: the sweep's run had another result; see the row of its table")
     print("\n".join(lines))
-    names = _write(directory, run, completed, lines, bag=bag)
+    made = RunDirectory(directory)
+    with made.discarded_on_error():
+        names = _write(directory, run, completed, lines, bag=bag)
     print(f"wrote {directory}: {', '.join(names)}")
     return 0
 
@@ -156,7 +159,6 @@ def _write(
     directory: Path, run: Run, completed: CompletedRun, lines: list[str], *, bag: bool
 ) -> list[str]:
     episode = completed.episode
-    directory.mkdir(parents=True)
     names = ["explanation.txt"]
     write_new(directory / names[0], ("\n".join(lines) + "\n").encode())
     if not episode.ticks:

@@ -93,6 +93,26 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
         ) from None
 
 
+class PostponedErrors:
+    """Errors of writers, of which each is called although one before it has failed."""
+
+    def __init__(self) -> None:
+        self._first: OutputError | None = None
+
+    @contextmanager
+    def postponed(self) -> Iterator[None]:
+        """Keep an OutputError for raise_first()."""
+        try:
+            yield
+        except OutputError as error:
+            self._first = self._first or error
+
+    def raise_first(self) -> None:
+        """Raise the first of the errors, if there was one."""
+        if self._first is not None:
+            raise self._first
+
+
 def _publish(temporary: Path, path: Path) -> None:
     """Give a finished file its name; a link, unlike a rename, refuses an existing one."""
     try:

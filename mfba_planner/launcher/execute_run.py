@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import sys
-from contextlib import closing, suppress
+from contextlib import closing
 
-from ..core.errors import BagError, MfbaError
+from ..core.errors import BagError, MfbaError, OutputError
 from ..scenarios.run_config import Driver
 from ..simulation.episode import Episode
 from ..simulation.run_episode import simulate
@@ -42,8 +42,12 @@ def execute(request: RunRequest, fork_server: ForkServer | None = None) -> int:
         _finish(run, episode)
         return 0
     if run.has_started:
-        with suppress(BagError):  # nothing recorded; the failure is reported below
+        try:
             _finish(run, episode, str(failure))
+        except BagError:
+            pass  # nothing recorded; the failure is reported below
+        except OutputError as error:
+            print(f"note: {error}")
     return _fail(failure, run)
 
 

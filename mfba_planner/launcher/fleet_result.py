@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable
+from functools import partial
 
 from ..core.errors import MfbaError
 from ..evaluation.metrics import evaluate
@@ -18,7 +19,8 @@ def finish_fleet_run(run: Run, failure: str = "") -> None:
     """Print the table, write NAME.json for each robot and run.png.
 
     Raises MfbaError for a run without success, unless `failure` names another error already.
-    Raises BagError for a bag that lacks a robot's decisions or was not closed.
+    Raises BagError for a bag that lacks a robot's decisions or was not closed, and OutputError, in
+    the end, for a file that cannot be written.
     """
     from ..report.fleet_figure import draw_fleet
     from ..report.result_json import result_to_dict, write_result
@@ -29,13 +31,14 @@ def finish_fleet_run(run: Run, failure: str = "") -> None:
     runs = recording.episodes
     results = [evaluate(episode) for episode in runs.values()]
     extra = {"fleet_seed": config.seed, "wall_s": run.wall_s, "failure": failure or None}
+    writers: list[Callable[[], None]] = []
     for name, episode in runs.items():
         left_out = {"left_out": recording.omitted[name]} if name in recording.omitted else {}
-        write_result(directory.path / f"{name}.json", result_to_dict(episode, extra | left_out))
+        data = result_to_dict(episode, extra | left_out)
+        writers.append(partial(write_result, directory.path / f"{name}.json", data))
     if run.request.picture:
-        draw_fleet(config.scenario, config.seed, runs, directory.picture)
-    sys.stdout.write(fleet_text(list(runs), results))
-    print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
+        writers.append(partial(draw_fleet, config.scenario, config.seed, runs, directory.picture))
+    directory.complete(writers, lambda: print(fleet_text(list(runs), results), end=""))
     if failure:
         return
     if run.request.view:

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..core.errors import OutputError
-from ..core.output_files import new_run_directory
+from ..core.output_files import PostponedErrors, new_run_directory
 from ..recording.atomic_files import make_directory, remove_empty
 
 _MAX_TRIES = 100  # so many launchers may start at once
@@ -32,6 +34,32 @@ class RunDirectory:
         """Remove the directory and its files, for a run that has not started."""
         shutil.rmtree(self.path, ignore_errors=True)
         remove_empty(self._made)
+
+    @contextmanager
+    def discarded_on_error(self) -> Iterator[None]:
+        """Discard the directory if the body fails: a retry may give the same name."""
+        try:
+            yield
+        except BaseException:
+            self.discard()
+            raise
+
+    def complete(self, writers: Iterable[Callable[[], object]], show: Callable[[], None]) -> None:
+        """Write the results of a run, show them and print what the directory holds.
+
+        A writer that fails stops none of these; its OutputError is raised at the end. A directory
+        that holds nothing is removed.
+        """
+        errors = PostponedErrors()
+        for write in writers:
+            with errors.postponed():
+                write()
+        show()
+        if names := self.contents():
+            print(f"wrote {self.path}: {', '.join(names)}", flush=True)
+        else:
+            self.discard()
+        errors.raise_first()
 
     def contents(self) -> list[str]:
         """Names of the files in it, sorted."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from ..core.errors import MfbaError
@@ -45,7 +46,8 @@ def why_no_success(episode: Episode, result: Result) -> str:
 def finish_run(run: Run, episode: Episode | None, failure: str = "") -> RunResult:
     """Print the table, write result.json and run.png; the episode comes from the bag if None.
 
-    Raises BagError where the bag holds no decision or was not closed.
+    Raises BagError where the bag holds no decision or was not closed, and OutputError, in the end,
+    for a file that cannot be written.
     """
     from ..report.result_json import result_to_dict, write_result
 
@@ -66,13 +68,12 @@ def finish_run(run: Run, episode: Episode | None, failure: str = "") -> RunResul
     speed = result.ticks / run.wall_s if run.wall_s else None
     extra = {"wall_s": run.wall_s, "ticks_per_s": speed, "failure": failure or None}
     extra |= {"left_out": left_out} if left_out else {}
-    write_result(directory.result, result_to_dict(episode, extra))
+    writers = [partial(write_result, directory.result, result_to_dict(episode, extra))]
     if run.request.picture:
         from ..report.run_figure import draw_run
 
-        draw_run(episode, directory.picture)
-    show(episode, result, speed)
-    print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
+        writers.append(partial(draw_run, episode, directory.picture))
+    directory.complete(writers, partial(show, episode, result, speed))
     return RunResult(directory.path, episode, result)
 
 

@@ -2,14 +2,12 @@
 """A disk that fills up while recording, simulated by errors of the kernel."""
 
 import os
-import resource
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
 import pytest
+from full_disk import file_size_limit
 from recorded_bags import count_with_all, fill, text, write_bag
 
 from mfba_planner.core.errors import OutputError
@@ -17,17 +15,6 @@ from mfba_planner.recording import atomic_files
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import BagWriter
 from mfba_planner.recording.recover import recover
-
-
-@contextmanager
-def file_size_limit(size: int) -> Iterator[None]:
-    """Limit the size of files: write(2) fails with EFBIG, after a partial write if some fits."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_full_disk_at_any_moment(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ... import __version__
 from ...core.errors import ConfigError
 from ...core.option_specs import flatten
+from ...core.output_files import PostponedErrors
 from ...core.planner_types import Decision
 from ...evaluation.metrics import MetricsAccumulator, Result
 from ...recording.bag_reader import BagReader
@@ -105,8 +106,11 @@ class DecidedRun:
                 "`mfba verify` of this run will find other decisions"
             )
         episode = self._setup().episode(tuple(self._ticks.items))
-        names = self._write(self._out, episode, self._metrics.result(episode.outcome))
-        print(f"wrote {self._out}: {', '.join(['bag', *names])}")
+        names, errors = ["bag"], PostponedErrors()
+        with errors.postponed():
+            self._write(self._out, names, episode, self._metrics.result(episode.outcome))
+        print(f"wrote {self._out}: {', '.join(names)}", flush=True)
+        errors.raise_first()
 
     def _add(self, step: DecidedScan) -> None:
         decision, decider = step.decision, self._decider
@@ -173,7 +177,8 @@ class DecidedRun:
             },
         }
 
-    def _write(self, out: Path, episode: Episode, result: Result) -> list[str]:
+    def _write(self, out: Path, names: list[str], episode: Episode, result: Result) -> None:
+        """Write the files, and append their names."""
         # The drawing modules take long to import: only after the bag has been read.
         from ...report.html.page import write_page
         from ...report.result_json import plain, result_to_dict, write_result
@@ -182,9 +187,10 @@ class DecidedRun:
         data = result_to_dict(episode, {"decided_on": str(self._reader.path)})
         data["digest"], data["result"] = self._digest.hexdigest(), plain(_as_dict(result))
         write_result(out / "result.json", data)
+        names.append("result.json")
         perceived = self._perceived.items
         draw_run(episode, out / "run.png", perceived)
-        names = ["result.json", "run.png"]
+        names.append("run.png")
         if self._ticks.stride == 1:
             write_page([(self._name, episode)], out / "report.html", (), {},
                        {self._name: perceived})  # fmt: skip
@@ -194,7 +200,6 @@ class DecidedRun:
                 f"note: no report.html, as it shows {MOST_DECISIONS} decisions at most; "
                 f"run.png shows every {self._ticks.stride}th"
             )
-        return names
 
 
 def _as_dict(result: Result) -> dict[str, Any]:

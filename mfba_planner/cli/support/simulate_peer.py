@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from ...core.errors import ConfigError, MfbaError
@@ -77,10 +78,11 @@ class Peer:
         refuse_existing(out)
         episode = self.simulate(self.config)
         directory, result = RunDirectory(out), evaluate(episode)
-        write_result(directory.result, result_to_dict(episode))
-        draw_run(episode, directory.picture)
-        show(episode, result)
-        print(f"wrote {directory.path}: {', '.join(directory.contents())}", flush=True)
+        writers = [
+            partial(write_result, directory.result, result_to_dict(episode)),
+            partial(draw_run, episode, directory.picture),
+        ]
+        directory.complete(writers, partial(show, episode, result))
         if not result.success:
             raise MfbaError(f"{directory.path}: {why_no_success(episode, result)}")
         return 0
