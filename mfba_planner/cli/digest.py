@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from ..core.argument_parser import Parser
-from ..core.output_files import bag_in
+from ..core.output_files import bag_or_result_in
 from ..recording.decisions_without_inputs import print_omissions
 from ..recording.fleet_topics import NO_NAMESPACE, select_robots
 from ..recording.read_episode import summaries
@@ -34,11 +34,11 @@ def main(args: list[str]) -> int:
 
 
 def _digests(path: Path, robots: list[str]) -> dict[str, str]:
+    path = bag_or_result_in(path)
     if path.suffix == ".json":
         select_robots(path, [NO_NAMESPACE], robots)
         return {NO_NAMESPACE: str(read_result(path)["digest"])}
-    bag = bag_in(path)
-    runs = summaries(bag, robots)
+    runs = summaries(path, robots)
     # To stderr, so that stdout has digest lines only.
-    print_omissions(bag, {name: run.omitted for name, run in runs.items()}, sys.stderr)
+    print_omissions(path, {name: run.omitted for name, run in runs.items()}, sys.stderr)
     return {name: run.digest for name, run in runs.items()}

@@ -12,6 +12,8 @@ from typing import BinaryIO
 
 from .errors import ConfigError, OutputError
 
+RESULT = "result.json"  # of a run directory
+
 
 def new_run_directory(root: Path = Path("runs"), stem: str = "run") -> Path:
     """A directory name below root that is not in use, not created: run-001, run-002, ..."""
@@ -52,6 +54,13 @@ def bag_in(path: Path) -> Path:
         any(path.glob(pattern)) for pattern in ("*.mcap*", "*.db3*")
     )
     return path if is_bag else bag
+
+
+def bag_or_result_in(path: Path) -> Path:
+    """The bag of a run directory, or its result where it has no bag; any other path itself."""
+    bag = bag_in(path)
+    is_bag = bag != path or any(any(path.glob(f"*{end}*")) for end in (".mcap", ".db3", ".bag"))
+    return path / RESULT if not is_bag and (path / RESULT).is_file() else bag
 
 
 def write_new(path: Path, data: bytes) -> None:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..core.errors import OutputError
-from ..core.output_files import PostponedErrors, new_run_directory
+from ..core.output_files import RESULT, PostponedErrors, new_run_directory
 from ..recording.atomic_files import make_directory, remove_empty
 
 _MAX_TRIES = 100  # so many launchers may start at once
@@ -26,7 +26,7 @@ class RunDirectory:
         """
         self.path, self._made = _claim(wanted)
         self.bag = self.path / "bag"
-        self.result = self.path / "result.json"
+        self.result = self.path / RESULT
         self.picture = self.path / "run.png"
         self.log = self.path / "log.txt"
 

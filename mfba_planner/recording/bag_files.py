@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..core.errors import BagError
 from ..core.input_files import MOST_YAML_BYTES, read_input_text
+from ..core.output_files import RESULT
 from . import bag_metadata as metadata
 from .bag_metadata import BagMetadata
 from .mcap_index import GIVE_BAG
@@ -69,6 +70,11 @@ def _without_metadata(path: Path) -> BagFiles:
     missing = f"{metadata.FILE_NAME} is missing"
     found = _files_in(path)
     if not found:
+        if (path / RESULT).is_file():
+            raise BagError(
+                f"{path}: has no bag, only {RESULT}, as of a run without ROS; give a bag, or use "
+                "digest, report, animate or view"
+            )
         raise BagError(
             f"{path}: not a bag, {missing} and so is any .mcap, .db3 or .bag file; {GIVE_BAG}"
         )

@@ -32,6 +32,35 @@ def test_digest_of_a_bag_and_of_a_result(
     assert capsys.readouterr().out == f"{EXPECTED}  {bag}\n{EXPECTED}  {result}\n"
 
 
+@pytest.mark.parametrize("command", [["sim", "empty"], ["run", "empty", "--driver", "core"]])
+def test_digest_of_a_run_directory_without_a_bag(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run"
+    assert cli.main([*command, "--out", str(run)]) == 0
+    capsys.readouterr()
+    assert cli.main(["digest", str(run), str(run / "result.json")]) == 0
+    of_directory, of_file = capsys.readouterr().out.splitlines()
+    found = json.loads((run / "result.json").read_text("utf-8"))["digest"]
+    assert of_directory == f"{found}  {run}"
+    assert of_file == f"{found}  {run / 'result.json'}"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["info"], ["verify"], ["export", "x.csv"], ["picture", "x.png"], ["recover", "x"],
+     ["diff", "run"], ["decide"]],
+)  # fmt: skip
+def test_commands_that_need_a_bag_say_what_a_result_is_good_for(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["sim", "empty", "--out", "run"]) == 0
+    name, *more = command
+    with pytest.raises(BagError, match=r"^run: has no bag, only result.json, .*or use digest, r"):
+        cli.main([name, "run", *more])
+
+
 def test_a_result_without_digest_is_refused(tmp_path: Path) -> None:
     result = tmp_path / "result.json"
     data = result_to_dict(run_episode.run(load_scenario("case1")))

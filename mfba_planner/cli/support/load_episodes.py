@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ...core.argument_parser import Parser
 from ...core.errors import ConfigError, InputError
 from ...core.option_specs import override
-from ...core.output_files import bag_in
+from ...core.output_files import RESULT, bag_or_result_in
 from ...core.shipped_files import scenario_names
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
@@ -31,8 +31,6 @@ from ...simulation.decision_digest import digest
 from ...simulation.episode import Episode
 from ...simulation.run_episode import simulate
 from ...simulation.scenario import Scenario
-
-_RESULT = "result.json"
 
 
 def add_paths(parser: Parser) -> None:
@@ -73,21 +71,19 @@ def named_episodes(paths: list[Path], robots: Sequence[str] = ()) -> NamedEpisod
 def _name(path: Path) -> str:
     """A run's name on the page: its directory or file, without `bag` or `result.json`."""
     path = path.absolute()
-    if path.name in ("bag", _RESULT):
+    if path.name in ("bag", RESULT):
         return path.parent.name
     return path.name if path.is_dir() else path.stem
 
 
 def _recording(path: Path, robots: Sequence[str]) -> tuple[Recording, RobotMaps, RobotPerceived]:
     """A recording, its local maps, and what its robots perceived."""
-    bag = bag_in(path)
-    if bag == path and not any(path.glob("*.mcap*")) and (path / _RESULT).is_file():
-        path = path / _RESULT
+    path = bag_or_result_in(path)
     if path.suffix != ".json":
-        recording = read_recording(bag, robots)
-        print_omissions(bag, recording.omitted)
+        recording = read_recording(path, robots)
+        print_omissions(path, recording.omitted)
         episodes = recording.episodes
-        return recording, read_local_maps(bag, episodes), read_perceived(bag, episodes)
+        return recording, read_local_maps(path, episodes), read_perceived(path, episodes)
     select_robots(path, [NO_NAMESPACE], robots)
     episode = _simulate_result(path)
     return Recording(episode.scenario, episode.seed, {NO_NAMESPACE: episode}, {}), NO_MAPS, {}
