@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 from mcap.opcode import Opcode
@@ -34,27 +35,50 @@ def open_file(path: Path, *, salvage: bool = False, shown: Path | None = None) -
     try:
         with reading(path, "the file"):
             file = McapFile(path, stream, stream.seek(0, 2), source)
-            _require_mcap(file)
-            _require_profile(file)
             footer = _footer(file)
+            _require_mcap(file, is_closed=salvage and footer is not None)
+            if not salvage:
+                _require_profile(file)
         if footer is None and not salvage:
             raise BagError(
                 f"{path}: truncated, the end of the file is missing (the recording was not "
                 f"closed); run `mfba recover {path}`"
             )
         file.complete = footer is not None
-        if footer is None or salvage or not _read_summary(file, footer):
-            walk(file, salvage=salvage)
+        if salvage:
+            _salvage(file, footer)
+        elif footer is None or not _read_summary(file, footer):
+            walk(file, salvage=False)
         return file
     except BaseException:
         stream.close()
         raise
 
 
-def _require_mcap(file: McapFile) -> None:
+def _salvage(file: McapFile, footer: Footer | None) -> None:
+    """Index the whole records, whatever has happened to the header and the summary."""
+    try:
+        with reading(file.path, "its header"):
+            if file.bytes_at(0, len(MAGIC)) != MAGIC:
+                raise ValueError("no magic bytes")
+            _require_profile(file)
+    except BagError:
+        file.damage.append(f"{file.path.name}: its header is damaged, or not of ROS 2")
+    found = McapFile(file.path, file.stream, file.size, file.source)
+    with suppress(BagError):
+        if footer is not None:
+            _read_summary(found, footer)
+    known = {piece.offset: Opcode.CHUNK for piece in found.pieces}
+    known |= {attachment.offset: Opcode.ATTACHMENT for attachment in found.attachments}
+    known |= {record.offset: Opcode.METADATA for record in found.metadata}
+    walk(file, salvage=True, known=known)
+
+
+def _require_mcap(file: McapFile, *, is_closed: bool) -> None:
+    """Raise BagError for a file of another kind; what ends as MCAP does may begin otherwise."""
     if file.size == 0:
         raise BagError(f"{file.path}: empty file; {GIVE_BAG}")
-    if not file.bytes_at(0, min(file.size, len(MAGIC))).startswith(MAGIC):
+    if not is_closed and not file.bytes_at(0, min(file.size, len(MAGIC))).startswith(MAGIC):
         raise BagError(f"{file.path}: not an MCAP file (no magic bytes); {GIVE_BAG}")
 
 
@@ -69,7 +93,8 @@ def _require_profile(file: McapFile) -> None:
     if header.profile not in PROFILES:
         raise BagError(
             f"{file.path}: profile {header.profile!r}, only messages of ROS 2 (CDR) can be read "
-            "from MCAP; give a recording of ROS 2, or the ROS 1 .bag itself"
+            "from MCAP; give a recording of ROS 2, or the ROS 1 .bag itself; if it is one, run "
+            f"`mfba recover {file.path}`"
         )
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,7 +32,7 @@ def recover(path: str | Path, out_dir: str | Path) -> RecoverReport:
 
     Raises BagError if there are none, OutputError if `out_dir` exists or the disk is full.
     """
-    with BagReader(path, salvage=True) as reader:
+    with _recovering(), BagReader(path, salvage=True) as reader:
         if not reader.message_count and not reader.complete:
             raise BagError(
                 f"{path}: not one whole chunk in {reader.size_bytes} bytes, "
@@ -54,6 +55,18 @@ def recover(path: str | Path, out_dir: str | Path) -> RecoverReport:
             bytes_lost=reader.bytes_lost,
             problems=(*reader.problems, *_left_out(reader)),
         )
+
+
+@contextmanager
+def _recovering() -> Iterator[None]:
+    """Name another remedy where a message names this command."""
+    try:
+        yield
+    except BagError as error:
+        reason, _, remedy = str(error).partition("; ")
+        if "mfba recover" not in remedy:
+            raise
+        raise BagError(f"{reason}; nothing of it can be recovered, record again") from error
 
 
 def _left_out(reader: BagReader) -> Iterator[str]:

@@ -92,5 +92,8 @@ def test_sizes(tmp_path: Path) -> None:
 def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(BagError, match="does not exist"):
         describe(tmp_path / "none")
-    with pytest.raises(BagError, match="profile 'ros1'"):
-        describe(foreign_mcap(tmp_path / "a.mcap", profile="ros1"))
+    with pytest.raises(BagError, match="3 messages serialized as 'ros1', only cdr can be read"):
+        describe(foreign_mcap(tmp_path / "a.mcap", profile="ros1", message_encoding="ros1"))
+    # What is readable is described, with the problem that keeps others from reading it.
+    (problem,) = describe(foreign_mcap(tmp_path / "b.mcap", profile="ros1")).problems
+    assert problem == "b.mcap: its header is damaged, or not of ROS 2"

@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+import zstandard
 from mcap.writer import IndexType
 from recorded_bags import (
     FOREIGN,
@@ -157,6 +158,78 @@ def test_a_damaged_chunk_in_the_middle_is_skipped(tmp_path: Path) -> None:
     assert 0 < len(after) < len(before)
     assert [m for m in before if m in after] == after
     assert count_with_all(tmp_path / "out").total() == report.messages
+
+
+def flipped(data: bytes, offset: int, bit: int) -> bytes:
+    return data[:offset] + bytes([data[offset] ^ 1 << bit]) + data[offset + 1 :]
+
+
+def header_bytes(data: bytes) -> int:
+    """Length of the magic bytes and the header record."""
+    return 8 + 9 + int.from_bytes(data[9:17], "little")
+
+
+@pytest.mark.parametrize("bit", [0, 2, 7])
+def test_a_bit_before_the_first_record_of_data_costs_nothing(bit: int, tmp_path: Path) -> None:
+    source = write_bag(tmp_path / "run1", 10, chunk_bytes=9000)
+    data, before = source.read_bytes(), content(source)
+    damaged = tmp_path / "damaged.mcap"
+    for offset in range(header_bytes(data)):
+        damaged.write_bytes(flipped(data, offset, bit))
+        report = recover(damaged, tmp_path / f"out{offset}")
+        assert (report.messages, report.attachments) == (len(before), 1), offset
+        assert content(tmp_path / f"out{offset}") == before
+        if offset in (0, 20, 24):
+            (problem,) = report.problems
+            assert problem == "damaged.mcap: its header is damaged, or not of ROS 2"
+
+
+def test_a_changed_length_costs_one_record_only(tmp_path: Path) -> None:
+    """Of every chunk but the first, also without summary: the next chunk is found by its start."""
+    source = write_bag(tmp_path / "run1", 60, chunk_bytes=9000, beams=40)
+    data, before = source.read_bytes(), content(source)
+    file = open_file(source)
+    pieces, sizes = file.pieces, [len(file.messages(piece)) for piece in file.pieces]
+    file.stream.close()
+    assert len(pieces) > 4
+    damaged = tmp_path / "damaged.mcap"
+    for bytes_cut in (0, 40):  # with the summary, and without
+        for number in range(1, len(pieces) - 1):
+            bits = [(0, 3), (0, 0), (1, 0), (1, 6), (2, 2), (3, 5), (8, 7)]
+            for byte, bit in [*bits, (0, 7)] if not bytes_cut else bits:
+                whole = flipped(data, pieces[number].offset + byte, bit)
+                damaged.write_bytes(whole[: len(whole) - bytes_cut])
+                out = tmp_path / f"out{bytes_cut}_{number}_{byte}_{bit}"
+                report = recover(damaged, out)
+                assert report.problems
+                assert report.bytes_lost > 0
+                assert report.messages >= len(before) - sizes[number], (number, byte, bit)
+                assert [m for m in before if m in content(out)] == content(out)
+
+
+def test_no_remedy_names_the_command_that_has_failed(tmp_path: Path) -> None:
+    """Recover names itself never, verify and info only where it finds more than they do."""
+    source = foreign_mcap(tmp_path / "a.mcap", profile="ros1")
+    data = source.read_bytes()
+    generator = random.Random(5)
+    damaged = tmp_path / "damaged.mcap"
+    for number in range(150):
+        offset = generator.randrange(len(data))
+        damaged.write_bytes(flipped(data, offset, number % 8)[: len(data) - number % 3 * 40])
+        assert "mfba recover" not in refusal_of(damaged, tmp_path / f"out{number}")
+    cut = tmp_path / "cut.mcap.zstd"
+    cut.write_bytes(zstandard.compress(data)[:4] + b"\xff" * 20)
+    with pytest.raises(BagError, match="; nothing of it can be recovered, record again"):
+        recover(cut, tmp_path / "out")
+
+
+def refusal_of(source: Path, out: Path) -> str:
+    """Why recover refuses; "" if it does not."""
+    try:
+        recover(source, out)
+    except BagError as error:
+        return str(error)
+    return ""
 
 
 def test_messages_without_definitions_are_not_recovered(tmp_path: Path) -> None:
