@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from ..core.argument_parser import Parser
-from ..core.errors import ConfigError, MfbaError
+from ..core.errors import MfbaError
+from ..core.option_specs import require_range
 from ..evaluation.optimizer_check import BUDGET, PATIENCE_S, POPULATION, check
 from ..optimizers.registry import NAMES, NONE
 
@@ -29,8 +30,7 @@ def main(args: list[str]) -> int:
         help=f"wall time, s, after which a search does not end (default: {PATIENCE_S:g})",
     )
     parsed = parser.parse(args)
-    if not 0.0 < parsed.patience <= 3600.0:
-        raise ConfigError(f"--patience={parsed.patience:g}: out of range; give 0 to 3600 s")
+    require_range("--patience", parsed.patience, 0, 3600, "s", above=True)
     refused = []
     for name in parsed.names:
         properties = check(name, parsed.patience)

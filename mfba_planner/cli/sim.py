@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ..core.argument_parser import Parser
 from ..core.errors import ConfigError, MfbaError
+from ..core.option_specs import require_range
 from ..evaluation.metrics import Result, evaluate
 from ..launcher.run_arguments import RunRequest, add_world_arguments, read_config
 from ..launcher.run_result import show, why_no_success
@@ -21,6 +22,7 @@ from ..simulation.run_episode import always_continue, simulate
 from ..simulation.world import World
 from .support.progress_bar import simulation_progress
 
+MOST_SEEDS = 2**31 - 1
 _METHODS = [method.value for method in Method]
 _DESCRIPTION = "Simulate episodes without ROS: same decisions as `mfba run`, no bag."
 _HEAD = "    seed  outcome       length     time  clearance  collisions"
@@ -64,8 +66,7 @@ def main(args: list[str]) -> int:
 
 
 def _check(parsed: argparse.Namespace) -> None:
-    if parsed.seeds < 1:
-        raise ConfigError(f"--seeds={parsed.seeds}: out of range; give at least 1")
+    require_range("--seeds", parsed.seeds, 1, MOST_SEEDS)
     if parsed.out is not None and parsed.seeds > 1:
         raise ConfigError(f"--out {parsed.out}: holds one run; leave out --seeds")
 
@@ -88,8 +89,7 @@ def _simulate_with_progress(config: RunConfig) -> Episode:
 def _run(config: RunConfig, seeds: int, simulate_one: Callable[[RunConfig], Episode]) -> int:
     if seeds == 1:
         return _one(simulate_one(config))
-    configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
-    return _many(configs, simulate_one)
+    return _many(config, seeds, simulate_one)
 
 
 def _one(episode: Episode) -> int:
@@ -100,12 +100,13 @@ def _one(episode: Episode) -> int:
     return 0
 
 
-def _many(configs: list[RunConfig], simulate_one: Callable[[RunConfig], Episode]) -> int:
+def _many(config: RunConfig, seeds: int, simulate_one: Callable[[RunConfig], Episode]) -> int:
+    last = replace(config, seed=config.seed + seeds - 1)  # refused before the first run
     print(_HEAD)
     results = []
-    for config in configs:
-        results.append(evaluate(simulate_one(config)))
-        print(_row(config.seed, results[-1]), flush=True)
+    for seed in range(config.seed, last.seed + 1):
+        results.append(evaluate(simulate_one(replace(config, seed=seed))))
+        print(_row(seed, results[-1]), flush=True)
     good = [result for result in results if result.success]
     print(_summary(good, len(results)))
     if len(good) < len(results):

@@ -70,6 +70,20 @@ def _checked(name: str, value: Any, default: Any, spec: Spec) -> Any:
     return value
 
 
+def require_range(
+    name: str, value: float, low: float, high: float, unit: str = "", *, above: bool = False
+) -> None:
+    """Raise ConfigError, with the range, for a value not in [low, high] or, if above, (low, high].
+
+    For values that belong to no dataclass of options.
+    """
+    if (low < value if above else low <= value) and value <= high:
+        return
+    given, least, most = (f"{v:g}" if isinstance(v, float) else v for v in (value, low, high))
+    interval = f"more than {least}, at most {most}" if above else f"{least} to {most}"
+    raise ConfigError(f"{name}={given}: out of range; give {f'{interval} {unit}'.rstrip()}")
+
+
 def _as_float(value: float) -> float:
     try:
         return float(value)

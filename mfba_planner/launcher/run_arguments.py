@@ -235,5 +235,5 @@ def _timeout_s(given: float | None, config: RunConfig) -> float:
         wall_s = config.scenario.time_limit_s / config.speed_factor if config.real_time else 0.0
         return max(TIMEOUT_S, 60.0 + wall_s)
     if not 0.0 < given < float("inf"):
-        raise ConfigError(f"--timeout={given:g}: out of range; give seconds above 0")
+        raise ConfigError(f"--timeout={given:g}: out of range; give a finite number above 0, s")
     return given

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ConfigError, OptimizerError
-from ..core.option_specs import flatten
+from ..core.option_specs import flatten, require_range
 from ..evaluation.comparison.comparison_spec import TABLE, TIMING_TABLE, with_budget
 from ..evaluation.study.chunk import Columns
-from ..evaluation.sweep.sweep_spec import Setting
+from ..evaluation.sweep.sweep_spec import MOST_RUNS, Setting
 from ..evaluation.sweep.table_columns import FAILED, Row
 from ..evaluation.sweep.worker import Lost, run_in_worker
 from ..optimizers.registry import NONE, find_optimizer, make
@@ -97,8 +97,7 @@ class FunctionSpec:
 
     def __post_init__(self) -> None:
         """Raise ConfigError for less than two optimisers that search, or values out of range."""
-        if not 1 <= self.seeds < 2**31:
-            raise ConfigError(f"--runs={self.seeds}: out of range; give at least 1")
+        require_range("--runs", self.seeds, 1, MOST_RUNS)
         Setting(patience_s=self.patience_s)  # the same limits as in worlds
         if self.functions and len(self._searching) < 2:
             raise ConfigError(

@@ -79,7 +79,10 @@ def _require_mcap(file: McapFile, *, is_closed: bool) -> None:
     if file.size == 0:
         raise BagError(f"{file.path}: empty file; {GIVE_BAG}")
     if not is_closed and not file.bytes_at(0, min(file.size, len(MAGIC))).startswith(MAGIC):
-        raise BagError(f"{file.path}: not an MCAP file (no magic bytes); {GIVE_BAG}")
+        raise BagError(
+            f"{file.path}: neither MCAP nor sqlite3 nor a ROS 1 bag, by its first bytes; "
+            f"{GIVE_BAG}"
+        )
 
 
 def _require_profile(file: McapFile) -> None:

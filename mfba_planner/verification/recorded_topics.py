@@ -44,11 +44,12 @@ def named_or_only(
     if not wanted:
         found = [name for name in found if not _is_of_virtual_sensor(reader, name)] or found
     if wanted:
-        problem = "has no message" if wanted in reader.topics else "not one of"
-        raise BagError(
-            f"{reader.path}: {option} {wanted}: {problem} {', '.join(found) or type_name}; "
-            f"name one with {option}"
-        )
+        known = reader.topics.get(wanted)
+        problem = "no such topic" if known is None else "has no message"
+        if known is not None and known.type_name != type_name:
+            problem = f"of type {known.type_name}, not {type_name}"
+        remedy = f"give one of {', '.join(found)}" if found else f"it has none of {type_name}"
+        raise BagError(f"{reader.path}: {option} {wanted}: {problem}; {remedy}")
     if not found:
         raise BagError(
             f"{reader.path}: no message of type {type_name}; give a recording that holds some"

@@ -125,7 +125,7 @@ def test_a_page_is_filled(compared: Path, tmp_path: Path, capsys: Capture) -> No
     again = ["compare", *SMALL, "--out", str(compared), "--update", str(page)]
     page.write_text("# Mine\n", encoding="utf-8")
     assert mfba(*again) == 1
-    assert "no block 'comparison' in the page" in capsys.readouterr().err
+    assert f"mfba: {page}: no block 'comparison'; add the lines" in capsys.readouterr().err
     marks = [f"<!-- {word} generated: comparison -->" for word in ("begin", "end")]
     page.write_text(f"# Mine\n\n{marks[0]}\nold\n{marks[1]}\nend\n", encoding="utf-8")
     for _ in range(2):

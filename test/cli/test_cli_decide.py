@@ -201,7 +201,12 @@ def test_a_new_goal_resets_the_planner_as_in_the_node(tmp_path: Path) -> None:
             "", "nothing was decided: 20 scans before the first odometry: not decided",
         ),
         (drive(20, [math.nan] * 36), "", "no scan could be used, 20 of 20 .*usable range"),
-        (drive(), "--scan /other", "--scan /other: not one of /scan; name one with --scan"),
+        (drive(), "--scan /other", "--scan /other: no such topic; give one of /scan"),
+        (
+            drive(), "--scan /odom",
+            "--scan /odom: of type nav_msgs/msg/Odometry, not sensor_msgs/msg/LaserScan; "
+            "give one of /scan",
+        ),
         (drive(), "--set planner.speed=1", "unknown option; did you mean"),
         (drive(), "--planner apf", "invalid choice"),
         (drive(), "--speed fast", "invalid float value"),

@@ -414,3 +414,14 @@ def test_runs_that_a_sweep_does_not_have(swept: Path, tmp_path: Path, capsys: Ca
     assert "no results of `mfba sweep`" in refused(capsys, "show", str(tmp_path))
     taken = ["show", str(swept), "0", "--out", str(tmp_path)]
     assert "exists and is never overwritten" in refused(capsys, *taken)
+
+
+def test_a_directory_of_something_else_is_not_an_output(tmp_path: Path, capsys: Capture) -> None:
+    """The directory is the input of show; of sweep it is --out."""
+    (tmp_path / "run.png").touch()
+    missing = f"{tmp_path}: no results of `mfba sweep` (study.json is missing); "
+    assert f"{missing}give one that `mfba sweep` has made" in refused(
+        capsys, "show", str(tmp_path)
+    )
+    (tmp_path / "study.json").write_text("{", encoding="utf-8")
+    assert "not JSON; give one that `mfba sweep` has" in refused(capsys, "show", str(tmp_path))

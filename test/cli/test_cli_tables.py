@@ -358,7 +358,7 @@ def test_a_page_without_marks_is_not_changed(capsys: Capture, tmp_path: Path) ->
     page = tmp_path / "page.md"
     page.write_text("# mine\n")
     error = refused(capsys, "1", "--out", str(tmp_path / "out"), "--update", str(page))
-    assert "no block 'origin' in the page: add the lines <!-- begin generated: origin -->" in error
+    assert "no block 'origin'; add the lines <!-- begin generated: origin -->" in error
     assert page.read_text() == "# mine\n"
     assert os.listdir(tmp_path) == ["page.md"]  # checked before anything is run
 

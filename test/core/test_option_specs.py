@@ -18,6 +18,7 @@ from mfba_planner.core.option_specs import (
     flatten,
     option,
     override,
+    require_range,
     walk,
 )
 from mfba_planner.perception.sensory_vector import SensorParams
@@ -276,3 +277,19 @@ def test_the_table_above_is_complete() -> None:
         if type(item.default) in (int, float)
     }
     assert tested == numbers
+
+
+@pytest.mark.parametrize("above", [False, True])
+@pytest.mark.parametrize(("low", "high"), [(0, 3600), (1, 2**31 - 1), (0.0, 86_400.0)])
+def test_a_range_that_is_named_is_the_one_that_is_accepted(
+    low: float, high: float, above: bool
+) -> None:
+    require_range("--x", high, low, high, above=above)
+    require_range("--x", low + 1, low, high, above=above)
+    for refused in (low - 1, high + 1, 10**30, math.nan, math.inf, *([low] if above else [])):
+        with pytest.raises(ConfigError) as caught:
+            require_range("--x", refused, low, high, "s", above=above)
+        end = (f"more than {low:g}, at most" if above else f"{low:g} to") + f" {int(high)} s"
+        assert str(caught.value).endswith(f": out of range; give {end}")
+    if not above:
+        require_range("--x", low, low, high)

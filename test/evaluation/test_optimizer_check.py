@@ -121,7 +121,10 @@ def test_the_command_refuses_by_name_with_the_reasons(capsys: pytest.CaptureFixt
     [
         (["none"], "optimizer none: no search, only the planner's own candidate"),
         (["randon"], r"optimizer 'randon': unknown; did you mean 'random'\?"),
-        (["random", "--patience=0"], "--patience=0: out of range; give 0 to 3600 s"),
+        (
+            ["random", "--patience=0"],
+            "--patience=0: out of range; give more than 0, at most 3600 s",
+        ),
     ],
 )
 def test_the_command_refuses_names_and_arguments(args: list[str], message: str) -> None:

@@ -396,9 +396,10 @@ def test_seeds_of_a_world_are_a_single_case() -> None:
             "give --perception lidar or lidar-differential or lidar-realistic or scenario or "
             "known or scan-12 or scan-360",
         ),
-        ({"worlds": 0}, "--worlds=0: out of range; give at least 1"),
-        ({"first": -1}, "--first=-1: out of range; give at least 0"),
-        ({"seeds": 0}, "--seeds=0: out of range; give at least 1"),
+        ({"worlds": 0}, "--worlds=0: out of range; give 1 to 2147483647"),
+        ({"first": -1}, "--first=-1: out of range; give 0 to 2147483647"),
+        ({"first": 10**20}, f"--first={10**20}: out of range; give 0 to 2147483647"),
+        ({"seeds": 0}, "--seeds=0: out of range; give 1 to 2147483647"),
     ],
 )
 def test_invalid_specs_are_refused(changes: dict[str, Any], reason: str) -> None:
@@ -416,7 +417,7 @@ def test_invalid_specs_are_refused(changes: dict[str, Any], reason: str) -> None
         ({"perception": "lidar", "latency_ticks": -1}, "latency_ticks=-1"),
         ({"noise_m": math.nan}, "noise_m=nan"),
         ({"latency_ticks": -1}, "latency_ticks=-1"),
-        ({"patience_s": 0.0}, "--patience=0: out of range"),
+        ({"patience_s": 0.0}, "--patience=0: out of range; give more than 0, at most 86400 s"),
         ({"patience_s": math.inf}, "--patience=inf: out of range"),
     ],
 )

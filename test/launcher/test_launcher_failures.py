@@ -40,7 +40,10 @@ def only_line(program: Program) -> str:
         (["--reading", "fig2"], "launcher: 'fig2': unknown planner reading; did you mean"),
         (["--swarm", "x"], "launcher: 'x': unknown swarm reading; known: best, literal, robust"),
         (["--speed", "0"], "launcher: speed_factor=0.0: out of range; give"),
-        (["--timeout", "0"], "launcher: --timeout=0: out of range; give seconds above 0"),
+        (
+            ["--timeout", "0"],
+            "launcher: --timeout=0: out of range; give a finite number above 0, s",
+        ),
         (["--driver", "core", "--real-time"], "launcher: --real-time: the core driver has no"),
         (["--driver", "core", "--planner-args=-p"], "launcher: --planner-args: the core driver"),
         (["--planner-args", '"-p'], 'launcher: --planner-args "-p: No closing quotation; quote'),

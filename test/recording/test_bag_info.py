@@ -85,7 +85,7 @@ def test_sizes(tmp_path: Path) -> None:
     assert "Size:        5.4 GB" in format_info(replace(info, size_bytes=5_400_000_000))
     with (tmp_path / "sparse").open("wb") as stream:
         stream.truncate(5_400_000_000)
-    with pytest.raises(BagError, match="not an MCAP file"):
+    with pytest.raises(BagError, match="neither MCAP nor sqlite3 nor a ROS 1 bag"):
         describe(tmp_path / "sparse")
 
 

@@ -324,7 +324,7 @@ def test_nothing_to_recover(tmp_path: Path) -> None:
     with pytest.raises(BagError, match="not a bag"):
         recover(tmp_path / "folder", tmp_path / "out")
     (tmp_path / "text.mcap").write_text("a shopping list")
-    with pytest.raises(BagError, match="not an MCAP file"):
+    with pytest.raises(BagError, match="neither MCAP nor sqlite3 nor a ROS 1 bag"):
         recover(tmp_path / "text.mcap", tmp_path / "out")
     broken = tmp_path / "folder" / "metadata.yaml"
     broken.write_text("{")

@@ -54,9 +54,11 @@ def test_no_bag_at_all(tmp_path: Path) -> None:
     (tmp_path / "empty.mcap").touch()
     assert refusal(tmp_path / "empty.mcap") == f": empty file; {remedy}"
     (tmp_path / "text.mcap").write_text("a shopping list, not a recording")
-    assert refusal(tmp_path / "text.mcap") == f": not an MCAP file (no magic bytes); {remedy}"
+    assert refusal(tmp_path / "text.mcap") == (
+        f": neither MCAP nor sqlite3 nor a ROS 1 bag, by its first bytes; {remedy}"
+    )
     (tmp_path / "short.mcap").write_bytes(MCAP0_MAGIC[:5])
-    assert "not an MCAP file" in refusal(tmp_path / "short.mcap")
+    assert "neither MCAP nor sqlite3" in refusal(tmp_path / "short.mcap")
     (tmp_path / "folder").mkdir()
     assert "not a bag, metadata.yaml is missing" in refusal(tmp_path / "folder")
     os.mkfifo(tmp_path / "pipe")

@@ -262,7 +262,7 @@ def test_topics_without_messages_count_as_not_recorded(tmp_path: Path) -> None:
     messages = [MOUNT, GOAL, *steps(odom, on_wall)]
     path = write(tmp_path / "bag", messages, empty=[("/rear/scan", kind), ("/sectors", kind)])
     assert len(redecide_recording(path, ROBOT).decided) == 20
-    with pytest.raises(BagError, match="--scan /rear/scan: has no message /scan; name one"):
+    with pytest.raises(BagError, match="--scan /rear/scan: has no message; give one of /scan"):
         redecide_recording(path, replace(ROBOT, scan="/rear/scan"))
     empty = write(tmp_path / "empty", [MOUNT, GOAL, *steps(odom)], empty=[("/scan", kind)])
     with pytest.raises(BagError, match=f"no message of type {kind}"):

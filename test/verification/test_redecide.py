@@ -341,7 +341,7 @@ def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
         ("--goal nan 1", "--goal nan 1.0: not finite"),
         ("--seed -1", "seed=-1: negative"),
         ("--robot-radius -1", "robot_radius_m=-1.0: out of range"),
-        ("--odom /o", "--odom /o: not one of /odom; name one with --odom"),
+        ("--odom /o", "--odom /o: no such topic; give one of /odom"),
         ("--set planner.speed=1", "unknown option; did you mean"),
     ],
 )

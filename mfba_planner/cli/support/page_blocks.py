@@ -22,7 +22,10 @@ def read_page(path: Path, names: Iterable[str]) -> str:
         raise InputError(
             f"{path}: cannot be read ({reason.lower()}); give a Markdown page"
         ) from None
-    fill(text, dict.fromkeys(names, ""))
+    try:
+        fill(text, dict.fromkeys(names, ""))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     return text
 
 

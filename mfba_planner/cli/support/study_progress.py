@@ -11,7 +11,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
-from ...core.errors import ConfigError
+from ...core.option_specs import require_range
 from ...evaluation.study.chunk import Chunk
 from ...evaluation.study.chunk_store import Store
 from ...evaluation.study.compute_chunks import check_workers
@@ -53,8 +53,7 @@ def add_study_arguments(parser: argparse.ArgumentParser) -> None:
 
 def check(parsed: argparse.Namespace) -> None:
     """Raise ConfigError for a seed or a number of workers out of range."""
-    if not 0 <= parsed.seed < 2**62:
-        raise ConfigError(f"--seed={parsed.seed}: out of range; give a whole number from 0 up")
+    require_range("--seed", parsed.seed, 0, 2**62 - 1)
     check_workers(parsed.workers)
 
 

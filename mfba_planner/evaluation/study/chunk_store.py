@@ -97,24 +97,24 @@ def manifest(
     }
 
 
-def read_manifest(directory: Path, command: str) -> dict[str, Any]:
-    """Read the manifest of a directory of results. Raises OutputError."""
+def read_manifest(directory: Path, command: str, remedy: str = _ANOTHER) -> dict[str, Any]:
+    """Read the manifest of a directory of results. Raises OutputError, with the remedy."""
     try:
         found = json.loads(read_input_text(directory / MANIFEST))
     except (FileNotFoundError, NotADirectoryError):
+        state = "not empty and " if remedy == _ANOTHER else ""
         raise OutputError(
-            f"{directory}: not empty and no results of `{command}` ({MANIFEST} is missing); "
-            f"{_ANOTHER}"
+            f"{directory}: {state}no results of `{command}` ({MANIFEST} is missing); {remedy}"
         ) from None
     except OSError as error:
         raise OutputError(
             f"{directory}: {MANIFEST} cannot be read ({(error.strerror or str(error)).lower()}); "
-            f"{_ANOTHER}"
+            f"{remedy}"
         ) from None
     except ValueError:
         found = None
     if not isinstance(found, dict):
-        raise OutputError(f"{directory}: {MANIFEST} is cut short or not JSON; {_ANOTHER}")
+        raise OutputError(f"{directory}: {MANIFEST} is cut short or not JSON; {remedy}")
     return found
 
 

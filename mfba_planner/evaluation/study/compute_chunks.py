@@ -14,8 +14,9 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import TypeVar
 
-from ...core.errors import ConfigError, MfbaError
+from ...core.errors import MfbaError
 from ...core.interrupts import interrupts_held
+from ...core.option_specs import require_range
 from .chunk import Chunk, Columns
 from .chunk_store import Store
 
@@ -32,8 +33,7 @@ class WorkerDied(Exception):  # noqa: N818
 
 def check_workers(workers: int) -> None:
     """Raise ConfigError for a number of workers out of range."""
-    if not 1 <= workers <= MAX_WORKERS:
-        raise ConfigError(f"--workers={workers}: out of range; give 1 to {MAX_WORKERS}")
+    require_range("--workers", workers, 1, MAX_WORKERS)
 
 
 def compute(

@@ -19,6 +19,8 @@ from .sweep_spec import Setting, SweepSpec
 from .table import build
 from .table_columns import Row
 
+_GIVE = f"give one that `{COMMAND}` has made"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadSweep:
@@ -32,8 +34,8 @@ class ReadSweep:
 def read_sweep(directory: Path) -> ReadSweep:
     """Read a sweep. Raises InputError for no sweep, OutputError for a damaged manifest."""
     if not directory.is_dir():
-        raise InputError(f"{directory}: no such directory; give one that `mfba sweep` has made")
-    facts = read_manifest(directory, COMMAND)
+        raise InputError(f"{directory}: no such directory; {_GIVE}")
+    facts = read_manifest(directory, COMMAND, _GIVE)
     try:
         spec = _spec(facts)
     except (KeyError, TypeError, AttributeError, ConfigError) as error:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ...core.errors import ConfigError, MfbaError
 from ...core.named_import import import_named
-from ...core.option_specs import Scalar, did_you_mean, flatten
+from ...core.option_specs import Scalar, did_you_mean, flatten, require_range
 from ...core.planner_types import PathPlanner
 from ...perception.sensory_vector import SensorParams
 from ...planning.planner_params import PlannerParams
@@ -30,6 +30,7 @@ from ..suites.scenario_suite import ScenarioSet
 from .planner_sandbox import fault_of_planner
 
 PATIENCE_S, LONGEST_S = 60.0, 86_400.0
+MOST_RUNS = 2**31 - 1  # worlds, seeds
 DEFAULT_PERCEPTION = "lidar"
 # What a planner can be given instead of its input, as listed in reports and in --help.
 PERCEIVED = dict.fromkeys(LIDAR_PERCEPTIONS, "scan") | INPUTS
@@ -83,10 +84,7 @@ class Setting:
             )
         # Also of lidars: the same limits of noise and latency.
         Perception("sectors", noise_m=self.noise_m, latency_ticks=self.latency_ticks)
-        if not 0.0 < self.patience_s <= LONGEST_S:
-            raise ConfigError(
-                f"--patience={self.patience_s:g}: out of range; give 0 to {LONGEST_S:g} s"
-            )
+        require_range("--patience", self.patience_s, 0, LONGEST_S, "s", above=True)
 
     def suite(self, name: str) -> Suite:
         """The suite of the runs. Raises ConfigError for an unknown name."""
@@ -161,8 +159,7 @@ class SweepSpec:
             ("--first", self.first, 0),
             ("--seeds", self.seeds, 1),
         ):
-            if not least <= value < 2**31:
-                raise ConfigError(f"{name}={value}: out of range; give at least {least}")
+            require_range(name, value, least, MOST_RUNS)
         found = self.setting.suite(self.suite)
         if found.count is not None and self.first + self.worlds > found.count:
             raise ConfigError(

@@ -37,7 +37,7 @@ def fill(page_text: str, generated: Mapping[str, str]) -> str:
         start, end = f"<!-- begin generated: {name} -->", f"<!-- end generated: {name} -->"
         pattern = re.compile(re.escape(start) + ".*?" + re.escape(end), re.DOTALL)
         if not pattern.search(page_text):
-            raise InputError(f"no block {name!r} in the page: add the lines {start} and {end}")
+            raise InputError(f"no block {name!r}; add the lines {start} and {end}")
         whole = f"{start}\n{content}\n{end}".replace("\\", r"\\")
         page_text = pattern.sub(whole, page_text)
     return page_text

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ...core.errors import ConfigError
 from ...core.geometry import Point
-from ...core.option_specs import check, option
+from ...core.option_specs import check, option, require_range
 
 Plain = dict[str, Any]  # a scenario as plain data, as a YAML file holds it
 MOST_OBSTACLES = 5000
@@ -47,8 +47,8 @@ class ImportOptions:
         check(self)
         for name in ("robot_radius_m", "time_limit_s"):
             value = getattr(self, name)
-            if value is not None and not 0.0 < value <= 1e5:
-                raise ConfigError(f"{name}={value:g}: out of range; give a number above 0")
+            if value is not None:
+                require_range(name, value, 0, 100_000, name.rpartition("_")[2], above=True)
         for name in ("start_m", "goal_m"):
             value = getattr(self, name)
             if value is not None and not all(map(math.isfinite, value)):
