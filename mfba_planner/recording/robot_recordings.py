@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from ..core.errors import BagError, InputError
@@ -56,13 +57,24 @@ def robot_setups(
         )
     by_name = {name.strip("/"): values for name, values in nodes.items()}
     require_decisions(reader, robots)
+    driver, name = str(run.get("driver", "robot")), str(run.get("name") or name_of(reader.path))
     return {
-        robot: _setup(reader, robot, by_name, str(run.get("driver", "robot"))) for robot in robots
+        robot: _setup(reader, robot, by_name, driver, name if robot == NO_NAMESPACE else robot)
+        for robot in robots
     }
 
 
+def name_of(path: Path) -> str:
+    """The name of a recording: its file or directory, of a bag in a run directory that one."""
+    return path.absolute().parent.name if path.name == "bag" else path.stem
+
+
 def _setup(
-    reader: BagReader, robot: str, nodes: Mapping[str, Mapping[str, Any]], driver: str
+    reader: BagReader,
+    robot: str,
+    nodes: Mapping[str, Mapping[str, Any]],
+    driver: str,
+    name: str,
 ) -> Setup:
     prefix = f"{robot}/" if robot != NO_NAMESPACE else ""
     given, sensing = dict(nodes[prefix + _PLANNER]), dict(nodes.get(prefix + _SENSOR, {}))
@@ -72,7 +84,7 @@ def _setup(
     has_lidar = sensing.get("source") == "scan" or planner.reads_scan
     return Setup(
         scenario=trip_scenario(
-            reader.path.stem if robot == NO_NAMESPACE else robot,
+            name,
             trip,
             planner,
             lidar_of(

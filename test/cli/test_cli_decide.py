@@ -83,7 +83,14 @@ def test_every_command_reads_the_run(run: Path, tmp_path: Path, capsys: Capture)
     assert cli.main(["verify", str(run)]) == 0
     assert f"identical, 133 decisions, digest {found}" in capsys.readouterr().out
     assert cli.main(["info", str(run)]) == 0
-    assert found in capsys.readouterr().out
+    info = capsys.readouterr().out
+    assert found in info
+    # One name in all of them: that of the recording.
+    name = json.loads((run / "result.json").read_text())["scenario"]
+    assert name == FOREIGN.name
+    assert f"\n{name}, predictive, seed 0, recording driver\n" in info
+    (episode,) = read_recording(run / "bag").episodes.values()
+    assert episode.scenario.name == name
     table = tmp_path / "table.csv"
     assert cli.main(["export", str(run), str(table)]) == 0
     with table.open() as file:

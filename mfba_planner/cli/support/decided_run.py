@@ -22,7 +22,7 @@ from ...recording.perceived import (
     TrackedCircle,
     returns_of,
 )
-from ...recording.robot_recordings import Trip, apart, lidar_of, trip_scenario
+from ...recording.robot_recordings import Trip, apart, lidar_of, name_of, trip_scenario
 from ...recording.run_setup import Setup
 from ...simulation.decision_digest import Digest
 from ...simulation.episode import Episode
@@ -50,7 +50,7 @@ class DecidedRun:
     ) -> None:
         """Nothing is read or written yet; `out` is the directory to create, None for none."""
         self._decider, self._params, self._out = decider, params, out
-        self._reader, self._name = reader, reader.path.stem
+        self._reader, self._name = reader, name_of(reader.path)
         self._modes: Counter[str] = Counter()
         self._digest = Digest()
         self._ticks: EvenChoice[Decision] = EvenChoice(MOST_DECISIONS)
@@ -85,7 +85,8 @@ class DecidedRun:
             for step in self._decider.decide():
                 self._add(step)
             if self._bag is not None:
-                self._bag.close(self._nodes(), {"driver": DRIVER, "mfba_planner": __version__})
+                facts = {"driver": DRIVER, "mfba_planner": __version__, "name": self._name}
+                self._bag.close(self._nodes(), facts)
         except BaseException:
             if self._bag is not None and self._out is not None:
                 self._bag.discard()
