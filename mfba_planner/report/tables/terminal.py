@@ -17,6 +17,7 @@ from ..terminal_output import print_encodable
 from . import markdown, text
 from .text import Origin
 
+_PADDING = 3  # of a column: one space on either side and the line
 STYLES = {
     Verdict.REPRODUCED: "green",
     Verdict.DIFFERS: "red",
@@ -37,7 +38,8 @@ def _print(console: Console, sections: Sequence[Section], origin: Origin) -> Non
         if section.entries:
             console.print(_numbers(section))
         for grid in section.grids:
-            console.print(_grid(grid, section.digits))
+            for table in _grid(grid, section.digits, console.width):
+                console.print(table)
             if grid.note:
                 console.print(Padding(Text(grid.note, style="dim"), (0, 1)))
         for note in (*filter(None, [text.seeds(section)]), *section.notes):
@@ -75,13 +77,48 @@ def _ours(e: Entry, names: Sequence[str], digits: int) -> str:
     return "\n".join(f"{name}: {value}" for name, value in shown)
 
 
-def _grid(grid: Grid, digits: int) -> Table:
-    table = _new(grid.title)
-    for head in grid.head:
-        table.add_column(head, overflow="fold")
-    for row in text.rows(grid, digits):
-        table.add_row(*map(Text, row))
-    return table
+def _grid(grid: Grid, digits: int, width: int) -> list[Table]:
+    """The tables of a grid, more than one where its columns do not fit without broken words."""
+    rows = list(text.rows(grid, digits))
+    least = [
+        max(len(word) for cell in column for word in cell.split() or [""])
+        for column in zip(grid.head, *rows)
+    ]
+    tables: list[Table] = []
+    for columns in _column_blocks(least, _label_count(grid), width):
+        table = _new("" if tables else grid.title)
+        for column in columns:
+            table.add_column(grid.head[column], overflow="fold", min_width=least[column])
+        for row in rows:
+            table.add_row(*(Text(row[column]) for column in columns))
+        tables.append(table)
+    return tables
+
+
+def _label_count(grid: Grid) -> int:
+    """How many columns name the rows: the first ones that hold text only, one at least."""
+    columns = list(zip(*grid.rows))
+    numbers = (
+        k for k, column in enumerate(columns) if not all(isinstance(v, str) for v in column)
+    )
+    return max(1, next(numbers, 1))
+
+
+def _column_blocks(least: Sequence[int], labels: int, width: int) -> list[list[int]]:
+    """The numbers of the columns of each table; each begins with the columns of the labels.
+
+    least: the width of the longest word of each column. A column that does not fit at all has a
+    table of its own.
+    """
+    names = list(range(labels))
+    blocks = [list(names)]
+    for column in range(labels, len(least)):
+        block = [*blocks[-1], column]
+        if sum(least[k] + _PADDING for k in block) > width and len(blocks[-1]) > labels:
+            blocks.append([*names, column])
+        else:
+            blocks[-1] = block
+    return blocks
 
 
 def _summary(sections: Sequence[Section]) -> Table:
