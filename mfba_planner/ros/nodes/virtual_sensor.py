@@ -17,7 +17,7 @@ from ...scenarios.scenario_json import parse_segments
 from ..endpoints.scan_sensing import ScanSensing
 from ..endpoints.sensor_diagnostics import SensorDiagnostics
 from ..interface import parameters, topics
-from ..interface.to_messages import sectors_msg, sensory_vector_msg
+from ..interface.tick_serializers import SectorsSerializer, SensoryVectorSerializer
 from ..node_settings import Source, VirtualSensorSettings, names
 from ..runtime.base_node import GraphNode
 from ..runtime.input_monitor import NEWEST, PAIRED, InputMonitor, InputVerdict
@@ -44,6 +44,8 @@ class VirtualSensor(GraphNode):
         self._monitor = InputMonitor(self, s, self._refused_inputs, s.input_timeout_s, self._reset)
         self._by_stamp = s.lockstep or s.source is Source.OBSTACLES
         self._reset()
+        self._serialized_sectors = SectorsSerializer(s.odom_frame)
+        self._serialized_vector = SensoryVectorSerializer()
         self._sectors = self.advertise(topics.SECTORS)
         self._vector = self.advertise(topics.SENSORY_VECTOR)
         self._source = topics.OBSTACLES if s.source is Source.OBSTACLES else topics.SCAN
@@ -132,12 +134,10 @@ class VirtualSensor(GraphNode):
         )
 
     def _publish(self, stamp: int, ranges: Ranges) -> None:
-        s = self.settings
-        self._sectors.publish(
-            sectors_msg(ranges, self.sensor, s.robot_radius_m, stamp, s.odom_frame)
-        )
+        radius_m = self.settings.robot_radius_m
+        self._sectors.publish(self._serialized_sectors(ranges, self.sensor, radius_m, stamp))
         if not math.isnan(ranges[0]):
-            self._vector.publish(sensory_vector_msg(sensory_vector(ranges)))
+            self._vector.publish(self._serialized_vector(sensory_vector(ranges)))
 
     def _refuse(self, error: InputError, source: str) -> str:
         self._refused_inputs.add(error, source)

@@ -34,12 +34,22 @@ class GraphNode(Node):
     def __init__(self, name: str, **kwargs: Any) -> None:
         """Pass rclpy's keyword arguments on (context, parameter_overrides, ...)."""
         super().__init__(name, **kwargs)
+        self._leave_qos_events()
         self.finished = False
         self._kind = name
         self._advertised: list[tuple[Topic, Publisher]] = []
         self._subscribed: list[Subscription] = []
         self._peers: set[str] = set()
         self._jump_handles: list[JumpHandle] = []
+
+    def _leave_qos_events(self) -> None:
+        """Remove the QoS events of rclpy's own topics, for which the executor would wait."""
+        endpoints: list[Any] = [*self.publishers, *self.subscriptions]
+        for endpoint in endpoints:
+            while endpoint.event_handlers:
+                handler = endpoint.event_handlers.pop()
+                self.remove_waitable(handler)
+                handler.destroy()
 
     def advertise(self, topic: Topic, message_type: Any = None) -> Publisher:
         """Create the publisher of a topic of topics.py.

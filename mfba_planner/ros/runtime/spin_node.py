@@ -8,11 +8,12 @@ import time
 from collections.abc import Callable
 
 import rclpy
-from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.signals import SignalHandlerOptions
 
 from .base_node import SPIN_S, GraphNode
 from .environment_notes import environment_notes
+from .node_executor import NodeExecutor
 
 # Longest time that a node stays after its end by a service call, for callers that stay too.
 CALLERS_TIMEOUT_S = 2.0
@@ -33,7 +34,7 @@ class StopFlag:
 
 def make_executor(context: rclpy.Context | None = None) -> Executor:
     """The executor all nodes use; MultiThreadedExecutor is far slower and drops messages."""
-    return SingleThreadedExecutor(context=context)
+    return NodeExecutor(context=context)
 
 
 def wait_for_callers(
