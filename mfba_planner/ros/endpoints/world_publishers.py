@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import replace
 
 from ...core.geometry import Point, towards
@@ -16,8 +15,6 @@ from ..interface.tick_serializers import ObstaclesSerializer, OdometrySerializer
 from ..node_settings import WorldSimSettings
 from ..runtime.base_node import GraphNode
 from .robot_namespace import NamespacedNode
-
-TRAIL_POINTS = 500  # one per view period; of a longer trail the newest is shown
 
 
 class WorldPublishers:
@@ -54,7 +51,7 @@ class WorldPublishers:
                 self._tf_static.publish(
                     markers.lidar_tf_msg(robot.lidar, self._base_frame, self._scan_frame)
                 )
-        self._positions: deque[Point] = deque(maxlen=TRAIL_POINTS)
+        self._positions = markers.Trail(self._frame)
         self._view = markers.RateLimit(settings.view_period_s)
 
     @property
@@ -96,6 +93,5 @@ class WorldPublishers:
             self._scan.publish(to_messages.scan_msg(reading.scan, stamp_ns, self._scan_frame))
         self._odom.publish(self._serialized_odom(reading.pose, velocity, stamp_ns, turn))
         if self._view.due(stamp_ns):
-            self._positions.append(world.pose.position)
-            self._trail.publish(to_messages.path_msg(list(self._positions), stamp_ns, frame))
+            self._trail.publish(self._positions.add(world.pose.position, stamp_ns))
             self._markers.publish(markers.world_markers(world, stamp_ns, frame))
