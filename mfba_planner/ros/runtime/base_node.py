@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import time
 from collections.abc import Callable, Collection
@@ -20,6 +21,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from ..interface import parameters
+from ..interface.tick_decoders import decoder
 from ..interface.topics import PARAMETERS, Topic, expected_readers, reading_qos, with_depth
 from .connection_check import type_mismatch
 from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
@@ -96,14 +98,20 @@ class GraphNode(Node):
         """Subscribe with each QoS profile; a message that fits more than one is delivered once.
 
         With one profile, or with info, a callback of two arguments gets rclpy's MessageInfo too.
+        Messages of the types of tick_decoders.py are named tuples.
         """
         # Without rclpy's QoS events, as in advertise(); connection_check.py names what does not
         # fit, and not a publisher that fits another of the profiles.
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
-        call: Any = _without_duplicates(callback, info=info) if len(profiles) > 1 else callback
+        decode = decoder(message_type)
+        call: Any = callback if decode is None else _decoded(callback, decode)
+        if len(profiles) > 1:
+            call = _without_duplicates(call, info=info)
         for qos in profiles:
             self._subscribed.append(
-                self.create_subscription(message_type, name, call, qos, event_callbacks=events)
+                self.create_subscription(
+                    message_type, name, call, qos, event_callbacks=events, raw=decode is not None
+                )
             )
 
     def subscribe_polled(
@@ -241,6 +249,15 @@ class GraphNode(Node):
         while self._jump_handles:
             self._jump_handles.pop().unregister()
         super().destroy_node()
+
+
+def _decoded(callback: Callable[..., None], decode: Callable[[bytes], Any]) -> Any:
+    """The callback for serialized messages, with as many arguments."""
+    try:
+        inspect.signature(callback).bind(None)
+    except TypeError:
+        return lambda data, info: callback(decode(data), info)
+    return lambda data: callback(decode(data))
 
 
 def _without_duplicates(
