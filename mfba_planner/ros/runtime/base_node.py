@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from collections.abc import Callable, Collection
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -19,9 +21,12 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
+from ...core.errors import ConfigError
+from ...core.ros_arguments import split_ros_args
 from ..interface import parameters
 from ..interface.topics import PARAMETERS, Topic, expected_readers, reading_qos, with_depth
 from .connection_check import type_mismatch
+from .given_parameters import check_given_parameters
 from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
 
 SPIN_S = 0.1  # longest time until a signal is noticed
@@ -32,8 +37,16 @@ class GraphNode(Node):
     """A node of the graph: publishers made from topics.py, and the service ~/ready."""
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Pass rclpy's keyword arguments on (context, parameter_overrides, ...)."""
-        super().__init__(name, **kwargs)
+        """Pass rclpy's keyword arguments on (context, parameter_overrides, ...).
+
+        Raises ConfigError for parameters of the command line that cannot be used.
+        """
+        try:
+            super().__init__(name, **kwargs)
+        except InvalidParameterTypeException:  # of rclpy's own parameter
+            raise ConfigError("use_sim_time: wrong type; give true or false") from None
+        if kwargs.get("context") is None:  # the program's own node
+            check_given_parameters(self, split_ros_args(sys.argv[1:])[1])
         self.finished = False
         self._kind = name
         self._advertised: list[tuple[Topic, Publisher]] = []
