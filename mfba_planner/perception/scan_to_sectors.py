@@ -83,7 +83,7 @@ def sense_scan(
     ox, oy = rotated(extrinsics.offset_m, yaw_rad - extrinsics.yaw_rad)
     reach_m = params.sensing_range_m + math.sqrt(ox * ox + oy * oy)
     hits &= np.where(hits, d, np.inf) - robot_radius_m <= reach_m
-    angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hits) + yaw_rad
+    angles = scan.angles_rad(np.flatnonzero(hits)) + yaw_rad
     ranges = [math.inf] * params.sectors
     for distance_m, angle in zip(d[hits].tolist(), angles.tolist()):
         if ox or oy:

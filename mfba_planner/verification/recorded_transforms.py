@@ -122,21 +122,33 @@ class RecordedExtrinsics:
             reader.path, transforms, base, given
         )  # fmt: skip
         self._found: dict[str, LidarExtrinsics] = {}
+        self._frame = ""
         self.last = given or CENTRED
-
-    @property
-    def is_one(self) -> bool:
-        """Whether all scans so far had the same extrinsics."""
-        return len(set(self._found.values())) < 2
 
     def of(self, frame: str) -> LidarExtrinsics:
         """The extrinsics of the lidar with this frame. Raises BagError if they are unknown."""
         if self._given is not None:
+            self._require_one(frame)
             return self._given
         if frame not in self._found:
             self._found[frame] = self._find(frame)
         self.last = self._found[frame]
         return self.last
+
+    def name(self, frame: str) -> str:
+        """The lidar's name: its frame where tf gives it, else "", that of any single lidar."""
+        self.of(frame)
+        return frame if self._base and self._given is None else ""
+
+    def _require_one(self, frame: str) -> None:
+        """One pose is not that of two lidars."""
+        self._frame = self._frame or frame
+        if frame != self._frame:
+            raise BagError(
+                f"{self._path}: scans in frames {self._frame!r} and {frame!r}, but one pose of a "
+                f"lidar is given; leave {_OPTIONS} out, so that tf gives both, or name the topic "
+                "of one with --scan"
+            )
 
     def _find(self, frame: str) -> LidarExtrinsics:
         if frame and not self._base:

@@ -19,10 +19,10 @@ from .stamp_check import StampCheck
 NEWEST = 1  # queue of an input of which only the newest message counts
 PAIRED = 10  # queue of an input that is looked up by the stamp of another
 
-_REMEDIES = {
-    "odom": "stop or remap all but one",
-    "scan": "merge the lidars into one topic, or set scan_frame to the one to use",
-}
+SEVERAL_REMEDY = (
+    "give each lidar a frame of its own that tf knows, or set scan_frame to the one to use"
+)
+_REMEDIES = {"odom": "stop or remap all but one", "scan": SEVERAL_REMEDY}
 
 
 class InputVerdict(NamedTuple):
@@ -73,8 +73,12 @@ class InputMonitor:
         *,
         depth: int = NEWEST,
         frame: str = "",
+        is_merged: Callable[[str], bool] = lambda _: False,
     ) -> None:
-        """Subscribe to an input; frame is the one required, if any; depth is that in real time."""
+        """Subscribe to an input; frame is the one required, if any; depth is that in real time.
+
+        is_merged(frame): whether messages of this frame may come beside those of others.
+        """
         name = topic.name
         if self._lockstep:
             # Foreign writers send scans, but no odometry that a lockstep world would not.
@@ -85,6 +89,7 @@ class InputMonitor:
             lambda: [p.node_name for p in self._node.get_publishers_info_by_topic(name)],
             _REMEDIES.get(name, "stop all but one"),
             frame,
+            is_merged,
         )
 
         def deliver(message: Any, info: Mapping[str, Any]) -> None:
