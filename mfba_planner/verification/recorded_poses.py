@@ -41,6 +41,10 @@ class RecordedPoses:
             self._stamps.append(stamp)
             self._times.append(message.log_time_ns)
 
+    def __len__(self) -> int:
+        """Number of poses."""
+        return len(self._stamps)
+
     def at(self, stamp_ns: int) -> RecordedPose | None:
         """The pose of a stamp, None if there is none."""
         index = bisect_left(self._stamps, stamp_ns)

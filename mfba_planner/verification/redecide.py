@@ -34,6 +34,7 @@ from ..recording.from_messages import (
     stamp_ns,
     value_or_refusal,
 )
+from ..recording.odometry_from_tf import BASE_FRAME, ODOM_FRAME
 from ..recording.scan_parts import LidarMerging, MountedScan
 from ..recording.transform_tree import frame_name
 from ..simulation.decision_digest import digest
@@ -140,24 +141,29 @@ class RecordingDecider:
         self._reader, self._params = reader, params
         wanted = [name.strip() for name in params.scan.split(",")]
         self.scans = tuple(named_or_only(reader, SCAN, name, "--scan") for name in wanted)
-        self.odom = named_or_only(reader, ODOMETRY, params.odom, "--odom", near=self.scans[0])
-        if not params.odom:
-            require_same_robot(reader, SCAN, self.scans[0], self.odom)
+        self.odom = self._odometry_topic()
         self._faults: list[str] = []
         self._counts: Counter[str] = Counter()
         self._decided: Counter[bool] = Counter()  # by whether the robot is stopped
         self._reasons: Counter[str] = Counter()  # why it is
         self._ahead_s: list[float] = []  # scan stamps against odometry at the same log time
-        first = next(m.message for m in reader.decoded([self.odom]))
-        self.frame = params.odom_frame or frame_name(first.header.frame_id)
-        self.base = frame_name(first.child_frame_id) or params.base_frame
-        self._poses = RecordedPoses(
-            self._rising(self.odom),
-            partial(value_or_refusal, partial(robot_pose, frame=self.frame)),
-        )
         transforms = RecordedTransforms(
             reader, self._topics(TRANSFORMS, TF_STATIC), self._topics(TRANSFORMS, TF)
         )
+        self.odometry = self.odom or ", ".join(transforms.moving)  # the topics
+        self.frame, self.base = self._frames()
+        messages = (
+            self._rising(self.odom) if self.odom else transforms.odometry(self.frame, self.base)
+        )
+        self._poses = RecordedPoses(
+            messages, partial(value_or_refusal, partial(robot_pose, frame=self.frame))
+        )
+        if not self._poses:
+            raise BagError(
+                f"{reader.path}: no message of type {ODOMETRY}, and {self.odometry or '/tf'} does "
+                f"not give {self.base!r} in {self.frame!r}; give odom_frame and base_frame with "
+                "--params-file, or a recording with odometry"
+            )
         self.goals, refused = self._goals(transforms)
         self._notes = [refused] if refused else []
         self._extrinsics = RecordedExtrinsics(reader, transforms, self.base, params.extrinsics)
@@ -223,9 +229,31 @@ class RecordingDecider:
                 self._reasons[step.decision.reason] += 1
             yield step
 
+    def _odometry_topic(self) -> str:
+        """The topic of the odometry; "" where the robot sends it on /tf only."""
+        reader, wanted, scan = self._reader, self._params.odom, self.scans[0]
+        if not wanted and not recorded(reader, ODOMETRY) and recorded(reader, TRANSFORMS):
+            return ""
+        found = named_or_only(reader, ODOMETRY, wanted, "--odom", near=scan)
+        if not wanted:
+            require_same_robot(reader, SCAN, scan, found)
+        return found
+
+    def _frames(self) -> tuple[str, str]:
+        """The frames of the odometry and of the robot, "" where the odometry names none."""
+        params = self._params
+        if not self.odom:
+            return params.odom_frame or ODOM_FRAME, params.base_frame or BASE_FRAME
+        first = next(m.message for m in self._reader.decoded([self.odom]))
+        return (
+            params.odom_frame or frame_name(first.header.frame_id),
+            frame_name(first.child_frame_id) or params.base_frame,
+        )
+
     def _topics(self, type_name: str, name: str) -> list[str]:
         """The topics of this name that belong to the robot."""
-        return of_robot(recorded(self._reader, type_name), name, (*self.scans, self.odom))
+        robot = [*self.scans, *filter(None, [self.odom])]
+        return of_robot(recorded(self._reader, type_name), name, robot)
 
     def _rising(self, *topics: str) -> Iterator[tuple[int, DecodedMessage]]:
         """Yield (stamp, message) of rising stamps; of scans those of each frame rise.
@@ -286,8 +314,8 @@ class RecordingDecider:
         if abs(ahead_s) > CLOCKS_APART_S:
             yield (
                 f"the stamps of {', '.join(self.scans)} are {abs(ahead_s):.3g} s "
-                f"{'ahead of' if ahead_s > 0.0 else 'behind'} those of {self.odom} received at "
-                "the same time: their clocks differ (synchronise them, and record again)"
+                f"{'ahead of' if ahead_s > 0.0 else 'behind'} those of {self.odometry} received "
+                "at the same time: their clocks differ (synchronise them, and record again)"
             )
 
     def _decide(self, stamp: int, log_time_ns: int, scan: Any) -> DecidedScan | None:

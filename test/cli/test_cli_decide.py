@@ -248,6 +248,25 @@ def test_scans_of_two_lidars_are_merged_and_verified(tmp_path: Path, capsys: Cap
         )
 
 
+def test_odometry_on_tf_alone_is_decided_on_and_shown(tmp_path: Path, capsys: Capture) -> None:
+    messages = [transform(START_NS), goal(START_NS, 5.0, 0.0)]
+    for k in range(1, 21):
+        stamp = START_NS + k * TICK_NS
+        messages.append(transform(stamp, "odom", "base_link", x=0.01 * k, topic="/tf"))
+        messages.append(scan(stamp, wall(90)))
+    path, run = write(tmp_path / "bag", messages), tmp_path / "run"
+    assert decide(path, "--out", str(run)) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("recording: scan /scan, odometry /tf in 'odom', goal (5, 0)\n")
+    by_topic = write(tmp_path / "by_topic", drive(20))
+    assert decide(by_topic) == 0
+    assert DIGEST.findall(out) == DIGEST.findall(capsys.readouterr().out) != []
+    for command in (["verify", str(run)], ["export", str(run), str(tmp_path / "run.csv")]):
+        assert cli.main(command) == 0
+    (episode,) = read_recording(run).episodes.values()
+    assert episode.ticks[-1].pose.x == pytest.approx(0.2)
+
+
 def test_where_the_lidar_is_can_be_given(tmp_path: Path, capsys: Capture) -> None:
     """The same as by the recording's transform, and kept for `mfba verify`."""
     mount = transform(START_NS, x=0.1, y=-0.2, yaw=1.0, roll=math.pi)

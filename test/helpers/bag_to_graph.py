@@ -34,7 +34,9 @@ def play(
 ) -> tuple[list[Any], list[Any]]:
     """Publish the very bytes of a bag to both nodes; planner/decision and sectors."""
     common = {"lockstep": True, "robot_radius_m": RADIUS_M, **more}
-    played = (topics.ODOM, topics.SCAN, topics.GOAL_POSE, *topics.TRANSFORMS)
+    played = [topics.ODOM, topics.SCAN, topics.GOAL_POSE, *topics.TRANSFORMS]
+    with BagReader(bag) as reader:
+        played = [topic for topic in played if f"/{topic.name.lstrip('/')}" in reader.topics]
     writers = {topic.name.lstrip("/"): graph.writer(topic) for topic in played}
     decisions, sectors = graph.collect(topics.DECISION), graph.collect(topics.SECTORS)
     graph.start(VirtualSensor, {**common, "source": "scan"})

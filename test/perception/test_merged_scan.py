@@ -36,7 +36,7 @@ def parts() -> list[PlacedScan]:
     ]
 
 
-def seen(lidar: Lidar, pose: Pose2D, discs: list[tuple[float, float, float]]) -> Scan:
+def scan_in_base(lidar: Lidar, pose: Pose2D, discs: list[tuple[float, float, float]]) -> Scan:
     """A scan in the robot's frame."""
     return aligned(scan_at(pose, lidar, discs, None), 0.0, lidar.extrinsics)
 
@@ -92,7 +92,9 @@ DISCS = st.lists(
 def test_nothing_is_free_that_is_not(discs: list[tuple[float, float, float]]) -> None:
     """Returns are on the discs, and beams that met nothing pass them all but for grazing."""
     pose = Pose2D(0.0, 0.0)
-    merged = merged_scan([PlacedScan(seen(each, pose, discs)) for each in CORNERS], RADIUS_M)
+    merged = merged_scan(
+        [PlacedScan(scan_in_base(each, pose, discs)) for each in CORNERS], RADIUS_M
+    )
     ranges = np.asarray(merged.ranges_m)
     angles = merged.angles_rad(np.arange(ranges.size))
     for x, y, r in discs:
@@ -118,7 +120,7 @@ def test_obstacles_are_tracked_where_they_are() -> None:
     for k in range(20):
         pose = Pose2D(0.02 * k, 0.0, 0.03 * k)
         discs = [(2.0, 0.5, 0.2), (1.0 + 0.04 * k, -1.2, 0.2)]
-        lidars = [PlacedScan(seen(lidar, pose, discs)) for lidar in CORNERS]
+        lidars = [PlacedScan(scan_in_base(lidar, pose, discs)) for lidar in CORNERS]
         scan = aligned(merged_scan(lidars, RADIUS_M), pose.yaw)
         tracker.update(k * 100_000_000, scan.taken_from(pose), scan)
     standing, moving = sorted(tracker.tracks, key=lambda track: track.moving)
@@ -131,7 +133,7 @@ def test_obstacles_are_tracked_where_they_are() -> None:
 def test_an_older_scan_is_brought_to_where_the_robot_is_now() -> None:
     disc = [(1.5, 0.4, 0.2)]
     before, now = Pose2D(0.0, 0.0), Pose2D(0.1, 0.05, 0.3)
-    old = PlacedScan(seen(CORNERS[0], before, disc), relative_pose(before, now))
+    old = PlacedScan(scan_in_base(CORNERS[0], before, disc), relative_pose(before, now))
     points = returns_of(aligned(merged_scan([old], RADIUS_M), now.yaw), now)
     assert len(points) > 5
     assert np.abs(np.linalg.norm(points - disc[0][:2], axis=1) - 0.2).max() < 2e-3
@@ -160,8 +162,8 @@ def test_beams_of_a_scan_that_takes_time_are_where_the_lidar_was() -> None:
 
 def test_of_two_returns_in_one_direction_the_nearest_counts() -> None:
     pose = Pose2D(0.0, 0.0)
-    near = seen(CORNERS[0], pose, [(1.0, 0.0, 0.2)])
-    far = seen(CORNERS[1], pose, [(2.0, 0.0, 0.2)])
+    near = scan_in_base(CORNERS[0], pose, [(1.0, 0.0, 0.2)])
+    far = scan_in_base(CORNERS[1], pose, [(2.0, 0.0, 0.2)])
     for both in ([near, far], [far, near]):
         merged = merged_scan([PlacedScan(scan) for scan in both], RADIUS_M)
         assert merged.ranges_m[0] == pytest.approx(0.8, abs=0.01)

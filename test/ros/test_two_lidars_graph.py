@@ -232,7 +232,7 @@ def test_a_lidar_that_falls_silent_makes_its_part_unknown(
         assert robot.inputs(node).level == OK
 
 
-def test_a_second_lidar_of_unknown_mounting_stops_the_robot(graph: Graph, with_tf: Any) -> None:
+def test_a_second_lidar_at_an_unknown_pose_stops_the_robot(graph: Graph, with_tf: Any) -> None:
     robot = TwoLidarRobot(graph, with_tf, ("base_scan",))
     assert robot.drive() == DRIVES
     assert robot.send_rear() == STOPS

@@ -65,7 +65,7 @@ class DecidedRun:
         goals = [goal for _, goal in decider.goals]
         more = f" and {len(goals) - 1} more" if goals[1:] else ""
         print(
-            f"recording: scan {', '.join(decider.scans)}, odometry {decider.odom} in "
+            f"recording: scan {', '.join(decider.scans)}, odometry {decider.odometry} in "
             f"{decider.frame!r}, goal ({goals[0][0]:g}, {goals[0][1]:g}){more}"
         )
         print(

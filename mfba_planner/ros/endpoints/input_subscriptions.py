@@ -33,6 +33,7 @@ from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.stale_inputs import NewestInputs
 from ..runtime.stamp_pairing import StampPairs
 from .known_map_subscription import KnownMapSubscription
+from .odometry_source import OdometrySource
 from .planner_diagnostics import PlannerDiagnostics
 from .scan_extrinsics import ScanExtrinsics
 from .transform_subscription import TransformSubscription
@@ -68,6 +69,7 @@ class InputSubscriptions:
             node, settings.odom_frame, refused_inputs, diagnostics, self._deliver_held
         )
         self._transforms, self.extrinsics = transforms, ScanExtrinsics(settings, transforms)
+        self.odometry = OdometrySource(node, settings, transforms, monitor, self._on_odom)
         self._lidars = LidarMerging(
             self.extrinsics.of,
             self.extrinsics.name,
@@ -100,7 +102,7 @@ class InputSubscriptions:
         self._is_subscribed, self._is_subscribed_to_scan = True, False
         self.set_params(self._params)
         frame = self._settings.odom_frame
-        self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
+        self.odometry.subscribe()
         self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
 
     def text(self, params: PlannerParams) -> str:
@@ -110,7 +112,7 @@ class InputSubscriptions:
             by, lidar = f"perception {params.perception.value}", f"; {self.extrinsics.text}"
         return (
             f"decides: {params.label}, {by}, {params.drive.value}, robot radius "
-            f"{params.robot_radius_m:g} m, {params.speed_mps:g} m/s{lidar}"
+            f"{params.robot_radius_m:g} m, {params.speed_mps:g} m/s{lidar}{self.odometry.text}"
         )
 
     def set_params(self, params: PlannerParams) -> None:

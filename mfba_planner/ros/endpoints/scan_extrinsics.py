@@ -12,9 +12,8 @@ from ...recording.planar_poses import lidar_extrinsics
 from ..interface import topics
 from ..node_settings import ExtrinsicsSource, PlannerSettings, VirtualSensorSettings
 from ..runtime.input_monitor import SEVERAL_REMEDY
-from .transform_subscription import TransformSubscription
+from .transform_subscription import DISCOVERY_S, TransformSubscription
 
-_DISCOVERY_S = 2.0  # until all publishers are known
 _REMEDY = f"publish it, or set {', '.join(PARAMETERS)}"
 
 
@@ -33,7 +32,7 @@ class ScanExtrinsics:
         self._found: dict[str, LidarExtrinsics] = {}
         self._frame, self._is_lockstep = "", settings.lockstep
         # In lockstep all publishers have been discovered before the first tick.
-        self._discovered_s = -math.inf if settings.lockstep else time.monotonic() + _DISCOVERY_S
+        self._discovered_s = -math.inf if settings.lockstep else time.monotonic() + DISCOVERY_S
         source = settings.scan_extrinsics
         self.is_required = source is ExtrinsicsSource.TF
         self.reads_tf = bool(topics.TRANSFORMS) and (

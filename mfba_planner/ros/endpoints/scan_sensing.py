@@ -36,10 +36,10 @@ class ScanSensing:
     ) -> None:
         """Subscribe to tf where scans are read and it is needed. Raises ConfigError."""
         self._settings, self._monitor = settings, monitor
-        transforms = TransformSubscription(node)
-        self.extrinsics = ScanExtrinsics(settings, transforms)
+        self.transforms = TransformSubscription(node)
+        self.extrinsics = ScanExtrinsics(settings, self.transforms)
         if settings.source is Source.SCAN and self.extrinsics.reads_tf:
-            transforms.subscribe()
+            self.transforms.subscribe()
         # Queue of scans in real time, where only the newest of each lidar counts.
         self.depth = _MOST_LIDARS if self.extrinsics.reads_tf else 1
         self._lidars = LidarMerging(

@@ -42,8 +42,10 @@ class DecisionBag:
             self._writer.add_topic(_name(topic), type_name(topic.type), offered(topic.qos))
 
     def copy(self, reader: BagReader, scans: Sequence[str], odom: str) -> None:
-        """Copy the messages of some topics, as `scan` and `odom`."""
-        names = {**dict.fromkeys(scans, _name(topics.SCAN)), odom: _name(topics.ODOM)}
+        """Copy the messages of some topics, as `scan` and `odom`; odom may be ""."""
+        names = dict.fromkeys(scans, _name(topics.SCAN))
+        if odom:
+            names[odom] = _name(topics.ODOM)
         for message in reader.messages(names):
             self._writer.write(
                 names[message.topic], message.data, message.log_time_ns, message.publish_time_ns

@@ -12,6 +12,7 @@ from ...core.planner_types import Ranges
 from ...perception.sensory_vector import SensorParams, sensory_vector
 from ...recording.from_messages import robot_pose, stamp_ns
 from ..endpoints.obstacle_sensing import ObstacleSensing
+from ..endpoints.odometry_source import OdometrySource
 from ..endpoints.scan_sensing import KEPT_POSES, ScanSensing
 from ..endpoints.sensor_diagnostics import SensorDiagnostics
 from ..interface import parameters, topics
@@ -50,12 +51,13 @@ class VirtualSensor(GraphNode):
             self, s, self._refused_inputs, self._monitor, self._source.name
         )
         depth = PAIRED if self._by_stamp else NEWEST
-        self._monitor.subscribe(topics.ODOM, self._on_odom, depth=depth, frame=s.odom_frame)
+        odometry = OdometrySource(self, s, scans.transforms, self._monitor, self._on_odom)
+        odometry.subscribe(depth)
         depth, known = max(depth, scans.depth), scans.extrinsics.is_known
         self._monitor.subscribe(
             self._source, self._on_source, depth=depth, frame=s.scan_frame, is_merged=known
         )
-        self.announce(scans.text(self.sensor))
+        self.announce(scans.text(self.sensor) + odometry.text)
         self.advertise_ready(names(s.wait_for))
 
     def _set_sensor(self, sensor: SensorParams) -> None:

@@ -59,6 +59,7 @@ class InputMonitor:
         self._receptions: dict[str, Reception] = {}
         self.timeout_s = timeout_s  # how far a stamp may be off
         self.scan_note = ""  # what to warn of in the newest scan
+        self.odom_source = ""  # where odometry is from, if that is not the topic
         self.reset()
         node.on_time_set_back(on_time_set_back)
 
@@ -110,7 +111,8 @@ class InputMonitor:
             name, stamp, clock_ns, now_s, self.timeout_s
         )
         error: InputError = StampError(fault)
-        if not fault and (fault := self._receptions[name].fault(now_s)):
+        reception = self._receptions.get(name)  # none of odometry by tf alone
+        if not fault and reception and (fault := reception.fault(now_s)):
             error = InputError(fault)
         if fault:
             self._refused_inputs.add(error, name)
@@ -126,7 +128,7 @@ class InputMonitor:
     @property
     def values(self) -> dict[str, str]:
         """What /diagnostics reports of each input besides its rate and age."""
-        values = {}
+        values = {"odom: source": self.odom_source} if self.odom_source else {}
         for name, reception in self._receptions.items():
             values[f"{name}: dropped"] = str(reception.dropped)
             if reception.ignored:
