@@ -18,7 +18,8 @@ from .scan_coverage import TWO_PI, covered_sectors, usable_beams
 Array = np.ndarray
 
 _JOIN_M, _JOIN_SPACINGS = 0.15, 2.5  # between neighbouring returns of one surface
-_LEAST_RANGE_M = 1e-3
+_LEAST_RANGE_M, _MOST_RANGE_M = 1e-3, 1e3  # some drivers send a range_max of inf
+_MOST_BEAMS = 7200
 AT_REST = Pose2D(0.0, 0.0)
 
 
@@ -44,9 +45,9 @@ def merged_scan(parts: Sequence[PlacedScan], robot_radius_m: float) -> Scan:
     see. -inf is taken at range_min, or at the robot's edge if that is nearer (near_returns.py).
     """
     spacing = max((abs(p.scan.angle_increment_rad) for p in parts), default=0.0) or TWO_PI
-    beams = _Beams(max(round(TWO_PI / spacing), 1))
+    beams = _Beams(round(min(max(TWO_PI / spacing, 1.0), _MOST_BEAMS)))
     reach_m = [p.scan.range_max_m - distance(_placed(p).origin_m, (0.0, 0.0)) for p in parts]
-    beams.range_max_m = max(min(reach_m), _LEAST_RANGE_M)
+    beams.range_max_m = min(max(min(reach_m), _LEAST_RANGE_M), _MOST_RANGE_M)
     for part in parts:
         beams.add(part, robot_radius_m)
     return beams.scan()
@@ -94,9 +95,8 @@ class _Beams:
         number = np.flatnonzero(known)
         r = np.asarray(placed.ranges_m, dtype=np.float64)[number]
         free = np.isposinf(r)
-        length = np.where(
-            free, placed.range_max_m, np.where(np.isneginf(r), placed.range_min_m, r)
-        )
+        length = np.maximum(np.where(free, placed.range_max_m, r), placed.range_min_m)
+        length = np.minimum(length, 2.0 * _MOST_RANGE_M)
         x, y = _ends(part, placed, number, length)
         index, bearing = self._index(x, y)
         away = np.sqrt(x * x + y * y)

@@ -15,7 +15,7 @@ from ..perception.lidar_sets import LidarScan, LidarSets
 from ..perception.merged_scan import PlacedScan, merged_scan
 from ..perception.near_returns import blind_ring
 from ..perception.pose_history import PoseHistory
-from ..perception.scan_to_sectors import aligned
+from ..perception.scan_to_sectors import aligned, require_usable
 from .from_messages import decision_field, extrinsics_fields, require_frame, stamp_ns
 
 FIELD, FRAME_FIELD = "merged_scans", "scan_frame"  # of planner/decision
@@ -135,6 +135,7 @@ class LidarMerging:
             part = ScanPart(frame, at_ns, extrinsics, *self.poses.motion(at_ns, now_ns, lasts_ns))
             parts.append(part)
             placed.append(part.placed(scan))
+            require_usable(placed[-1].scan, 0.0, placed[-1].scan.origin_m)
         radius_m = self._robot_radius_m()
         notes = (blind_ring(part.scan, radius_m) for part in placed)
         self.note = "; ".join(filter(None, (self.sets.silence(limit_s), *notes)))

@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mounted_lidars import FRONT, MOUNTED, REAR, front_scan, rear_scan, wall_points, wall_scan
 
+from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D, ray_circle_distance, relative_pose
 from mfba_planner.core.planner_types import Scan
 from mfba_planner.perception.merged_scan import PlacedScan, merged_scan
 from mfba_planner.perception.obstacle_tracker import Tracker
 from mfba_planner.perception.scan_coverage import ScanCoverage, usable_beams
-from mfba_planner.perception.scan_to_sectors import aligned, sense_scan
+from mfba_planner.perception.scan_to_sectors import aligned, require_usable, sense_scan
 from mfba_planner.perception.sensory_vector import SensorParams, sensory_vector
 from mfba_planner.recording.perceived import returns_of
 from mfba_planner.simulation.robot_model import Lidar
@@ -191,3 +192,38 @@ def test_half_a_lidar_beside_the_centre_covers_what_is_beyond_its_own_line() -> 
     known = usable_beams(merged)
     assert known[:70].all()
     assert not known[76:285].any()
+
+
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(NUMBERS, min_size=1, max_size=40), st.floats(-7.0, 7.0),
+    st.floats(-0.5, 0.5) | st.just(1e-30), st.floats(0.0, 1.0),
+    st.floats(1.1, 1e300) | st.just(math.inf), st.floats(-1.0, 1.0),
+)  # fmt: skip
+def test_odd_scans_make_a_scan_that_can_be_measured(
+    ranges: list[float],
+    first: float,
+    step: float,
+    least: float,
+    most: float,
+    x: float,
+) -> None:
+    scan = Scan(
+        ranges_m=np.array(ranges), angle_min_rad=first, angle_increment_rad=step,
+        range_min_m=least, range_max_m=most, origin_m=(x, -x), time_increment_s=0.005 * abs(x),
+    )  # fmt: skip
+    try:
+        known = require_usable(scan, 0.0, scan.origin_m)
+    except InputError:
+        return
+    merged = merged_scan([PlacedScan(scan, Pose2D(0.1, x, x), (x, 0.3, x))], RADIUS_M)
+    assert not np.isneginf(merged.ranges_m).any()
+    assert merged.range_min_m < merged.range_max_m < 1e4
+    assert (usable_beams(merged) == ~np.isnan(merged.ranges_m)).all()
+    if usable_beams(merged).any():
+        sense_scan(merged, 0.3, RADIUS_M, SENSOR)
+        Tracker().update(1, Pose2D(0.0, 0.0), aligned(merged, 0.3))
+    assert known.any()

@@ -232,6 +232,31 @@ def test_a_lidar_that_falls_silent_makes_its_part_unknown(
         assert robot.inputs(node).level == OK
 
 
+def test_a_recording_of_both_while_the_robot_moves_verifies(
+    graph: Graph, tmp_path: Path, with_tf: Any
+) -> None:
+    """Odometry between the two scans: the older one is moved, and the decisions say how far."""
+    recorder = graph.start(
+        Recorder, {"output": str(tmp_path / "run"), "nodes": "planner, virtual_sensor"}
+    )
+    robot = TwoLidarRobot(graph, with_tf, ("base_scan", "rear"), planner=TRACKING)
+    for k in range(8):
+        robot.send_odom(stamp(), x=0.04 * k)
+        robot.send_rear(ranges=REAR_HALF[:-9] + (0.9,) * 9)
+        robot.send_odom(stamp(), x=0.04 * k + 0.02)
+        robot.send_scan(scan_of(stamp(), FRONT_HALF))
+    graph.settle()
+    graph.stop(recorder)
+    report = verify(tmp_path / "run")
+    assert report.is_identical, (report.faults, report.divergence)
+    assert len([one for one in report.recorded if one.perception == "scan"]) >= 8
+    with BagReader(tmp_path / "run") as reader:
+        found = [parts_in(message.message) for message in reader.decoded(["/planner/decision"])]
+    moved = [part.robot.x for parts in found for part in parts]
+    assert min(moved) < -0.01
+    assert max(moved) == 0.0
+
+
 def test_a_second_lidar_at_an_unknown_pose_stops_the_robot(graph: Graph, with_tf: Any) -> None:
     robot = TwoLidarRobot(graph, with_tf, ("base_scan",))
     assert robot.drive() == DRIVES

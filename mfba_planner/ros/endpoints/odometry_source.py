@@ -72,6 +72,8 @@ class OdometrySource:
         else:
             # Until then publishers may not have been discovered; most robots need no tf.
             self._discovered_s = time.monotonic() + DISCOVERY_S
+            if self._timer is not None:  # of an earlier configuration
+                self._node.destroy_timer(self._timer)
             self._timer = self._node.create_wall_timer(_WATCH_PERIOD_S, self._on_timer)
 
     def _on_timer(self) -> None:
