@@ -12,6 +12,7 @@ from importlib import import_module
 from types import FrameType
 
 from mfba_planner.core.errors import ConfigError, MfbaError
+from mfba_planner.core.interrupts import start_own_program
 from mfba_planner.core.required_packages import missing_packages
 from mfba_planner.core.ros_arguments import split_ros_args
 from mfba_planner.core.standard_streams import open_closed_streams, require_stdout
@@ -154,8 +155,7 @@ def _unwind(_signum: int, _frame: FrameType | None) -> None:
 
 def _start(on_sigint: int, on_sigterm: int) -> None:
     """Set environment and signal handlers before the heavy imports; a signal exits at once."""
-    # Our matrices are small: starting numpy's thread pool would cost 0.06 s per start.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    start_own_program()
     # Node logs go to stdout; stderr is for errors.
     os.environ.setdefault("RCUTILS_LOGGING_USE_STDOUT", "1")
     # A notebook's backend is not there in another process; pictures need none.

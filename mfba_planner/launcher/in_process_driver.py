@@ -13,6 +13,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from ..core.errors import GraphError
+from ..core.interrupts import interrupts_held
 from ..ros.interface import parameters, topics
 from ..ros.nodes.planner import PlannerNode
 from ..ros.nodes.recorder import Recorder
@@ -54,7 +55,8 @@ def run_in_process(
     False. Raises GraphError when the graph does not get ready or does not finish in time.
     """
     context = Context()
-    context.init(domain_id=domain_id)
+    with interrupts_held():  # by the middleware's threads, for ever
+        context.init(domain_id=domain_id)
     with ExitStack() as stack:
         stack.callback(context.destroy)
         stack.callback(context.try_shutdown)
@@ -70,12 +72,13 @@ def run_in_process(
         nodes: dict[str, Any] = {}
         for name, values in node_parameters.items():
             namespace, _, program = name.rpartition("/")
-            node = KINDS[program](
-                context=context,
-                namespace=namespace,
-                parameter_overrides=_overrides(values | NO_EXTRA_SERVICES),
-                start_parameter_services=False,
-            )
+            with interrupts_held():
+                node = KINDS[program](
+                    context=context,
+                    namespace=namespace,
+                    parameter_overrides=_overrides(values | NO_EXTRA_SERVICES),
+                    start_parameter_services=False,
+                )
             stack.callback(node.destroy_node)
             stack.callback(node.close)
             executor.add_node(node)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.geometry import Point
+from ..core.interrupts import interrupts_held
 
 Array = np.ndarray
 
@@ -27,7 +28,9 @@ def march(speed: Array, end: tuple[int, int], cell_m: float) -> Array:
     """D (m) to the cell at (row, column) end, by fast marching."""
     import eikonalfm  # only here: most runs in the open do not need it
 
-    to_go: Array = eikonalfm.fast_marching(speed, end, (cell_m, cell_m), 2)
+    # It handles SIGINT by a C++ exception, which may end the process: a robot would drive on.
+    with interrupts_held():
+        to_go: Array = eikonalfm.fast_marching(speed, end, (cell_m, cell_m), 2)
     return to_go
 
 

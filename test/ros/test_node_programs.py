@@ -4,14 +4,16 @@
 import os
 import re
 import resource
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from launched_programs import PROGRAM, ROOT
+from launched_programs import PROGRAM, ROOT, Program
 from nav_msgs.msg import Path as PathMsg
 from ros_graph import Graph
+from waiting import wait_until
 
 from mfba_planner.core.option_specs import walk
 from mfba_planner.recording.bag_reader import BagReader
@@ -174,6 +176,26 @@ def noise(seed: int) -> PathMsg:
     """A message that does not compress."""
     digits = [int.from_bytes(os.urandom(6), "little") + seed for _ in range(200)]
     return path_msg([(1.0 / (1 + d), d * 1e-3) for d in digits], seed, "odom")
+
+
+def test_only_the_main_thread_of_a_node_takes_an_interrupt(tmp_path: Path) -> None:
+    """Another one would get it while the main thread computes the distance to go."""
+    with Program("planner", cwd=tmp_path) as program:
+        tasks = Path(f"/proc/{program.process.pid}/task")
+        held_by: dict[str, bool] = {}
+
+        def count() -> bool:
+            for task in tasks.iterdir():
+                status = (task / "status").read_text()
+                blocked = re.search(r"^SigBlk:\s*(\w+)", status, re.MULTILINE)
+                assert blocked
+                held_by[task.name] = bool(int(blocked[1], 16) >> (signal.SIGINT - 1) & 1)
+            return len(held_by) > 8 and not held_by[tasks.parent.name]
+
+        wait_until(count, timeout_s=60.0)
+        program.process.send_signal(signal.SIGINT)
+        assert program.end() == 0
+    assert [name for name, held in held_by.items() if not held] == [tasks.parent.name]
 
 
 def test_signals_at_random_moments_are_quiet() -> None:

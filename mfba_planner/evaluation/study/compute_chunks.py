@@ -15,6 +15,7 @@ from itertools import islice
 from typing import TypeVar
 
 from ...core.errors import ConfigError, MfbaError
+from ...core.interrupts import interrupts_held
 from .chunk import Chunk, Columns
 from .chunk_store import Store
 
@@ -160,7 +161,8 @@ def _outcome(future: Future[Columns]) -> Columns | WorkerDied:
 def initialize_worker() -> None:
     """Worker set-up: ignore Ctrl-C, which the parent handles; exit when the parent dies."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    with interrupts_held():
+        threading.Thread(target=_end_with_the_parent, daemon=True).start()
 
 
 def _end_with_the_parent() -> None:

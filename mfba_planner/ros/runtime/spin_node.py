@@ -11,6 +11,7 @@ import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from ...core.interrupts import interrupts_held
 from .base_node import SPIN_S, GraphNode
 from .environment_notes import environment_notes
 
@@ -56,11 +57,13 @@ def wait_for_callers(
 def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
     """Run one node until a signal or its own end; return 0. Its MfbaErrors pass through."""
     stop = StopFlag()
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    with interrupts_held():  # by the middleware's threads, for ever
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node: GraphNode | None = None
     executor = make_executor()
     try:
-        node = make_node()
+        with interrupts_held():
+            node = make_node()
         for note in environment_notes(rclpy.get_default_context().get_domain_id()):
             node.get_logger().warning(note)
         executor.add_node(node)
