@@ -194,11 +194,8 @@ class GraphNode(Node):
             expected = expected_readers(topic, self._peers - {self.get_name()})
             if not expected:
                 continue
-            known = self.get_subscriptions_info_by_topic(publisher.topic_name)
-            found = [info.node_name for info in known if info.node_name in expected]
-            absent = expected.difference(found)
-            if absent or publisher.get_subscription_count() < len(found):
-                return f"{topic.name} waits for {', '.join(sorted(absent or expected))}"
+            if not_reached := readers_not_reached(self, publisher, expected):
+                return f"{topic.name} waits for {', '.join(sorted(not_reached))}"
         outputs = [made.topic_name for topic, made in self._advertised if topic.readers]
         inputs = [subscription.topic_name for subscription in self._subscribed]
         mismatch = type_mismatch(self, [*outputs, *inputs])
@@ -244,6 +241,14 @@ class GraphNode(Node):
         while self._jump_handles:
             self._jump_handles.pop().unregister()
         super().destroy_node()
+
+
+def readers_not_reached(node: Node, publisher: Publisher, readers: set[str]) -> set[str]:
+    """Which of these nodes do not subscribe yet, or all if not every subscription is matched."""
+    known = node.get_subscriptions_info_by_topic(publisher.topic_name)
+    found = [info.node_name for info in known if info.node_name in readers]
+    absent = readers.difference(found)
+    return absent if absent or publisher.get_subscription_count() >= len(found) else readers
 
 
 def _without_duplicates(
