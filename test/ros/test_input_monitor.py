@@ -228,8 +228,8 @@ def test_two_lidars_on_one_topic_stop_the_robot(graph: Graph) -> None:
     assert robot.drive() == STOPS
     assert robot.inputs("virtual_sensor").level == ERROR
     assert robot.inputs("virtual_sensor").message.startswith(
-        "refused: scan has 2 publishers that send in turn (probe, probe); merge the lidars into "
-        "one topic, or set scan_frame"
+        "refused: scan has 2 publishers that send in turn (probe, probe); give each lidar a "
+        "frame of its own that tf knows, or set scan_frame to the one to use"
     )
     graph.probe.destroy_publisher(other)
     graph.until(lambda: robot.drive() == DRIVES)
@@ -241,7 +241,7 @@ def test_two_lidars_are_distinguished_by_their_frames(graph: Graph) -> None:
     other = graph.writer(topics.SCAN)
     assert robot.drive() == DRIVES
     assert robot.send_scan(scan_of(stamp(), WALL, "rear"), other) == STOPS
-    text = "refused: scan changes its frame from 'base_scan' to 'rear'; merge the lidars"
+    text = "refused: scan changes its frame from 'base_scan' to 'rear'; give each lidar a frame"
     assert robot.inputs("virtual_sensor").message.startswith(text)
 
 

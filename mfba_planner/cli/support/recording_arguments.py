@@ -63,7 +63,11 @@ def add_to(group: Any) -> None:
         choices=[member.value for member in NoReturn],
         help="range by which the lidar reports that nothing is there (default: inf, as REP-117)",
     )
-    group.add_argument("--scan", metavar="TOPIC", help="scan topic, if there are several")
+    group.add_argument(
+        "--scan",
+        metavar="TOPIC",
+        help="scan topic, if there are several; of several lidars all, separated by commas",
+    )
     group.add_argument("--odom", metavar="TOPIC", help="odometry topic, if there are several")
 
 

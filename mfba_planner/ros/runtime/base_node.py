@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import sys
 import time
 from collections.abc import Callable, Collection
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -20,10 +22,13 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
+from ...core.errors import ConfigError
+from ...core.ros_arguments import split_ros_args
 from ..interface import parameters
 from ..interface.tick_decoders import decoder
 from ..interface.topics import PARAMETERS, Topic, expected_readers, reading_qos, with_depth
 from .connection_check import type_mismatch
+from .given_parameters import check_given_parameters
 from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
 
 SPIN_S = 0.1  # longest time until a signal is noticed
@@ -34,8 +39,16 @@ class GraphNode(Node):
     """A node of the graph: publishers made from topics.py, and the service ~/ready."""
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Pass rclpy's keyword arguments on (context, parameter_overrides, ...)."""
-        super().__init__(name, **kwargs)
+        """Pass rclpy's keyword arguments on (context, parameter_overrides, ...).
+
+        Raises ConfigError for parameters of the command line that cannot be used.
+        """
+        try:
+            super().__init__(name, **kwargs)
+        except InvalidParameterTypeException:  # of rclpy's own parameter
+            raise ConfigError("use_sim_time: wrong type; give true or false") from None
+        if kwargs.get("context") is None:  # the program's own node
+            check_given_parameters(self, split_ros_args(sys.argv[1:])[1])
         self._leave_qos_events()
         self.finished = False
         self._kind = name
@@ -199,11 +212,8 @@ class GraphNode(Node):
             expected = expected_readers(topic, self._peers - {self.get_name()})
             if not expected:
                 continue
-            known = self.get_subscriptions_info_by_topic(publisher.topic_name)
-            found = [info.node_name for info in known if info.node_name in expected]
-            absent = expected.difference(found)
-            if absent or publisher.get_subscription_count() < len(found):
-                return f"{topic.name} waits for {', '.join(sorted(absent or expected))}"
+            if not_reached := readers_not_reached(self, publisher, expected):
+                return f"{topic.name} waits for {', '.join(sorted(not_reached))}"
         outputs = [made.topic_name for topic, made in self._advertised if topic.readers]
         inputs = [subscription.topic_name for subscription in self._subscribed]
         mismatch = type_mismatch(self, [*outputs, *inputs])
@@ -258,6 +268,14 @@ def _decoded(callback: Callable[..., None], decode: Callable[[bytes], Any]) -> A
     except TypeError:
         return lambda data, info: callback(decode(data), info)
     return lambda data: callback(decode(data))
+
+
+def readers_not_reached(node: Node, publisher: Publisher, readers: set[str]) -> set[str]:
+    """Which of these nodes do not subscribe yet, or all if not every subscription is matched."""
+    known = node.get_subscriptions_info_by_topic(publisher.topic_name)
+    found = [info.node_name for info in known if info.node_name in readers]
+    absent = readers.difference(found)
+    return absent if absent or publisher.get_subscription_count() >= len(found) else readers
 
 
 def _without_duplicates(
