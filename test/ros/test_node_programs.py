@@ -168,7 +168,7 @@ def test_in_a_namespace_no_option_names_the_node(tmp_path: Path, ros_env: dict[s
         "recovery.enabled:=off", "bat.iterations:=+9", "odom_frame:='12:30'", "seed:=0x10",
     ],
 )  # fmt: skip
-def test_what_rcl_reads_in_its_own_ways_has_an_effect(given: str) -> None:
+def test_what_rcl_reads_in_another_form_has_an_effect(given: str) -> None:
     context = Context()
     context.init(args=["--ros-args", "-p", given])
     node = rclpy.create_node("planner", context=context, start_parameter_services=False)
