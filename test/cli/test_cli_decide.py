@@ -114,6 +114,19 @@ def test_what_if_is_a_second_run(run: Path, tmp_path: Path, capsys: Capture) -> 
     assert "first difference at tick" in capsys.readouterr().out
 
 
+def test_a_misspelt_name_in_a_parameter_file_is_named(tmp_path: Path, capsys: Capture) -> None:
+    path = write(tmp_path / "bag", drive())
+    params = tmp_path / "params.yaml"
+    params.write_text(
+        "planner: {ros__parameters: {spede_mps: 0.2, speed_mps: 0.5, use_sim_time: true}}\n"
+    )
+    assert decide(path, "--params-file", str(params)) == 0
+    assert capsys.readouterr().err == (
+        f"note: --params-file {params}: spede_mps: no such parameter of planner or "
+        "virtual_sensor; `planner --help` and `virtual_sensor --help` list them\n"
+    )
+
+
 def test_the_parameter_file_of_the_nodes_is_taken(tmp_path: Path, capsys: Capture) -> None:
     path = write(tmp_path / "bag", drive())
     params = tmp_path / "params.yaml"
