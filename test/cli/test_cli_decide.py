@@ -114,6 +114,17 @@ def test_what_if_is_a_second_run(run: Path, tmp_path: Path, capsys: Capture) -> 
     assert "first difference at tick" in capsys.readouterr().out
 
 
+def test_options_that_contradict_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag", drive())
+    for given, setting in (
+        (["--speed", "0.5"], "planner.speed_mps=0.6"),
+        (["--planner", "paper"], "planner.method=predictive"),
+    ):
+        line = f"{' '.join(given)}: --set {setting}; leave one of them out"
+        with pytest.raises(ConfigError, match=f"^{line}$"):
+            decide(path, *given, "--set", setting)
+
+
 def test_a_misspelt_name_in_a_parameter_file_is_named(tmp_path: Path, capsys: Capture) -> None:
     path = write(tmp_path / "bag", drive())
     params = tmp_path / "params.yaml"
