@@ -114,6 +114,30 @@ def test_what_if_is_a_second_run(run: Path, tmp_path: Path, capsys: Capture) -> 
     assert "first difference at tick" in capsys.readouterr().out
 
 
+def test_options_that_contradict_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag", drive())
+    for given, setting in (
+        (["--speed", "0.5"], "planner.speed_mps=0.6"),
+        (["--planner", "paper"], "planner.method=predictive"),
+    ):
+        line = f"{' '.join(given)}: --set {setting}; leave one of them out"
+        with pytest.raises(ConfigError, match=f"^{line}$"):
+            decide(path, *given, "--set", setting)
+
+
+def test_a_misspelt_name_in_a_parameter_file_is_named(tmp_path: Path, capsys: Capture) -> None:
+    path = write(tmp_path / "bag", drive())
+    params = tmp_path / "params.yaml"
+    params.write_text(
+        "planner: {ros__parameters: {spede_mps: 0.2, speed_mps: 0.5, use_sim_time: true}}\n"
+    )
+    assert decide(path, "--params-file", str(params)) == 0
+    assert capsys.readouterr().err == (
+        f"note: --params-file {params}: spede_mps: no such parameter of planner or "
+        "virtual_sensor; `planner --help` and `virtual_sensor --help` list them\n"
+    )
+
+
 def test_the_parameter_file_of_the_nodes_is_taken(tmp_path: Path, capsys: Capture) -> None:
     path = write(tmp_path / "bag", drive())
     params = tmp_path / "params.yaml"
