@@ -2,7 +2,9 @@
 """Fixtures that isolate tests from each other and from any other ROS graph."""
 
 import os
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -53,6 +55,27 @@ def graph(ros_context: Any) -> Iterator[Any]:
     opened = Graph(ros_context)
     yield opened
     opened.close()
+
+
+@pytest.fixture(scope="session")
+def tf2_msgs_directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of the package tf2_msgs, generated for the tests."""
+    import tf2_msgs_package
+
+    return tf2_msgs_package.build(tmp_path_factory.mktemp("tf2_msgs"))
+
+
+@pytest.fixture
+def with_tf(tf2_msgs_directory: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """The type TFMessage, with tf2_msgs installed for this test alone."""
+    from mfba_planner.ros.interface import topics
+
+    monkeypatch.syspath_prepend(str(tf2_msgs_directory))
+    monkeypatch.setattr(topics, "TRANSFORMS", topics.transform_topics())
+    assert [topic.name for topic in topics.TRANSFORMS] == ["/tf", "/tf_static"]
+    yield topics.TRANSFORMS[0].type
+    for name in [name for name in sys.modules if name.split(".")[0] == "tf2_msgs"]:
+        del sys.modules[name]
 
 
 @pytest.fixture

@@ -60,6 +60,12 @@ ALLOWED = {
     ("bench/benchmark.py", "seen"),
     ("mfba_planner/planning/recovery.py", "attempt"),
     ("test/planning/test_recovery.py", "attempt"),
+    # rclpy's names of guard conditions
+    ("mfba_planner/ros/runtime/node_executor.py", "_guard"),
+    ("mfba_planner/ros/runtime/node_executor.py", "_take_guard_condition"),
+    ("mfba_planner/ros/runtime/node_executor.py", "add_guard_condition"),
+    ("mfba_planner/ros/runtime/node_executor.py", "guards"),
+    ("mfba_planner/ros/runtime/node_executor.py", "num_guard_conditions"),
 }
 
 

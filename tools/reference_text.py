@@ -26,7 +26,7 @@ In a fleet each robot has the topics of one robot below its own name (`robot0/od
 **Frames** (REP-105, REP-103). Poses are in `odom`, velocities in `base_link`; the parameters
 `odom_frame` and `base_frame` change these names. Where `tf2_msgs` is installed, `world_sim` also
 publishes `/tf` (`odom` to `base_link`) and `/tf_static` (`base_link` to `base_scan`), and
-`virtual_sensor` and `planner` read both (parameter `scan_extrinsics`).
+`virtual_sensor` and `planner` read both (parameters `scan_extrinsics`, `odom_source`).
 
 **Sectors.** Sector 1 starts at +x of the odom frame. Sectors count counter-clockwise and do not
 turn with the robot. `sectors` is the sensory vector with a stamp: one beam per sector, the range

@@ -66,6 +66,38 @@ class Box(NamedTuple):
         return ((x0, y0, x1, y0), (x1, y0, x1, y1), (x1, y1, x0, y1), (x0, y1, x0, y0))
 
 
+class Standing(NamedTuple):
+    """What stands in the room, inside its border."""
+
+    boxes: tuple[Box, ...] = ()
+    pillars: tuple[Obstacle, ...] = ()
+
+    @property
+    def sides(self) -> tuple[Segment, ...]:
+        """The outlines of all boxes."""
+        return tuple(side for box in self.boxes for side in box.outline)
+
+    def clearance_m(self, point: Point) -> float:
+        """Distance from a point to the nearest wall or pillar."""
+        x, y = point
+        if any(abs(x - box.x) < box.half_x and abs(y - box.y) < box.half_y for box in self.boxes):
+            return 0.0
+        to_walls = float(Segments.of([*BORDER, *self.sides]).distances(x, y).min())
+        return min([to_walls, *(distance(point, p.center_m) - p.radius_m for p in self.pillars)])
+
+    def is_free(self, a: Point, b: Point, free_m: float) -> bool:
+        """Whether a straight walk keeps off all that stands."""
+        start = np.array([a[0]]), np.array([a[1]])
+        moved = np.array([b[0] - a[0]]), np.array([b[1] - a[1]])
+        swept = Segments.of(list(self.sides)).swept_distances(*start, *moved)
+        if float(swept.min()) < free_m:
+            return False
+        walk = Segments.of([(*a, *b)])
+        return all(
+            float(walk.distances(*p.center_m)[0]) >= p.radius_m + free_m for p in self.pillars
+        )
+
+
 class Room(NamedTuple):
     """A task, and the boxes whose outlines are the scenario's segments after the room's four."""
 
@@ -94,15 +126,15 @@ def draw_room(
     With kidnapped the robot is put elsewhere after 4 to 10 s, to a place where nobody is then.
     """
     rng = np.random.default_rng((20, number))
-    boxes, pillars = _draw_what_stands(rng)
-    start, goal = _ends(rng, boxes, pillars)
-    walkers = [_person(rng, walk, boxes, pillars, (start, goal)) for _ in range(people)]
+    standing = _draw_what_stands(rng)
+    start, goal = _ends(rng, standing)
+    walkers = [_person(rng, walk, standing, (start, goal)) for _ in range(people)]
     scenario = Scenario(
         name=f"room{number}",
         start_m=start,
         goal_m=goal,
         robot_radius_m=ROBOT_RADIUS_M,
-        obstacles=(*walkers, *pillars),
+        obstacles=(*walkers, *standing.pillars),
         time_limit_s=TIME_LIMIT_S,
         robot=Robot(
             drive=Drive.DIFFERENTIAL,
@@ -111,52 +143,40 @@ def draw_room(
             noise=Noise(scan_m=RANGE_SD_M),
             footprint_m=(FootprintCircle(0.0, 0.0, BODY_RADIUS_M),),
         ),
-        segments_m=(*BORDER, *(side for box in boxes for side in box.outline)),
+        segments_m=(*BORDER, *standing.sides),
     )
     if kidnapped:
-        scenario = _with_kidnapping(scenario, rng, boxes, pillars)
-    return Room(scenario, boxes, people)
+        scenario = _with_kidnapping(scenario, rng, standing)
+    return Room(scenario, standing.boxes, people)
 
 
-def clearance_m(point: Point, boxes: tuple[Box, ...], pillars: tuple[Obstacle, ...]) -> float:
-    """Distance from a point to the nearest wall or pillar."""
-    sides = Segments.of([*BORDER, *(side for box in boxes for side in box.outline)])
-    inside = any(abs(point[0] - b.x) < b.half_x and abs(point[1] - b.y) < b.half_y for b in boxes)
-    to_pillars = [distance(point, p.center_m) - p.radius_m for p in pillars]
-    return 0.0 if inside else min([float(sides.distances(*point).min()), *to_pillars])
-
-
-def _draw_what_stands(
-    rng: np.random.Generator,
-) -> tuple[tuple[Box, ...], tuple[Obstacle, ...]]:
-    boxes: tuple[Box, ...] = ()
-    pillars: tuple[Obstacle, ...] = ()
-    while len(boxes) < _WALLS:
+def _draw_what_stands(rng: np.random.Generator) -> Standing:
+    found = Standing()
+    while len(found.boxes) < _WALLS:
         half = 0.5 * float(rng.uniform(1.5, 3.5))
         x, y = rng.uniform(2.0, SIDE_M - 2.0, size=2).round(_DIGITS).tolist()
         half, thin = round(half, _DIGITS), 0.5 * WALL_M
         box = Box(x, y, half, thin) if rng.random() < 0.5 else Box(x, y, thin, half)
         steps = np.linspace(-1.0, 1.0, 9).tolist()
         along = [(x + s * box.half_x, y + s * box.half_y) for s in steps]
-        if all(clearance_m(point, boxes, pillars) >= APART_M + WALL_M for point in along):
-            boxes += (box,)
-    while len(pillars) < _PILLARS:
+        if all(found.clearance_m(point) >= APART_M + WALL_M for point in along):
+            found = found._replace(boxes=(*found.boxes, box))
+    while len(found.pillars) < _PILLARS:
         x, y = rng.uniform(1.5, SIDE_M - 1.5, size=2).round(_DIGITS).tolist()
         radius = round(float(rng.uniform(0.15, 0.3)), _DIGITS)
-        if clearance_m((x, y), boxes, pillars) >= APART_M + radius:
-            pillars += (Obstacle(center_m=(x, y), radius_m=radius),)
-    return boxes, pillars
+        if found.clearance_m((x, y)) >= APART_M + radius:
+            pillar = Obstacle(center_m=(x, y), radius_m=radius)
+            found = found._replace(pillars=(*found.pillars, pillar))
+    return found
 
 
-def _ends(
-    rng: np.random.Generator, boxes: tuple[Box, ...], pillars: tuple[Obstacle, ...]
-) -> tuple[Point, Point]:
+def _ends(rng: np.random.Generator, standing: Standing) -> tuple[Point, Point]:
     """A start in one corner and a goal in the opposite one."""
     found: list[Point] = []
     while len(found) < 2:
         x, y = rng.uniform(0.8, 2.5, size=2).round(_DIGITS).tolist()
         point = (SIDE_M - x, SIDE_M - y) if found else (x, y)
-        if clearance_m(point, boxes, pillars) >= ROBOT_RADIUS_M + 0.3:
+        if standing.clearance_m(point) >= ROBOT_RADIUS_M + 0.3:
             found.append(point)
     return found[0], found[1]
 
@@ -164,13 +184,12 @@ def _ends(
 def _person(
     rng: np.random.Generator,
     walk: Walk,
-    boxes: tuple[Box, ...],
-    pillars: tuple[Obstacle, ...],
+    standing: Standing,
     ends: tuple[Point, Point],
 ) -> Obstacle:
     """One who walks for the whole time, and is not near the robot's start or goal at first."""
     speed = float(rng.uniform(*SPEEDS_MPS))
-    route = (_to_and_fro if walk is Walk.STRAIGHT else _among_waypoints)(rng, boxes, pillars, ends)
+    route = (_to_and_fro if walk is Walk.STRAIGHT else _among_waypoints)(rng, standing, ends)
     here, t_s = next(route), 0.0
     knots: list[Knot] = [(t_s, *here)]
     while t_s < TIME_LIMIT_S:
@@ -188,25 +207,23 @@ def _point(rng: np.random.Generator) -> Point:
 
 def _among_waypoints(
     rng: np.random.Generator,
-    boxes: tuple[Box, ...],
-    pillars: tuple[Obstacle, ...],
+    standing: Standing,
     ends: tuple[Point, Point],
 ) -> Iterator[Point]:
     here = _point(rng)
-    while _near(here, ends) or clearance_m(here, boxes, pillars) < _FREE_M:
+    while _near(here, ends) or standing.clearance_m(here) < _FREE_M:
         here = _point(rng)
     yield here
     while True:
         there = _point(rng)
-        if distance(here, there) >= 1.0 and _is_free(here, there, _FREE_M, boxes, pillars):
+        if distance(here, there) >= 1.0 and standing.is_free(here, there, _FREE_M):
             here = there
             yield here
 
 
 def _to_and_fro(
     rng: np.random.Generator,
-    boxes: tuple[Box, ...],
-    pillars: tuple[Obstacle, ...],
+    standing: Standing,
     ends: tuple[Point, Point],
 ) -> Iterator[Point]:
     """From a point of a line across the room to one of its ends, to the other one, and so on."""
@@ -220,7 +237,7 @@ def _to_and_fro(
             distance(a, b) >= _ACROSS_M
             and 0.1 < share < 0.9
             and not _near(here, ends)
-            and _is_free(a, b, _FREE_M, boxes, pillars)
+            and standing.is_free(a, b, _FREE_M)
         ):
             break
     yield here
@@ -233,24 +250,7 @@ def _near(point: Point, ends: tuple[Point, Point]) -> bool:
     return min(distance(point, end) for end in ends) < _KEPT_FREE_M
 
 
-def _is_free(
-    a: Point, b: Point, free_m: float, boxes: tuple[Box, ...], pillars: tuple[Obstacle, ...]
-) -> bool:
-    """Whether a straight walk keeps off all that stands."""
-    ux, uy = np.array([b[0] - a[0]]), np.array([b[1] - a[1]])
-    sides = Segments.of([side for box in boxes for side in box.outline])
-    if float(sides.swept_distances(np.array([a[0]]), np.array([a[1]]), ux, uy).min()) < free_m:
-        return False
-    walk = Segments.of([(*a, *b)])
-    return all(float(walk.distances(*p.center_m)[0]) >= p.radius_m + free_m for p in pillars)
-
-
-def _with_kidnapping(
-    scenario: Scenario,
-    rng: np.random.Generator,
-    boxes: tuple[Box, ...],
-    pillars: tuple[Obstacle, ...],
-) -> Scenario:
+def _with_kidnapping(scenario: Scenario, rng: np.random.Generator, standing: Standing) -> Scenario:
     at_s = round(float(rng.uniform(4.0, 10.0)), 1)
     centers = scenario.centers(at_s)
     while True:
@@ -260,6 +260,6 @@ def _with_kidnapping(
         if (
             far
             and people_off > _KEPT_FREE_M
-            and (clearance_m((x, y), boxes, pillars) >= ROBOT_RADIUS_M + 0.2)
+            and (standing.clearance_m((x, y)) >= ROBOT_RADIUS_M + 0.2)
         ):
             return replace(scenario, kidnappings=(Kidnapping(at_s=at_s, to_m=(x, y)),))

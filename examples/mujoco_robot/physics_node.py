@@ -38,6 +38,7 @@ from mfba_planner.recording.from_messages import stamp_ns
 from mfba_planner.ros.interface.markers import tf_msg
 from mfba_planner.ros.interface.to_messages import odometry_msg, scan_msg
 from mfba_planner.ros.interface.topics import CMD_VEL, ODOM, SCAN, TRANSFORMS
+from mfba_planner.ros.runtime.base_node import readers_not_reached
 from mfba_planner.ros.runtime.spin_node import StopFlag, make_executor
 
 ODOM_FRAME, BASE_FRAME, SCAN_FRAME = "odom", "base_link", "base_scan"
@@ -103,11 +104,7 @@ class PhysicsNode(Node):
 
     def _has_readers(self) -> bool:
         for publisher in (self._odom, self._scan):
-            infos = self.get_subscriptions_info_by_topic(publisher.topic_name)
-            readers = [info for info in infos if info.node_name in self._wait_for]
-            if self._wait_for - {info.node_name for info in readers}:
-                return False
-            if publisher.get_subscription_count() < len(readers):
+            if readers_not_reached(self, publisher, self._wait_for):
                 return False
         return self.count_publishers(CMD_VEL.name) > 0 or not self._wait_for
 

@@ -18,13 +18,15 @@ from crowded_room import SPEED_MPS, Room
 from physics_world import SCAN_NS, PhysicsWorld
 
 from mfba_planner.core.geometry import Pose2D, distance, pose_as_in_message
-from mfba_planner.core.planner_types import NANO, Decision, Mode, Observation, Scan, observe
+from mfba_planner.core.lidar_extrinsics import CENTRED
+from mfba_planner.core.planner_types import NANO, Decision, Mode, Observation, observe
 from mfba_planner.perception.scan_to_sectors import aligned, sense_scan
 from mfba_planner.perception.sensory_vector import SensorParams
 from mfba_planner.planning.differential_drive import track
 from mfba_planner.planning.planner_factory import make_planner
 from mfba_planner.planning.planner_params import Method, PerceptionInput, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
+from mfba_planner.recording.scan_parts import MountedScan
 from mfba_planner.ros.runtime.lockstep_inputs import Inputs
 from mfba_planner.ros.runtime.stale_inputs import NewestInputs
 from mfba_planner.simulation.episode import Episode, Outcome
@@ -139,7 +141,7 @@ class _Inputs:
         self._add_odometry()
         # virtual_sensor turns the scan by the newest heading.
         ranges = sense_scan(scan, self._last.yaw, world.scenario.robot_radius_m, sensor)
-        inputs = self._newest.add_sectors(stamp, ranges, world.time_s, scan)
+        inputs = self._newest.add_sectors(stamp, ranges, world.time_s, MountedScan(scan, CENTRED))
         assert inputs is not None
         return _with_scan(inputs, world, self._last)
 
@@ -158,11 +160,11 @@ def _with_scan(inputs: Inputs, world: PhysicsWorld, last: Pose2D) -> Observation
     obs = observe(
         inputs.stamp_ns, inputs.pose, inputs.ranges_m, goal, last, round(inputs.age_s / NANO)
     )
-    assert isinstance(scan, Scan)
+    assert scan is not None
     pose = inputs.sensed[1] if inputs.sensed else obs.pose
     return replace(
         obs,
-        scan=aligned(scan, pose.yaw),
+        scan=aligned(scan.scan, pose.yaw, scan.extrinsics),
         sensed=inputs.sensed,
         pose_stamp_ns=inputs.pose_stamp_ns,
     )

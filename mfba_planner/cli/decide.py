@@ -10,7 +10,13 @@ from pathlib import Path
 from ..core.argument_parser import Parser
 from ..core.errors import BagError
 from ..core.output_files import bag_in, refuse_existing
-from ..launcher.set_option import add_set_argument, with_robot_settings, with_settings
+from ..launcher.set_option import (
+    METHOD,
+    add_set_argument,
+    refuse_other,
+    with_robot_settings,
+    with_settings,
+)
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_factory import DEFAULT_METHOD, check_usable, params_for_method
 from ..planning.planner_params import Method, PlannerParams
@@ -80,8 +86,12 @@ def _params(parsed: argparse.Namespace) -> RedecideParams:
     planner, sensor = recording_arguments.with_parameters(planner, SensorParams(), given)
     planner = replace(planner, method=Method(method or DEFAULT_METHOD))
     settings = list(parsed.settings)
+    if parsed.planner:
+        refuse_other(f"--planner {parsed.planner}", f"{METHOD}={parsed.planner}", settings)
     if parsed.speed is not None:
-        settings.append(f"planner.speed_mps={parsed.speed}")
+        speed = f"planner.speed_mps={parsed.speed}"
+        refuse_other(f"--speed {parsed.speed}", speed, settings)
+        settings.append(speed)
     base = {name: getattr(planner, name) for name in Robot().base.__dataclass_fields__}
     robot, others = with_robot_settings(Robot(**base), settings)
     planner, sensor = with_settings(planner, sensor, others)

@@ -72,6 +72,12 @@ def rotated(vector: Point, angle_rad: float) -> Point:
     return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1])
 
 
+def relative_pose(pose: Pose2D, base: Pose2D) -> Pose2D:
+    """A pose as seen from another one, both given in the same frame."""
+    x, y = rotated((pose.x - base.x, pose.y - base.y), -base.yaw)
+    return Pose2D(x, y, math.remainder(pose.yaw - base.yaw, 2.0 * math.pi))
+
+
 def tangent_half_angle(distance_m: float, radius_m: float) -> float:
     """Half the angle between the two tangents from a point to a circle (Fig. 5).
 

@@ -22,7 +22,8 @@ class Scan:
     """A planar laser scan: beam k points along angle_min_rad + k * angle_increment_rad.
 
     It was measured k * time_increment_s after the stamp; 0: all beams at once. Its beams begin at
-    origin_m, seen from the robot, in a frame aligned with that of the angles.
+    origin_m, seen from the robot, in a frame aligned with that of the angles. bearings_rad (n,)
+    are the exact directions, from angle_min_rad on, of beams that only nearly point there.
     """
 
     ranges_m: np.ndarray
@@ -32,6 +33,15 @@ class Scan:
     range_max_m: float
     time_increment_s: float = 0.0
     origin_m: Point = (0.0, 0.0)
+    bearings_rad: np.ndarray | None = None
+
+    def angles_rad(self, beams: np.ndarray) -> np.ndarray:
+        """The directions of beams, given by their numbers (k,)."""
+        if self.bearings_rad is not None:
+            beams = self.bearings_rad[beams]
+            return self.angle_min_rad + beams
+        angles: np.ndarray = self.angle_min_rad + self.angle_increment_rad * beams
+        return angles
 
     def taken_from(self, pose: Pose2D) -> Pose2D:
         """Where the beams begin, of a scan aligned with odom and a robot at this pose."""

@@ -168,7 +168,8 @@ def require_complete(directory: RunDirectory, ticks: Mapping[str, int]) -> None:
     for robot, topic in itertools.product(ticks, every_tick):
         name = topic.name if topic.name.startswith("/") else robot_topic(robot, f"/{topic.name}")
         if (found := counts.get(name, 0)) < ticks[robot]:
+            remedy = "run again on a machine with less load" if found else f"see {directory.log}"
             raise BagError(
                 f"{directory.bag}: incomplete, {found} of {ticks[robot]} messages on {name}; "
-                "run again on a machine with less load"
+                f"{remedy}"
             )

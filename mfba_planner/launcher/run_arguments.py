@@ -149,7 +149,15 @@ def add_world_arguments(parser: argparse.ArgumentParser, peers: Collection[str] 
 
 
 def read_config(parsed: argparse.Namespace, **more: Any) -> RunConfig:
-    """The RunConfig of the arguments, applied as reading, swarm, algorithm, planner, --set."""
+    """The RunConfig of the arguments, applied as reading, swarm, algorithm, planner, --set.
+
+    Raises ConfigError for what contradicts or has no effect.
+    """
+    for option in ("reading", "swarm"):
+        if getattr(parsed, option) and parsed.planner == Method.PREDICTIVE.value:
+            raise ConfigError(
+                f"--{option}: of planner paper only; leave it out with {parsed.planner}"
+            )
     planner = readings_of_paper.planner(parsed.reading or readings_of_paper.DEFAULT_METHOD)
     if parsed.swarm:
         planner = replace(planner, bat=readings_of_paper.swarm(parsed.swarm))

@@ -19,7 +19,8 @@ OF_ROBOT = {"robot_radius_m": "set robot_radius_m in the scenario file"} | {
     name: f"give robot.{name}" for name in flatten(Base())
 }
 
-OPTIMIZER = "planner.optimizer"
+OPTIMIZER, METHOD = "planner.optimizer", "planner.method"
+_SAME = {"optimizer": OPTIMIZER, "planner": METHOD, "algorithm": "planner.bat.algorithm"}
 
 
 def add_set_argument(parser: argparse.ArgumentParser) -> None:
@@ -43,17 +44,26 @@ def add_optimizer_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def settings_of(parsed: argparse.Namespace) -> list[str]:
-    """The settings of --set and --optimizer. Raises ConfigError where they contradict."""
+    """The settings of --set and --optimizer.
+
+    Raises ConfigError for a setting that contradicts an option of the same meaning.
+    """
     settings: list[str] = parsed.settings
+    for option, name in _SAME.items():
+        value = getattr(parsed, option, None)
+        if isinstance(value, str):  # not several planners, each with its method
+            refuse_other(f"--{option} {value}", f"{name}={value}", settings)
     if parsed.optimizer is None:
         return settings
-    wanted = f"{OPTIMIZER}={parsed.optimizer}"
+    return [*settings, f"{OPTIMIZER}={parsed.optimizer}"]
+
+
+def refuse_other(given: str, wanted: str, settings: list[str]) -> None:
+    """Raise ConfigError for a setting NAME=VALUE of the same name as wanted, but another value."""
+    name, _, _ = wanted.partition("=")
     for text in settings:
-        if text.startswith(f"{OPTIMIZER}=") and text != wanted:
-            raise ConfigError(
-                f"--optimizer {parsed.optimizer}: --set {text}; leave one of them out"
-            )
-    return [*settings, wanted]
+        if text.startswith(f"{name}=") and text != wanted:
+            raise ConfigError(f"{given}: --set {text}; leave one of them out")
 
 
 def with_settings(

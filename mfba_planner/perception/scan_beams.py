@@ -75,6 +75,10 @@ class BeamReader:
             c0, s0 = math.cos(self._first), math.sin(self._first)
             self._turned = c0 * self._cos - s0 * self._sin, s0 * self._cos + c0 * self._sin
         number, (c, s) = self._all, self._turned
+        if scan.bearings_rad is not None:
+            angles = scan.angles_rad(number).tolist()
+            c = np.array([math.cos(angle) for angle in angles])
+            s = np.array([math.sin(angle) for angle in angles])
         usable = usable_beams(scan)
         if not usable.all():
             number = usable.nonzero()[0]

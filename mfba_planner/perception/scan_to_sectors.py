@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.geometry import rotated
+from ..core.geometry import Point, rotated
 from ..core.lidar_extrinsics import CENTRED, LidarExtrinsics
 from ..core.planner_types import Ranges, Scan
 from .scan_coverage import covered_sectors, covers_a_full_turn, usable_beams
@@ -37,6 +37,33 @@ def _upright(scan: Scan, extrinsics: LidarExtrinsics) -> Scan:
     return replace(scan, angle_min_rad=first, angle_increment_rad=step)
 
 
+def require_usable(scan: Scan, yaw_rad: float, offset_m: Point) -> np.ndarray:
+    """Which beams of a scan tell something, (n,); InputError if none, or for odd geometry."""
+    geometry = (
+        scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m, yaw_rad, *offset_m
+    )  # fmt: skip
+    if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:
+        raise InputError(
+            f"scan geometry angle_min={scan.angle_min_rad}, increment={scan.angle_increment_rad},"
+            f" range=[{scan.range_min_m}, {scan.range_max_m}], yaw={yaw_rad}: unusable;"
+            " check the lidar driver"
+        )
+    size = len(scan.ranges_m)
+    turn_rad = abs(scan.angle_increment_rad) * (size - 1)
+    if size > 1 and not 0.0 < turn_rad <= FULL_TURN_RAD:
+        raise InputError(
+            f"scan of {size} beams with angle_increment={scan.angle_increment_rad}: they span "
+            f"{turn_rad:.4g} rad, not more than 0 and at most a full turn; check the lidar driver"
+        )
+    known = usable_beams(scan)
+    if not known.any():
+        raise InputError(
+            f"scan of {size} beams without one usable range; check the lidar, and "
+            "scan_no_return if its driver reports free space otherwise than by inf"
+        )
+    return known
+
+
 def sense_scan(
     scan: Scan,
     yaw_rad: float,
@@ -52,38 +79,14 @@ def sense_scan(
     to be free. Raises InputError for a scan without any usable beam or with unusable geometry.
     """
     scan, yaw_rad = _upright(scan, extrinsics), yaw_rad + extrinsics.yaw_rad
-    geometry = (
-        scan.angle_min_rad,
-        scan.angle_increment_rad,
-        scan.range_min_m,
-        yaw_rad,
-        *extrinsics.offset_m,
-    )
-    if not all(map(math.isfinite, geometry)) or not scan.range_max_m > scan.range_min_m >= 0.0:
-        raise InputError(
-            f"scan geometry angle_min={scan.angle_min_rad}, increment={scan.angle_increment_rad},"
-            f" range=[{scan.range_min_m}, {scan.range_max_m}], yaw={yaw_rad}: unusable;"
-            " check the lidar driver"
-        )
     r = np.asarray(scan.ranges_m, dtype=np.float64)
-    turn_rad = abs(scan.angle_increment_rad) * (r.size - 1)
-    if r.size > 1 and not 0.0 < turn_rad <= FULL_TURN_RAD:
-        raise InputError(
-            f"scan of {r.size} beams with angle_increment={scan.angle_increment_rad}: they span "
-            f"{turn_rad:.4g} rad, not more than 0 and at most a full turn; check the lidar driver"
-        )
-    near, known = np.isneginf(r), usable_beams(scan)
-    if not known.any():
-        raise InputError(
-            f"scan of {r.size} beams without one usable range; check the lidar, and "
-            "scan_no_return if its driver reports free space otherwise than by inf"
-        )
+    near, known = np.isneginf(r), require_usable(scan, yaw_rad, extrinsics.offset_m)
     hits = known & ~np.isposinf(r)
     d = np.where(near, scan.range_min_m, r)
     ox, oy = rotated(extrinsics.offset_m, yaw_rad - extrinsics.yaw_rad)
     reach_m = params.sensing_range_m + math.sqrt(ox * ox + oy * oy)
     hits &= np.where(hits, d, np.inf) - robot_radius_m <= reach_m
-    angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hits) + yaw_rad
+    angles = scan.angles_rad(np.flatnonzero(hits)) + yaw_rad
     ranges = [math.inf] * params.sectors
     for distance_m, angle in zip(d[hits].tolist(), angles.tolist()):
         if ox or oy:

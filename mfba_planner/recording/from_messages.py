@@ -81,11 +81,15 @@ def pose2d(pose: Any, what: str) -> Pose2D:
 
 def require_frame(message: Any, frame: str, what: str, parameter: str = "odom_frame") -> None:
     """Raise FrameError for a message in another frame; an empty frame accepts any."""
+    if frame and frame_name(message.header.frame_id) != frame_name(frame):
+        raise _in_other_frame(message, frame, what, parameter)
+
+
+def _in_other_frame(message: Any, frame: str, what: str, parameter: str) -> FrameError:
     given = message.header.frame_id
-    if frame and frame_name(given) != frame_name(frame):
-        raise FrameError(
-            f"{what} is in frame {given!r}, not {frame!r}; transform it, or set {parameter}"
-        )
+    return FrameError(
+        f"{what} is in frame {given!r}, not {frame!r}; transform it, or set {parameter}"
+    )
 
 
 def robot_pose(odometry: Any, frame: str = "") -> Pose2D:
@@ -110,9 +114,9 @@ def goal_point(
     if not (given and frame) or given == frame_name(frame):
         return position
     if tree is None:
-        require_frame(pose_stamped, frame, what)
+        raise _in_other_frame(pose_stamped, frame, what, "odom_frame")
     try:
-        pose = plane_pose(tree or TransformTree(), given, frame)
+        pose = plane_pose(tree, given, frame)
     except FrameError:
         raise FrameError(
             f"{what} is in frame {given!r}, not {frame!r}, and no tf gives the one in the other; "

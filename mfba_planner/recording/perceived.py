@@ -65,6 +65,6 @@ def returns_of(scan: Scan, pose: Pose2D) -> np.ndarray:
     """The returns (n, 2) of a scan aligned with odom, taken at a pose."""
     ranges = np.asarray(scan.ranges_m, dtype=np.float64)
     hit = np.isfinite(ranges) & (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)
-    angles = scan.angle_min_rad + scan.angle_increment_rad * np.flatnonzero(hit)
+    angles = scan.angles_rad(np.flatnonzero(hit))
     points = np.column_stack((np.cos(angles), np.sin(angles))) * ranges[hit, None]
     return (points + scan.taken_from(pose).position).astype(np.float32)

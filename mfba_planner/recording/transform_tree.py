@@ -64,6 +64,11 @@ class TransformTree:
             raise FrameError(f"frame {frame!r}: no /tf_static or /tf gives its pose in {base!r}")
         return frame_poses[common].relative_to(base_poses[common])
 
+    def frames_between(self, frame: str, base: str) -> set[str]:
+        """The frames whose transforms give the pose of a frame in another; none without any."""
+        first, other = (set(self._poses_in_ancestors(frame_name(name))) for name in (frame, base))
+        return first ^ other if first & other else set()
+
     def _poses_in_ancestors(self, frame: str) -> dict[str, FramePose]:
         """The poses of a frame in itself and in all its ancestors, by frame."""
         poses = {frame: FramePose()}

@@ -45,6 +45,11 @@ def check_arguments(node: str, own: list[str]) -> None:
     parser.parse(own)
 
 
+def parameter_names(node: str) -> list[str]:
+    """The names of a node's parameters, rclpy's own one included."""
+    return ["use_sim_time", *(name for one in PARAMETERS[node] for name, _, _ in walk(one))]
+
+
 def _lines(node: str) -> list[str]:
     lines = []
     for settings in PARAMETERS[node]:

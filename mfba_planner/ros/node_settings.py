@@ -29,6 +29,10 @@ _SCAN_EXTRINSICS = (
     "where the pose of the lidar on the robot is from; auto: scan_x, scan_y, scan_yaw and "
     "scan_flipped if one of them is set, else tf where it is published"
 )
+_ODOM_SOURCE = (
+    "where the robot's pose is from; auto: odom where something publishes it, else base_frame in "
+    "odom_frame by tf"
+)
 _HARDWARE = "hardware_id of /diagnostics, to tell robots apart"
 
 
@@ -37,6 +41,14 @@ class ExtrinsicsSource(Enum):
 
     AUTO = "auto"
     PARAMETERS = "parameters"
+    TF = "tf"
+
+
+class OdomSource(Enum):
+    """Where the robot's pose is from."""
+
+    AUTO = "auto"
+    TOPIC = "topic"
     TF = "tf"
 
 
@@ -132,6 +144,7 @@ class VirtualSensorSettings:
     lockstep: bool = option(False, "pair odom with scan by stamp; false: newest odom")
     odom_frame: str = option("odom", "frame the sectors are aligned with")
     base_frame: str = option("base_link", _BASE_FRAME)
+    odom_source: OdomSource = option(OdomSource.AUTO, _ODOM_SOURCE)
     input_timeout_s: float = option(
         1.0,
         "age at which odometry, sectors or scan are stale, since their arrival or by their stamps",
@@ -157,6 +170,7 @@ class PlannerSettings:
     enable_stamped_cmd_vel: bool = option(False, "cmd_vel is a TwistStamped, as in Nav2")
     odom_frame: str = option("odom", "frame of all poses (REP-105)")
     base_frame: str = option("base_link", "frame of the robot (REP-105)")
+    odom_source: OdomSource = option(OdomSource.AUTO, _ODOM_SOURCE)
     view_period_s: float = option(
         0.2, "period of the markers", unit="s", minimum=0.0, maximum=3600.0
     )

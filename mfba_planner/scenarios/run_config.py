@@ -151,6 +151,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
     robot = config.scenario.robot
     # Never by tf: the first scan comes before it.
     extrinsics = {**robot.lidar.extrinsics.parameters, "scan_extrinsics": "parameters"}
+    reading = common | dated | {"odom_source": "topic"}
     radii = _radii(config.scenario)
     segments = config.scenario.segments_m if not robot.lidar.beams else ()
     return {
@@ -164,8 +165,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             "start_paused": True,
             "seed": config.seed,
         },
-        "virtual_sensor": common
-        | dated
+        "virtual_sensor": reading
         | flatten(config.sensor)
         | {
             "robot_radius_m": config.scenario.robot_radius_m,
@@ -174,7 +174,7 @@ def node_parameters(config: RunConfig, peers: tuple[str, ...]) -> Parameters:
             **({"source": "scan", **extrinsics} if robot.lidar.beams else {}),
         },
         "planner": viewed
-        | dated
+        | reading
         | flatten(config.scenario.planner_params(config.planner))
         | {"seed": config.seed, **extrinsics}
         | ({} if lockstep else {"input_timeout_s": timeout_s}),

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from ..core.geometry import Pose2D
@@ -41,6 +41,10 @@ class RecordedPoses:
             self._stamps.append(stamp)
             self._times.append(message.log_time_ns)
 
+    def __len__(self) -> int:
+        """Number of poses."""
+        return len(self._stamps)
+
     def at(self, stamp_ns: int) -> RecordedPose | None:
         """The pose of a stamp, None if there is none."""
         index = bisect_left(self._stamps, stamp_ns)
@@ -52,6 +56,13 @@ class RecordedPoses:
         """The newest pose recorded up to a log time, None without one."""
         index = bisect_right(self._times, log_time_ns)
         return self._get(index - 1) if index else None
+
+    def between(self, after_ns: int, log_time_ns: int) -> Iterator[RecordedPose]:
+        """Those recorded after a log time and up to another."""
+        for index in range(
+            bisect_right(self._times, after_ns), bisect_right(self._times, log_time_ns)
+        ):
+            yield self._get(index)
 
     def _get(self, index: int) -> RecordedPose:
         pose = self._refusals.get(index) or Pose2D(*self._values[3 * index : 3 * index + 3])

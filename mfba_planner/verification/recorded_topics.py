@@ -14,6 +14,7 @@ from ..core.errors import BagError
 from ..recording.bag_reader import BagReader
 
 Namespace = tuple[str, ...]
+_SEVERAL = {"--scan": ", or the lidars of one robot, separated by commas"}
 
 
 def namespace(topic: str) -> Namespace:
@@ -58,7 +59,7 @@ def named_or_only(
     if len(nearest) > 1:
         raise BagError(
             f"{reader.path}: {len(found)} topics of {type_name}, {', '.join(found)}; "
-            f"name one with {option}"
+            f"name one with {option}{_SEVERAL.get(option, '')}"
         )
     return nearest[0]
 

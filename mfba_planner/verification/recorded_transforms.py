@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from ..core.errors import BagError, FrameError, InputError
 from ..core.geometry import Point
 from ..core.lidar_extrinsics import CENTRED, PARAMETERS, LidarExtrinsics
-from ..recording.bag_reader import BagReader
-from ..recording.from_messages import goal_point
+from ..recording.bag_reader import BagReader, DecodedMessage
+from ..recording.from_messages import goal_point, stamp_ns
+from ..recording.odometry_from_tf import OdometryFromTf
 from ..recording.planar_poses import lidar_extrinsics
 from ..recording.transform_tree import TransformTree
 
@@ -27,7 +28,7 @@ class RecordedTransforms:
         self, reader: BagReader, static_topics: Sequence[str], topics: Sequence[str]
     ) -> None:
         """Read the static transforms; of several for a frame the last is used."""
-        self._reader, self._topics = reader, topics
+        self._reader, self.moving = reader, tuple(topics)
         self.static = TransformTree()
         for message in reader.decoded(static_topics) if static_topics else ():
             self.static.add(message.message)
@@ -42,13 +43,24 @@ class RecordedTransforms:
         except FrameError as error:
             missing = error
         tree = self.static.copy()
-        for message in self._reader.decoded(self._topics) if self._topics else ():
+        for message in self._reader.decoded(self.moving) if self.moving else ():
             tree.add(message.message)
             try:
                 return get(tree)
             except FrameError as error:
                 missing = error
         raise missing
+
+    def odometry(self, frame: str, base: str) -> Iterator[tuple[int, DecodedMessage]]:
+        """Yield (stamp, odometry) of rising stamps, where the robot sends it on /tf only."""
+        tree, last_ns = self.static.copy(), -1
+        by_tf = OdometryFromTf(tree, frame, base)
+        for message in self._reader.decoded(self.moving) if self.moving else ():
+            tree.add(message.message)
+            odometry = by_tf.of(message.message)
+            if odometry is not None and (stamp := stamp_ns(odometry.header.stamp)) > last_ns:
+                last_ns = stamp
+                yield stamp, message._replace(message=odometry)
 
     def goals(self, goal_topics: Sequence[str], frame: str) -> RecordedGoals:
         """All goals, in a frame: as the planner node takes them.
@@ -59,8 +71,8 @@ class RecordedTransforms:
         held: Any = None
         of_goals, is_refused = set(goal_topics), False
         topics = goal_topics
-        if self._topics and self._has_other_frame(goal_topics, frame):
-            topics = [*goal_topics, *self._topics]
+        if self.moving and self._has_other_frame(goal_topics, frame):
+            topics = [*goal_topics, *self.moving]
         for message in self._reader.decoded(topics) if topics else ():
             if message.topic in of_goals:
                 held, is_refused = message.message, False
@@ -122,21 +134,33 @@ class RecordedExtrinsics:
             reader.path, transforms, base, given
         )  # fmt: skip
         self._found: dict[str, LidarExtrinsics] = {}
+        self._frame = ""
         self.last = given or CENTRED
-
-    @property
-    def is_one(self) -> bool:
-        """Whether all scans so far had the same extrinsics."""
-        return len(set(self._found.values())) < 2
 
     def of(self, frame: str) -> LidarExtrinsics:
         """The extrinsics of the lidar with this frame. Raises BagError if they are unknown."""
         if self._given is not None:
+            self._require_one(frame)
             return self._given
         if frame not in self._found:
             self._found[frame] = self._find(frame)
         self.last = self._found[frame]
         return self.last
+
+    def name(self, frame: str) -> str:
+        """The lidar's name: its frame where tf gives it, else "", that of any single lidar."""
+        self.of(frame)
+        return frame if self._base and self._given is None else ""
+
+    def _require_one(self, frame: str) -> None:
+        """One pose is not that of two lidars."""
+        self._frame = self._frame or frame
+        if frame != self._frame:
+            raise BagError(
+                f"{self._path}: scans in frames {self._frame!r} and {frame!r}, but one pose of a "
+                f"lidar is given; leave {_OPTIONS} out, so that tf gives both, or name the topic "
+                "of one with --scan"
+            )
 
     def _find(self, frame: str) -> LidarExtrinsics:
         if frame and not self._base:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -34,6 +34,8 @@ from ..recording.from_messages import (
     stamp_ns,
     value_or_refusal,
 )
+from ..recording.odometry_from_tf import BASE_FRAME, ODOM_FRAME
+from ..recording.scan_parts import LidarMerging, MountedScan
 from ..recording.transform_tree import frame_name
 from ..simulation.decision_digest import digest
 from .recorded_poses import RecordedPoses
@@ -117,11 +119,15 @@ def redecide_recording(path: str | Path, params: RedecideParams) -> RedecideResu
 
 
 class DecidedScan(NamedTuple):
-    """A decision, and the scan it was made on in a frame aligned with odom; None if refused."""
+    """A decision, and the scan it was made on in a frame aligned with odom; None if refused.
+
+    fields are the keys of planner/decision that say what the scan was made of.
+    """
 
     decision: Decision
     scan: Scan | None
     log_time_ns: int
+    fields: Mapping[str, str]
 
 
 class RecordingDecider:
@@ -133,28 +139,39 @@ class RecordingDecider:
     def __init__(self, reader: BagReader, params: RedecideParams) -> None:
         """Choose the topics and read odometry and goals. Raises as redecide_recording()."""
         self._reader, self._params = reader, params
-        self.scan = named_or_only(reader, SCAN, params.scan, "--scan")
-        self.odom = named_or_only(reader, ODOMETRY, params.odom, "--odom", near=self.scan)
-        if not params.odom:
-            require_same_robot(reader, SCAN, self.scan, self.odom)
+        wanted = [name.strip() for name in params.scan.split(",")]
+        self.scans = tuple(named_or_only(reader, SCAN, name, "--scan") for name in wanted)
+        self.odom = self._odometry_topic()
         self._faults: list[str] = []
         self._counts: Counter[str] = Counter()
         self._decided: Counter[bool] = Counter()  # by whether the robot is stopped
         self._reasons: Counter[str] = Counter()  # why it is
         self._ahead_s: list[float] = []  # scan stamps against odometry at the same log time
-        first = next(m.message for m in reader.decoded([self.odom]))
-        self.frame = params.odom_frame or frame_name(first.header.frame_id)
-        self.base = frame_name(first.child_frame_id) or params.base_frame
-        self._poses = RecordedPoses(
-            self._rising(self.odom),
-            partial(value_or_refusal, partial(robot_pose, frame=self.frame)),
-        )
         transforms = RecordedTransforms(
             reader, self._topics(TRANSFORMS, TF_STATIC), self._topics(TRANSFORMS, TF)
         )
+        self.odometry = self.odom or ", ".join(transforms.moving)  # the topics
+        self.frame, self.base = self._frames()
+        messages = (
+            self._rising(self.odom) if self.odom else transforms.odometry(self.frame, self.base)
+        )
+        self._poses = RecordedPoses(
+            messages, partial(value_or_refusal, partial(robot_pose, frame=self.frame))
+        )
+        if not self._poses:
+            raise BagError(
+                f"{reader.path}: no message of type {ODOMETRY}, and {self.odometry or '/tf'} does "
+                f"not give {self.base!r} in {self.frame!r}; give odom_frame and base_frame with "
+                "--params-file, or a recording with odometry"
+            )
         self.goals, refused = self._goals(transforms)
         self._notes = [refused] if refused else []
         self._extrinsics = RecordedExtrinsics(reader, transforms, self.base, params.extrinsics)
+        self._lidars = LidarMerging(
+            self._extrinsics.of, self._extrinsics.name, self._laser_scan,
+            lambda: params.robot_radius_m, params.scan_frame,
+        )  # fmt: skip
+        self._followed_ns = -1  # log time of the newest pose that the lidars have
         planner = replace(params.planner, robot_radius_m=params.robot_radius_m)
         self._planner = make_planner(planner, params.sensor, params.seed)
         self.planner = self._planner.params
@@ -180,11 +197,6 @@ class RecordingDecider:
         return self._extrinsics.last
 
     @property
-    def has_same_extrinsics(self) -> bool:
-        """Whether all scans so far had the same extrinsics, as parameters hold one."""
-        return self._extrinsics.is_one
-
-    @property
     def faults(self) -> tuple[str, ...]:
         """Errors of the recording."""
         return tuple(self._faults)
@@ -207,7 +219,7 @@ class RecordingDecider:
 
     def decide(self) -> Iterator[DecidedScan]:
         """Yield the decision on each scan. Raises BagError."""
-        for stamp, message in self._rising(self.scan):
+        for stamp, message in self._rising(*self.scans):
             step = self._decide(stamp, message.log_time_ns, message.message)
             if step is None:
                 continue
@@ -217,25 +229,49 @@ class RecordingDecider:
                 self._reasons[step.decision.reason] += 1
             yield step
 
+    def _odometry_topic(self) -> str:
+        """The topic of the odometry; "" where the robot sends it on /tf only."""
+        reader, wanted, scan = self._reader, self._params.odom, self.scans[0]
+        if not wanted and not recorded(reader, ODOMETRY) and recorded(reader, TRANSFORMS):
+            return ""
+        found = named_or_only(reader, ODOMETRY, wanted, "--odom", near=scan)
+        if not wanted:
+            require_same_robot(reader, SCAN, scan, found)
+        return found
+
+    def _frames(self) -> tuple[str, str]:
+        """The frames of the odometry and of the robot, "" where the odometry names none."""
+        params = self._params
+        if not self.odom:
+            return params.odom_frame or ODOM_FRAME, params.base_frame or BASE_FRAME
+        first = next(m.message for m in self._reader.decoded([self.odom]))
+        return (
+            params.odom_frame or frame_name(first.header.frame_id),
+            frame_name(first.child_frame_id) or params.base_frame,
+        )
+
     def _topics(self, type_name: str, name: str) -> list[str]:
         """The topics of this name that belong to the robot."""
-        return of_robot(recorded(self._reader, type_name), name, (self.scan, self.odom))
+        robot = [*self.scans, *filter(None, [self.odom])]
+        return of_robot(recorded(self._reader, type_name), name, robot)
 
-    def _rising(self, topic: str) -> Iterator[tuple[int, DecodedMessage]]:
-        """Yield (stamp, message) of rising stamps.
+    def _rising(self, *topics: str) -> Iterator[tuple[int, DecodedMessage]]:
+        """Yield (stamp, message) of rising stamps; of scans those of each frame rise.
 
         A message that does not rise is skipped: it is a fault, but for odometry sent twice.
         """
-        last_ns = -1
-        for message in self._reader.decoded([topic]):
+        last: dict[str, int] = {}
+        for message in self._reader.decoded(topics):
             stamp = stamp_ns(message.message.header.stamp)
+            lidar = "" if topics == (self.odom,) else message.message.header.frame_id
+            last_ns = last.get(lidar, -1)
             if stamp > last_ns:
-                last_ns = stamp
+                last[lidar] = stamp
                 yield stamp, message
-            elif stamp == last_ns and topic == self.odom:
-                self._counts[f"messages of {topic} that repeat a stamp: left out"] += 1
+            elif stamp == last_ns and message.topic == self.odom:
+                self._counts[f"messages of {message.topic} that repeat a stamp: left out"] += 1
             else:
-                self._faults.append(f"{topic}: stamp {stamp} ns comes after {last_ns} ns")
+                self._faults.append(f"{message.topic}: stamp {stamp} ns comes after {last_ns} ns")
 
     def _known_map(self) -> KnownMap:
         """The first map that the planner would take, in the frame of the odometry."""
@@ -277,25 +313,32 @@ class RecordingDecider:
         ahead_s = median(self._ahead_s)
         if abs(ahead_s) > CLOCKS_APART_S:
             yield (
-                f"the stamps of {self.scan} are {abs(ahead_s):.3g} s "
-                f"{'ahead of' if ahead_s > 0.0 else 'behind'} those of {self.odom} received at "
-                "the same time: their clocks differ (synchronise them, and record again)"
+                f"the stamps of {', '.join(self.scans)} are {abs(ahead_s):.3g} s "
+                f"{'ahead of' if ahead_s > 0.0 else 'behind'} those of {self.odometry} received "
+                "at the same time: their clocks differ (synchronise them, and record again)"
             )
 
     def _decide(self, stamp: int, log_time_ns: int, scan: Any) -> DecidedScan | None:
-        newest, found = self._poses.newest(log_time_ns), self._poses.at(stamp)
+        newest = self._poses.newest(log_time_ns)
         if newest and len(self._ahead_s) < CLOCK_SAMPLES:
             self._ahead_s.append((stamp - newest.stamp_ns) * NANO)
-        if found is None:
-            if newest is None:
-                self._counts["scans before the first odometry: not decided"] += 1
-                return None
+        if (found := self._poses.at(stamp) or newest) is None:
+            self._counts["scans before the first odometry: not decided"] += 1
+            return None
+        try:
+            if not isinstance(found.pose, str):
+                if not self._is_due(stamp, log_time_ns, scan):
+                    return None  # another lidar's scan is about to come
+                stamp = self._lidars.sets.newest_ns
+                found = self._poses.at(stamp) or newest or found
+            mounted, ranges = self._measure(found.pose)
+        except InputError as error:
+            mounted, ranges = None, str(error)
+        pose_stamp, pose = found
+        if pose_stamp != stamp:
             self._counts[
                 "scans without odometry of their stamp: the newest before them was taken"
             ] += 1
-            found = newest
-        pose_stamp, pose = found
-        ranges = self._measure(pose, scan)
         if isinstance(ranges, str):
             self._counts["scans that the sensor refuses"] += 1
         goal = next((g for t, g in reversed(self.goals) if t <= log_time_ns), None)
@@ -304,26 +347,39 @@ class RecordingDecider:
             self._planner.reset()  # as the node does
         observation = observe(stamp, pose, ranges, goal, self._pose, max(stamp - pose_stamp, 0))
         self._pose = observation.pose
-        sensed = None
-        if not observation.refused:
-            extrinsics = self._extrinsics.of(scan.header.frame_id)
-            sensed = aligned(self._laser_scan(scan), observation.pose.yaw, extrinsics)
+        sensed, fields = None, {}
+        if mounted is not None and not observation.refused:
+            sensed = aligned(mounted.scan, observation.pose.yaw, mounted.extrinsics)
+            fields = mounted.fields
             if self._params.planner.reads_scan:
                 observation = replace(observation, scan=sensed)
         decision = self._planner.plan(observation)
-        return DecidedScan(decision, sensed, log_time_ns)
+        return DecidedScan(decision, sensed, log_time_ns, fields)
+
+    def _is_due(self, stamp: int, log_time_ns: int, scan: Any) -> bool:
+        """Take a scan; whether to decide now, or with the next one of another lidar."""
+        lidars = self._lidars
+        for found in self._poses.between(self._followed_ns, log_time_ns):
+            if not isinstance(found.pose, str):
+                lidars.poses.add(found.stamp_ns, found.pose)
+        self._followed_ns = log_time_ns
+        own = self._poses.at(stamp)
+        if own and not isinstance(own.pose, str) and stamp > lidars.poses.newest_ns:
+            lidars.poses.add(stamp, own.pose)  # in lockstep it is waited for
+        return lidars.add(scan, self._params.planner.input_timeout_s)
 
     def _laser_scan(self, scan: Any) -> Scan:
         return laser_scan(scan, self._params.scan_frame, self._params.scan_no_return)
 
-    def _measure(self, pose: Pose2D | RefusalReason, scan: Any) -> Ranges | RefusalReason:
+    def _measure(
+        self, pose: Pose2D | RefusalReason
+    ) -> tuple[MountedScan | None, Ranges | RefusalReason]:
+        """The newest scan, and the ranges by it from a pose. Raises InputError."""
         if isinstance(pose, str):
-            return pose
-        yaw, params = pose.yaw, self._params
-        extrinsics = self._extrinsics.of(scan.header.frame_id)
-
-        def sense(message: Any) -> Ranges:
-            read = self._laser_scan(message)
-            return sense_scan(read, yaw, params.robot_radius_m, params.sensor, extrinsics)
-
-        return value_or_refusal(sense, scan)
+            return None, pose
+        params = self._params
+        mounted = self._lidars.newest(params.planner.input_timeout_s)
+        ranges = sense_scan(
+            mounted.scan, pose.yaw, params.robot_radius_m, params.sensor, mounted.extrinsics
+        )
+        return mounted, ranges

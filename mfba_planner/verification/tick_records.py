@@ -26,10 +26,14 @@ TICK_TOPICS = (*STAMPED, SCAN, VECTOR, TWIST)
 
 @dataclass(slots=True, kw_only=True)
 class Tick:
-    """The decoded messages of one stamp, by topic."""
+    """The decoded messages of one stamp, by topic; scans by frame, of which there may be several.
+
+    The first of them is in messages too.
+    """
 
     stamp_ns: int
     messages: dict[str, Any] = field(default_factory=dict)
+    scans: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -45,6 +49,14 @@ class TickRecords:
     omitted_stamps: frozenset[int] = (
         frozenset()
     )  # stamps of decisions after the end of their inputs
+
+    def scans(self) -> dict[tuple[str, int], Any]:
+        """All scans, by frame and stamp."""
+        return {
+            (frame, tick.stamp_ns): message
+            for tick in self.ticks
+            for frame, message in tick.scans.items()
+        }
 
 
 def read_tick_messages(
@@ -158,16 +170,22 @@ def _join_stamped(
     *,
     must_match: bool = True,
 ) -> None:
-    latest_ns, repeated = -1, 0
+    repeated = 0
+    latest: dict[str, int] = {}  # of scans by frame: each lidar's stamps rise
     for message in messages:
         stamp = stamp_ns(message.header.stamp)
+        lidar = message.header.frame_id if topic == SCAN else ""
+        latest_ns = latest.get(lidar, -1)
         if begun_ns <= stamp < latest_ns:
             records.faults.append(f"{topic}: stamp {stamp} ns comes after {latest_ns} ns")
-        latest_ns = max(latest_ns, stamp)
-        stored = ticks.setdefault(stamp, Tick(stamp_ns=stamp)).messages
-        if topic not in stored:
-            stored[topic] = message
-        elif _content(topic, stored[topic]) == _content(topic, message):
+        latest[lidar] = max(latest_ns, stamp)
+        tick = ticks.setdefault(stamp, Tick(stamp_ns=stamp))
+        first = tick.messages.setdefault(topic, message)
+        if topic == SCAN:
+            first = tick.scans.setdefault(lidar, message)
+        if first is message:
+            continue
+        if _content(topic, first) == _content(topic, message):
             repeated += 1
         elif must_match:
             records.faults.append(f"{topic}: stamp {stamp} ns is repeated with other content")

@@ -37,6 +37,7 @@ from ..recording.from_messages import (
 from ..recording.from_messages import decision as read_decision
 from ..recording.run_parameters import Nodes, read_setup, read_setups
 from ..recording.run_setup import Setup
+from ..recording.scan_parts import FRAME_FIELD, ScanPart, merge_again, parts_in
 from ..simulation.decision_digest import canonical, digest
 from ..simulation.recorded_motion import is_present
 from ..simulation.scenario_map import with_known_map
@@ -156,7 +157,7 @@ def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Repor
     pose = Pose2D(0.0, 0.0)
     recorded: list[Decision] = []
     decided: list[Decision] = []
-    unchecked, goal_id = 0, ""
+    scans, unchecked, goal_id = _Scans(tick_records), 0, ""
     for count, tick in enumerate(tick_records.ticks):
         progress(count, len(tick_records.ticks))
         if DECISION not in tick.messages or tick.stamp_ns in tick_records.omitted_stamps:
@@ -207,8 +208,12 @@ def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Repor
         observation = observe(tick.stamp_ns, pose_input, ranges, goal, pose)
         pose = observation.pose
         recorded.append(decision)
-        decided.append(planner.plan(_with_scan(setup, tick, decision, observation)))
-        faults += _contradictions(setup, tick, decision)
+        try:
+            observation = _with_scan(setup, tick, scans, decision, observation)
+        except InputError as error:
+            faults.append(f"stamp {tick.stamp_ns} ns: {error}")
+        decided.append(planner.plan(observation))
+        faults += _contradictions(setup, tick, decision, is_one_lidar=scans.are_of_one_lidar)
     if unchecked:
         notes.append(f"{unchecked} stops of a run in real time cannot be decided again")
     if tick_records.began_late and setup.planner.method is not Method.PAPER:
@@ -245,22 +250,55 @@ def _inputs(setup: Setup) -> list[str]:
     ]
 
 
-def _with_scan(setup: Setup, tick: Tick, recorded: Decision, obs: Observation) -> Observation:
+class _Scans:
+    """The scans of a recording, by frame and stamp."""
+
+    def __init__(self, tick_records: TickRecords) -> None:
+        self._messages = tick_records.scans()
+        self._begin_ns = min((stamp for _, stamp in self._messages), default=0)
+        self.are_of_one_lidar = len({frame for frame, _ in self._messages}) < 2
+
+    def include(self, parts: Sequence[ScanPart]) -> bool:
+        """Whether the recording had begun when these parts of a merged scan were measured."""
+        return all(part.stamp_ns >= self._begin_ns for part in parts)
+
+    def of(self, part: ScanPart) -> Any:
+        """The message of a part of a merged scan; InputError without it."""
+        message = self._messages.get((part.frame, part.stamp_ns))
+        if message is None:
+            raise InputError(f"{SCAN} of {part.frame!r} at {part.stamp_ns} ns was not recorded")
+        return message
+
+
+def _with_scan(
+    setup: Setup, tick: Tick, scans: _Scans, recorded: Decision, obs: Observation
+) -> Observation:
     """The observation with the scan, where the recorded decision was made on one."""
     if recorded.perception != "scan" or obs.refused or SCAN not in tick.messages:
         return obs
     pose_stamp_ns, scan_pose = scan_timing(tick.messages[DECISION])
-    scan = laser_scan(tick.messages[SCAN], no_return=setup.scan_no_return)
-    yaw, extrinsics = (scan_pose or obs.pose).yaw, setup.scenario.robot.lidar.extrinsics
+    read = partial(laser_scan, no_return=setup.scan_no_return)
+    parts, yaw = parts_in(tick.messages[DECISION]), (scan_pose or obs.pose).yaw
+    if not scans.include(parts):
+        return obs
+    if parts:
+        merged = merge_again(parts, list(map(scans.of, parts)), read, setup.planner.robot_radius_m)
+        scan = aligned(merged, yaw)
+    else:
+        extrinsics = setup.scenario.robot.lidar.extrinsics
+        frame = decision_field(tick.messages[DECISION], FRAME_FIELD)
+        scan = aligned(read(tick.scans.get(frame, tick.messages[SCAN])), yaw, extrinsics)
     return replace(
         obs,
-        scan=aligned(scan, yaw, extrinsics),
+        scan=scan,
         sensed=(obs.stamp_ns, scan_pose) if scan_pose else None,
         pose_stamp_ns=pose_stamp_ns,
     )
 
 
-def _contradictions(setup: Setup, tick: Tick, decision: Decision) -> list[str]:
+def _contradictions(
+    setup: Setup, tick: Tick, decision: Decision, *, is_one_lidar: bool
+) -> list[str]:
     """Faults: the topics of a tick that do not match its decision."""
     found = []
     for topic, agrees in (
@@ -271,8 +309,8 @@ def _contradictions(setup: Setup, tick: Tick, decision: Decision) -> list[str]:
     ):
         if topic in tick.messages and not agrees(tick.messages[topic], decision):
             found.append(f"stamp {tick.stamp_ns} ns: {topic} does not match the decision")
-    if not setup.is_simulated and not setup.lockstep:
-        return found  # the sensor may have used other odometry
+    if not is_one_lidar or (not setup.is_simulated and not setup.lockstep):
+        return found  # the sensor may have used other odometry, or other scans
     source = SCAN if setup.scenario.robot.lidar.beams else OBSTACLES
     if {source, ODOM} <= tick.messages.keys() and not _sectors_match_sensor(setup, tick, decision):
         found.append(f"stamp {tick.stamp_ns} ns: {SECTORS} does not match the sensor")

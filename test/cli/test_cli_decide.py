@@ -121,6 +121,30 @@ def test_what_if_is_a_second_run(run: Path, tmp_path: Path, capsys: Capture) -> 
     assert "first difference at tick" in capsys.readouterr().out
 
 
+def test_options_that_contradict_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag", drive())
+    for given, setting in (
+        (["--speed", "0.5"], "planner.speed_mps=0.6"),
+        (["--planner", "paper"], "planner.method=predictive"),
+    ):
+        line = f"{' '.join(given)}: --set {setting}; leave one of them out"
+        with pytest.raises(ConfigError, match=f"^{line}$"):
+            decide(path, *given, "--set", setting)
+
+
+def test_a_misspelt_name_in_a_parameter_file_is_named(tmp_path: Path, capsys: Capture) -> None:
+    path = write(tmp_path / "bag", drive())
+    params = tmp_path / "params.yaml"
+    params.write_text(
+        "planner: {ros__parameters: {spede_mps: 0.2, speed_mps: 0.5, use_sim_time: true}}\n"
+    )
+    assert decide(path, "--params-file", str(params)) == 0
+    assert capsys.readouterr().err == (
+        f"note: --params-file {params}: spede_mps: no such parameter of planner or "
+        "virtual_sensor; `planner --help` and `virtual_sensor --help` list them\n"
+    )
+
+
 def test_the_parameter_file_of_the_nodes_is_taken(tmp_path: Path, capsys: Capture) -> None:
     path = write(tmp_path / "bag", drive())
     params = tmp_path / "params.yaml"
@@ -241,15 +265,42 @@ def test_without_ros_only_the_directory_is_refused(
     assert not (tmp_path / "run").exists()
 
 
-def test_scans_of_two_mountings_are_decided_and_named(tmp_path: Path, capsys: Capture) -> None:
-    rear = transform(START_NS, child="rear", yaw=math.pi)
-    turns = [
-        scan(START_NS + k * TICK_NS, wall(0), frame=("laser", "rear")[k % 2]) for k in range(1, 21)
-    ]
-    messages = [transform(START_NS), rear, goal(START_NS, 0.0, 5.0), *steps(odom), *turns]
-    path = write(tmp_path / "bag", messages)
-    assert decide(path, "--out", str(tmp_path / "run")) == 0
-    assert "lidars with several extrinsics" in capsys.readouterr().out
+def test_scans_of_two_lidars_are_merged_and_verified(tmp_path: Path, capsys: Capture) -> None:
+    rear = transform(START_NS, child="rear", x=-0.2, yaw=math.pi)
+    messages = [transform(START_NS), rear, goal(START_NS, 0.0, 5.0), *steps(odom)]
+    for k in range(1, 21):
+        for frame in ("laser", "rear"):
+            messages.append(scan(START_NS + k * TICK_NS, wall(0), frame=frame))
+    path, run = write(tmp_path / "bag", messages), tmp_path / "run"
+    assert decide(path, "--out", str(run)) == 0
+    computed = re.findall("20 decisions, digest (.*)", capsys.readouterr().out)
+    assert cli.main(["verify", str(run)]) == 0
+    assert computed[0] in capsys.readouterr().out
+    (perceived,) = read_perceived(run, read_recording(run).episodes).values()
+    assert len(perceived) == 20
+    for found in perceived[1:]:
+        assert (found.points_m[:, 0].min(), found.points_m[:, 0].max()) == pytest.approx(
+            (-0.8, 0.6), abs=0.01
+        )
+
+
+def test_odometry_on_tf_alone_is_decided_on_and_shown(tmp_path: Path, capsys: Capture) -> None:
+    messages = [transform(START_NS), goal(START_NS, 5.0, 0.0)]
+    for k in range(1, 21):
+        stamp = START_NS + k * TICK_NS
+        messages.append(transform(stamp, "odom", "base_link", x=0.01 * k, topic="/tf"))
+        messages.append(scan(stamp, wall(90)))
+    path, run = write(tmp_path / "bag", messages), tmp_path / "run"
+    assert decide(path, "--out", str(run)) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("recording: scan /scan, odometry /tf in 'odom', goal (5, 0)\n")
+    by_topic = write(tmp_path / "by_topic", drive(20))
+    assert decide(by_topic) == 0
+    assert DIGEST.findall(out) == DIGEST.findall(capsys.readouterr().out) != []
+    for command in (["verify", str(run)], ["export", str(run), str(tmp_path / "run.csv")]):
+        assert cli.main(command) == 0
+    (episode,) = read_recording(run).episodes.values()
+    assert episode.ticks[-1].pose.x == pytest.approx(0.2)
 
 
 def test_where_the_lidar_is_can_be_given(tmp_path: Path, capsys: Capture) -> None:

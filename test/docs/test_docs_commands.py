@@ -81,6 +81,7 @@ def test_commands_are_found_and_every_reduced_one_is_shown() -> None:
         ("python bench/fleet.py", "1 of 1"),
         ("python bench/startup.py --rounds 3", "--help "),
         ("python bench/startup.py --imports verify", " ms "),
+        ("python bench/graph_speed.py --pairs 3", "CPU    bare step "),
         ("python bench/tracking.py --seeds 30", "| decision with tracking |"),
         ("python bench/static_map.py --worlds 5", "| fast-20 |"),
         ("python bench/tracking.py --memory 100000", "| 20 |"),

@@ -112,6 +112,7 @@ def test_a_straight_line_beside_a_wall_is_a_straight_line() -> None:
 # --- soundness --------------------------------------------------------------------------------
 
 
+@pytest.mark.no_cover
 @settings(max_examples=30)
 @given(segments=st.lists(SEGMENTS, max_size=6), moving=st.booleans())
 def test_trajectories_touch_no_wall(segments: list[Segment], moving: bool) -> None:

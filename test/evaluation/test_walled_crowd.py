@@ -127,6 +127,7 @@ def test_a_published_world_does_not_change() -> None:
     assert found == pytest.approx(GOLDEN, abs=1e-6)
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("k", [7, 11])
 def test_the_default_planner_passes_from_its_lidar(k: int) -> None:
     found = metrics_of("crowd", k)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from crowded_room import BODY_RADIUS_M, LIDAR, RANGE_SD_M, Room, clearance_m, draw_room
+from crowded_room import BODY_RADIUS_M, LIDAR, RANGE_SD_M, Room, Standing, draw_room
 from physics_world import SCAN_NS, Lifted, PhysicsWorld
 from planner_in_process import DriveResult, drive, robot_rng
 from robot_model_xml import RobotBody
@@ -119,7 +119,8 @@ def test_the_lidar_measures_what_geometry_says() -> None:
     world = PhysicsWorld(room, robot_rng(3))
     compared = 0
     for pose in ((1.5, 1.5, 0.3), (6.0, 9.0, -2.0), (10.0, 3.0, 1.0), (3.0, 6.2, 3.0)):
-        if clearance_m(pose[:2], room.boxes, room.scenario.obstacles[room.people :]) < 0.4:
+        standing = Standing(room.boxes, room.scenario.obstacles[room.people :])
+        if standing.clearance_m(pose[:2]) < 0.4:
             continue
         world.advance(world.now_ns + 2 * SCAN_NS)
         world.put(Pose2D(*pose))

@@ -6,6 +6,7 @@ OFFSET_M ahead of it meet, so that a lidar of 360 beams at either place meets ea
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -72,3 +73,27 @@ def wall_points(pose: Pose2D) -> np.ndarray:
             for angle, d in zip(angles, distances)
         ]
     )
+
+
+# Two lidars, each of which tells nothing of a part of its turn; together they see all around.
+FRONT, REAR = MOUNTED["ahead"], MOUNTED["flipped"]
+
+
+def front_scan() -> Scan:
+    """That ahead of the centre, in its own frame: 200 degrees ahead of it."""
+    return _in_part(FRONT, lambda degrees: abs(degrees) <= 100)
+
+
+def rear_scan() -> Scan:
+    """That at the centre, upside down: all but 140 degrees ahead."""
+    return _in_part(REAR, lambda degrees: abs(degrees) >= 70)
+
+
+def _in_part(mounted: LidarExtrinsics, is_inside: Callable[[int], bool]) -> Scan:
+    """is_inside: by the direction on the robot, from -180 to 179 degrees."""
+    scan = wall_scan(mounted)
+    for beam in range(BEAMS):
+        degrees = -beam if mounted.flipped else beam
+        if not is_inside((degrees + 180) % 360 - 180):
+            scan.ranges_m[beam] = math.nan
+    return scan

@@ -72,6 +72,7 @@ REDUCED = {
     ),
     "python bench/tracking.py --memory 100000": "python bench/tracking.py --memory 20",
     "python bench/startup.py --rounds 3": "python bench/startup.py --rounds 1 --only help",
+    "python bench/graph_speed.py --pairs 3": "python bench/graph_speed.py --pairs 1 --steps 200",
     "python bench/startup.py --imports verify": "python bench/startup.py --imports verify",
     "python examples/mujoco_robot/run.py --world 1 --film --out runs/physics": (
         "python examples/mujoco_robot/run.py --world 1 --time-limit 2 --out runs/physics"

@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 import signal
 import threading
 from pathlib import Path
@@ -84,6 +85,17 @@ def test_node_that_refuses_its_arguments_is_named(tmp_path: Path) -> None:
         "sectors=2: out of range; give a value in [3, 3600]\n"
     )
     assert [*tmp_path.iterdir()] == []
+
+
+def test_where_a_node_sent_nothing_its_log_is_named(tmp_path: Path) -> None:
+    """A machine with less load would not help: the sensor refuses each message."""
+    world = "--world-sim-args=-p scenario:=case2"
+    done = complete("launcher", "case1", "--planner", "paper", world, "--out", "run", cwd=tmp_path)
+    assert done.process.returncode == 1
+    line = only_line(done)
+    assert re.match(r"launcher: run/bag: incomplete, 0 of \d+ messages on /sensory_vector;", line)
+    assert line.endswith("; see run/log.txt; what was recorded is in run\n")
+    assert "5 obstacles but 3 obstacle_radii_m" in (tmp_path / "run/log.txt").read_text()
 
 
 def test_second_launcher_in_the_same_directory_is_refused(tmp_path: Path) -> None:

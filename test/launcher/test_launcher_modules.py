@@ -105,6 +105,26 @@ def test_options_of_algorithm_1_select_algorithm_1(
     assert (planner.bat.algorithm is Algorithm.BA) == ("--algorithm=ba" in args)
 
 
+@pytest.mark.parametrize(
+    ("args", "line"),
+    [
+        ("--planner=predictive --reading=fig1", "--reading: of planner paper only; leave it out"),
+        ("--planner=predictive --swarm=literal", "--swarm: of planner paper only; leave it out"),
+        (
+            "--planner=paper --set=planner.method=predictive",
+            "--planner paper: --set planner.method=predictive; leave one of them out",
+        ),
+        (
+            "--algorithm=ba --set=planner.bat.algorithm=mfba",
+            "--algorithm ba: --set planner.bat.algorithm=mfba; leave one of them out",
+        ),
+    ],
+)
+def test_options_that_contradict_are_refused(args: str, line: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{re.escape(line)}"):
+        read_request(args.split(), "launcher")
+
+
 def test_speed_implies_real_time_and_a_longer_timeout() -> None:
     request = read_request(["--speed=0.1"], "launcher")
     assert request.config.real_time

@@ -32,6 +32,7 @@ def ten_runs(lengths: np.ndarray) -> np.ndarray:
     return np.percentile(statistics, [0.5, 99.5], axis=0)
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize(("reading", "case"), PRINTED)
 def test_intervals_of_ten_runs_contain_the_printed_row(reading: str, case: str) -> None:
     params = override(

@@ -50,6 +50,7 @@ def decide(name: str, *circles: Circle) -> Any:
     )  # fmt: skip
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("name", NAMES)
 def test_every_ablation_arrives_by_another_path_than_the_full_planner(name: str) -> None:
     results = [evaluate(drive(name, world=world)) for world in range(3)]

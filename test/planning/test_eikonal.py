@@ -47,12 +47,14 @@ def test_interrupts_while_it_is_computed_come_after_it() -> None:
         text=True,
     ) as program:
         assert program.stdout is not None
-        guard = threading.Timer(60.0, program.kill)  # what such a handler breaks may also hang
-        guard.start()
+        time_limit = threading.Timer(
+            60.0, program.kill
+        )  # what such a handler breaks may also hang
+        time_limit.start()
         while program.stdout.readline() == "ready\n":
             program.send_signal(signal.SIGINT)
         _, stderr = program.communicate()
-        guard.cancel()
+        time_limit.cancel()
     assert (program.returncode, stderr) == (0, "")
 
 

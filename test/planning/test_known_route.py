@@ -50,6 +50,7 @@ def length_m(episode: Episode) -> float:
     return float(np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum())
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize(
     ("goal", "walls", "shortest_m", "saved_m"),
     [
@@ -75,6 +76,7 @@ def test_the_trap_is_never_entered() -> None:
         assert not (2.5 < x < 7.0 and abs(y) < 3.0)
 
 
+@pytest.mark.no_cover
 def test_without_known_map_a_map_changes_nothing() -> None:
     """What is given to the planner is what counts, and the scenario's walls only if asked for."""
     scenario = place((12.0, 0.0), TRAP)

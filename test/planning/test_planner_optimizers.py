@@ -55,6 +55,7 @@ def test_each_optimizer_arrives_and_decides_differently(method: str) -> None:
         assert digest_of(method, "random", seed=1) != found["random"]
 
 
+@pytest.mark.no_cover
 def test_the_optimizer_refines_in_the_open_and_through_the_map() -> None:
     for scenario in ("case2", "rooms"):
         found = {

@@ -2,16 +2,25 @@
 """The same wall by lidars with several extrinsics: the same decisions, live and from a bag."""
 
 import math
-import sys
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import tf2_msgs_package
+from bag_to_graph import (
+    PAPER,
+    PLANNERS,
+    PREDICTIVE,
+    RADIUS_M,
+    SEED,
+    TICKS,
+    check_alike,
+    from_bag,
+    live,
+    play,
+)  # fmt: skip
 from foreign_bags import START_NS, TICK_NS, Recorded, goal, odom, scan, transform, write
 from geometry_msgs.msg import TransformStamped, Vector3
 from mounted_lidars import MOUNTED, wall_ranges
@@ -21,13 +30,10 @@ from std_msgs.msg import Header
 from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.geometry import Pose2D
 from mfba_planner.core.lidar_extrinsics import LidarExtrinsics
-from mfba_planner.core.option_specs import flatten
-from mfba_planner.core.planner_types import Decision, Mode, Scan
+from mfba_planner.core.planner_types import Scan
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.planner_factory import params_for_method
-from mfba_planner.planning.planner_params import Method, PlannerParams
-from mfba_planner.recording.bag_reader import BagReader
-from mfba_planner.recording.from_messages import decision, decision_field, sector_ranges, stamp_ns
+from mfba_planner.planning.planner_params import PlannerParams
+from mfba_planner.recording.from_messages import decision, decision_field, sector_ranges
 from mfba_planner.recording.planar_poses import lidar_extrinsics
 from mfba_planner.recording.transform_tree import TransformTree
 from mfba_planner.ros.interface import topics
@@ -40,32 +46,9 @@ from mfba_planner.scenarios.run_config import RunConfig, node_parameters
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.robot_model import Lidar, Robot
 from mfba_planner.simulation.run_episode import simulate
-from mfba_planner.verification.redecide import RedecideParams, redecide_recording
 from mfba_planner.verification.verify_bag import verify
 
-RADIUS_M, SEED, TICKS = 0.3, 3, 12
-PAPER = PlannerParams()
-PREDICTIVE = replace(
-    params_for_method(Method.PREDICTIVE.value, PAPER, algorithm_1=False), method=Method.PREDICTIVE
-)
-PLANNERS = {"paper": PAPER, "predictive": PREDICTIVE}
 EACH = pytest.mark.parametrize("name", MOUNTED)
-
-
-@pytest.fixture(scope="module")
-def tf2_msgs_directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tf2_msgs_package.build(tmp_path_factory.mktemp("tf2_msgs"))
-
-
-@pytest.fixture
-def with_tf(tf2_msgs_directory: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """The type TFMessage, with tf2_msgs installed for this test alone."""
-    monkeypatch.syspath_prepend(str(tf2_msgs_directory))
-    monkeypatch.setattr(topics, "TRANSFORMS", topics.transform_topics())
-    assert [topic.name for topic in topics.TRANSFORMS] == ["/tf", "/tf_static"]
-    yield topics.TRANSFORMS[0].type
-    for name in [name for name in sys.modules if name.split(".")[0] == "tf2_msgs"]:
-        del sys.modules[name]
 
 
 def recording(mounted: LidarExtrinsics, begin_ns: int = START_NS) -> list[Recorded]:
@@ -77,48 +60,6 @@ def recording(mounted: LidarExtrinsics, begin_ns: int = START_NS) -> list[Record
         stamp = begin_ns + k * TICK_NS
         found += [odom(stamp, yaw=0.4), scan(stamp, wall_ranges(mounted).tolist(), range_min=0.1)]
     return found
-
-
-def play(
-    graph: Graph, bag: Path, planner: PlannerParams, **more: Any
-) -> tuple[list[Any], list[Any]]:
-    """Publish the very bytes of a bag to both nodes; planner/decision and sectors."""
-    common = {"lockstep": True, "robot_radius_m": RADIUS_M, **more}
-    played = (topics.ODOM, topics.SCAN, topics.GOAL_POSE, *topics.TRANSFORMS)
-    writers = {topic.name.lstrip("/"): graph.writer(topic) for topic in played}
-    decisions, sectors = graph.collect(topics.DECISION), graph.collect(topics.SECTORS)
-    graph.start(VirtualSensor, {**common, "source": "scan"})
-    graph.start(PlannerNode, {**flatten(planner), **common, "seed": SEED})
-    with BagReader(bag) as reader:
-        for message in reader.messages():
-            writers[message.topic.lstrip("/")].publish(message.data)
-            graph.settle()
-    return decisions, sectors
-
-
-def live(
-    graph: Graph, bag: Path, planner: PlannerParams, **more: Any
-) -> list[tuple[Any, Decision]]:
-    """The messages of play(), and the decisions in them; those of one stamp belong together."""
-    decisions, sectors = play(graph, bag, planner, **more)
-    rings = {stamp_ns(ring.header.stamp): sector_ranges(ring) for ring in sectors}
-    assert len(rings) == TICKS
-    return [
-        (message, decision(message, rings[stamp_ns(message.header.stamp)]))
-        for message in decisions
-    ]
-
-
-def from_bag(bag: Path, planner: PlannerParams, **more: Any) -> tuple[Decision, ...]:
-    given = RedecideParams(robot_radius_m=RADIUS_M, planner=planner, seed=SEED)
-    found = redecide_recording(bag, replace(given, sensor=SensorParams(), **more))
-    assert not found.faults
-    return found.decided
-
-
-def by_wall(found: Decision) -> Any:
-    """What a decision of the paper's planner is apart from the last bits of its ranges."""
-    return replace(found, ranges_m=())
 
 
 @EACH
@@ -286,17 +227,3 @@ def test_a_goal_in_map_is_transformed(
     assert tuple(one for _, one in live(graph, bag, PAPER)) == expected[first:]
     assert {one.goal for one in expected[first:]} == {expected[-1].goal}
     assert expected[-1].goal == pytest.approx((0.0, 5.0))
-
-
-def check_alike(
-    found: list[Decision], expected: tuple[Decision, ...], planner: PlannerParams
-) -> None:
-    assert len(found) == len(expected) == TICKS
-    assert {one.mode for one in found} == {one.mode for one in expected} != {Mode.STOPPED}
-    for one, other in zip(found, expected):
-        assert one.vs == other.vs
-        assert one.ranges_m == pytest.approx(other.ranges_m, rel=1e-6)
-        if planner is PAPER:
-            assert by_wall(one) == by_wall(other)
-        else:
-            assert one.velocity == pytest.approx(other.velocity, abs=0.02)

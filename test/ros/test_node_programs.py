@@ -10,11 +10,14 @@ import sys
 from pathlib import Path
 
 import pytest
+import rclpy
 from launched_programs import PROGRAM, ROOT, Program
 from nav_msgs.msg import Path as PathMsg
+from rclpy.context import Context
 from ros_graph import Graph
 from waiting import wait_until
 
+from mfba_planner.core.errors import ConfigError
 from mfba_planner.core.option_specs import walk
 from mfba_planner.recording.bag_reader import BagReader
 from mfba_planner.recording.bag_writer import CHUNK_BYTES
@@ -22,6 +25,7 @@ from mfba_planner.recording.recover import recover
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.interface.to_messages import path_msg
 from mfba_planner.ros.node_help import PARAMETERS
+from mfba_planner.ros.runtime.given_parameters import check_given_parameters
 
 PARAMS_FILE = "/**: {ros__parameters: {bat.population: 1}}\n"
 
@@ -112,6 +116,72 @@ def test_bad_arguments_are_one_line(ros_env: dict[str, str], tmp_path: Path) -> 
     assert line("--params-file", str(file)).startswith("planner: population=1: out of range")
     file.write_text("planner: [1, 2")
     assert "planner.yaml" in line("--params-file", str(file))
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        (
+            ["speed_mps:=abc"],  # rcl drops it without a word: the file has a number
+            "planner: -p speed_mps:=abc has no effect: a parameter file says 0.4 for this node; "
+            "change it there, or give -p planner:speed_mps:=abc",
+        ),
+        (
+            ["step_length_m:=0.3"],  # the file's section of this node counts more
+            "planner: -p step_length_m:=0.3 has no effect: a parameter file says 0.2 for this "
+            "node; change it there, or give -p planner:step_length_m:=0.3",
+        ),
+        (
+            ["planner:speed_mps:=abc"],
+            "planner: parameter speed_mps='abc': wrong type; give",
+        ),
+        (["use_sim_time:=5"], "planner: use_sim_time: wrong type; give true or false"),
+        (["recovery.enabled:=2.0"], "planner: -p recovery.enabled:=2.0 has no effect: a param"),
+    ],
+)
+def test_a_parameter_beside_a_file_counts_or_is_refused(
+    tmp_path: Path, ros_env: dict[str, str], given: list[str], line: str
+) -> None:
+    file = tmp_path / "planner.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {speed_mps: 0.4, recovery: {enabled: true}}}\n"
+        "planner: {ros__parameters: {step_length_m: 0.2}}\n"
+    )
+    arguments = ["--ros-args", "--params-file", str(file), *parameters(*given)[1:]]
+    assert refused("planner", *arguments, env=ros_env).startswith(line)
+
+
+def test_in_a_namespace_no_option_names_the_node(tmp_path: Path, ros_env: dict[str, str]) -> None:
+    file = tmp_path / "planner.yaml"
+    file.write_text("/**: {ros__parameters: {speed_mps: 0.4}}\n")
+    given = ["--ros-args", "--params-file", str(file), "-r", "__ns:=/ns"]
+    assert refused("planner", *given, "-p", "planner:speed_mps:=0.6", env=ros_env) == (
+        "planner: -p speed_mps:=0.6 has no effect: a parameter file says 0.4 for this node; "
+        "change it there"
+    )
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "speed_mps:=5e-1", "speed_mps:=.5", "speed_mps:='0.6'", "use_sim_time:=Y",
+        "recovery.enabled:=off", "bat.iterations:=+9", "odom_frame:='12:30'", "seed:=0x10",
+    ],
+)  # fmt: skip
+def test_what_rcl_reads_in_another_form_has_an_effect(given: str) -> None:
+    context = Context()
+    context.init(args=["--ros-args", "-p", given])
+    node = rclpy.create_node("planner", context=context, start_parameter_services=False)
+    try:
+        check_given_parameters(node, ["--ros-args", "-p", given])
+        name = given.partition(":=")[0]
+        with pytest.raises(ConfigError, match=f"-p {name}:=another has no effect: a param"):
+            check_given_parameters(node, ["-p", f"{name}:=another"])
+        check_given_parameters(node, ["-p", f"{name}:=another", "-p", given])
+        check_given_parameters(node, ["-p", f"other_node:{name}:=another"])
+    finally:
+        node.destroy_node()
+        context.shutdown()
 
 
 def test_a_misspelt_parameter_is_named(ros_env: dict[str, str]) -> None:

@@ -11,12 +11,14 @@ from real_time_robot import BEAMS, FREE, TRACKING, RealTimeRobot, scan_of, stamp
 from ros_graph import Graph
 
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.lidar_extrinsics import CENTRED
+from mfba_planner.perception.pose_history import EXTRAPOLATED_NS, KEPT_NS, PoseHistory
 from mfba_planner.recording.from_messages import laser_scan
-from mfba_planner.ros.runtime.pose_history import EXTRAPOLATED_NS, KEPT_NS, PoseHistory
+from mfba_planner.recording.scan_parts import MountedScan
 from mfba_planner.ros.runtime.stale_inputs import NewestInputs
 
 TENTH = 100_000_000
-SCAN = laser_scan(scan_of(0))
+SCAN = MountedScan(laser_scan(scan_of(0)), CENTRED)
 
 
 @given(st.integers(0, 10 * TENTH), st.floats(-3.0, 3.0))

@@ -118,3 +118,59 @@ def test_messages_of_another_frame_are_ignored_while_the_wanted_ones_come() -> N
     alone = reception(["a"], wanted="front")
     assert alone.received(1, 1, "front", 0.0, 1.0)
     assert alone.received(2, 1, "rear", 0.1, 1.0), "one lidar whose frame changes"
+
+
+def merging(names: list[str]) -> Reception:
+    known = {"front", "rear"}.__contains__
+    return Reception("scan", lambda: names, "merge them", is_merged=known)
+
+
+@given(st.integers(0, 50), st.integers(0, 50), st.lists(st.booleans(), min_size=5, max_size=40))
+def test_a_publisher_for_each_merged_frame_is_no_fault(
+    front: int, rear: int, sequence: list[bool]
+) -> None:
+    topic, numbers = merging(TWO), {"front": front, "rear": rear}
+    for k, is_front in enumerate(sequence):
+        frame = "front" if is_front else "rear"
+        numbers[frame] += 1
+        topic.received(numbers[frame], 1000 + k, frame, 0.01 * k, 1.0)
+        assert topic.fault(0.01 * k) == ""
+
+
+def test_once_they_are_known_by_frame_nothing_is_dropped_or_overtaken() -> None:
+    topic = merging(TWO)
+    for k in range(1, 5):
+        for frame in ("front", "rear"):
+            topic.received(k, 10 * k, frame, 0.1 * k, 1.0)
+    before = topic.dropped
+    for k in range(5, 15):  # the clock of the rear one is late
+        assert topic.received(k, 10 * k, "front", 0.1 * k, 1.0)
+        assert topic.received(k, 10 * k - 9, "rear", 0.1 * k, 1.0)
+    assert topic.dropped == before
+    topic.received(17, 180, "front", 1.5, 1.0)
+    assert topic.dropped == before + 2
+
+
+def test_one_publisher_of_both_frames_is_no_fault_and_loses_nothing() -> None:
+    topic = merging(["relay"])
+    for k in range(1, 20):
+        assert topic.received(k, k, ("front", "rear")[k % 2], 0.1 * k, 1.0)
+    assert (topic.dropped, topic.fault(2.0)) == (0, "")
+
+
+def test_two_publishers_in_one_of_the_merged_frames_are_a_fault() -> None:
+    topic = merging(["a", "b", "c"])
+    now_s = 0.0
+    for k in range(1, 6):
+        for frame, number in (("front", k), ("rear", k), ("rear", 1000 + k)):
+            now_s += 0.01
+            topic.received(number, k, frame, now_s, 1.0)
+    assert topic.fault(now_s) == ("scan has 3 publishers that send in turn (a, b, c); merge them")
+
+
+def test_a_frame_that_is_not_merged_is_a_fault_beside_those_that_are() -> None:
+    topic = merging(TWO)
+    for k, frame in enumerate(("front", "rear", "front", "arm"), start=1):
+        assert topic.fault(0.0) == ""
+        topic.received(k, k, frame, 0.0, 1.0)
+    assert topic.fault(0.0) == "scan changes its frame from 'front' to 'arm'; merge them"

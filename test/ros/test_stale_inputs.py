@@ -8,16 +8,21 @@ import pytest
 
 from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.lidar_extrinsics import CENTRED
 from mfba_planner.core.planner_types import Scan
+from mfba_planner.recording.scan_parts import MountedScan
 from mfba_planner.ros.runtime.lockstep_inputs import Inputs, LockstepInputs
 from mfba_planner.ros.runtime.stale_inputs import NewestInputs
 
 POSE, OTHER_POSE = Pose2D(1.0, 2.0), Pose2D(3.0, 4.0)
 FREE = (math.inf,) * 12
 SCAN, NEXT_SCAN = (
-    Scan(
-        ranges_m=np.full(3, range_m), angle_min_rad=0.0, angle_increment_rad=1.0,
-        range_min_m=0.1, range_max_m=9.0,
+    MountedScan(
+        Scan(
+            ranges_m=np.full(3, range_m), angle_min_rad=0.0, angle_increment_rad=1.0,
+            range_min_m=0.1, range_max_m=9.0,
+        ),
+        CENTRED,
     )
     for range_m in (1.0, 2.0)
 )  # fmt: skip

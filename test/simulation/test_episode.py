@@ -316,6 +316,7 @@ def test_lengths_do_not_depend_on_how_python_sums() -> None:
 # --- both case studies ------------------------------------------------------------------------
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("algorithm", Algorithm)
 @pytest.mark.parametrize(
     ("name", "shortest", "longest", "median", "first"),

@@ -325,6 +325,7 @@ def test_invalid_fleets_are_refused(make_it: Any, what: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.no_cover
 def test_sim_prints_a_row_per_robot_or_per_seed(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["sim", "swap"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -206,7 +206,8 @@ def robot(name: str, goal_x: float, at_deg: int, yaw: float = 0.0) -> list[Recor
 def test_two_robots_in_namespaces_are_not_mixed(tmp_path: Path) -> None:
     both = [*robot("left", 5.0, 90), *robot("right", -5.0, 0, yaw=math.pi)]
     assert refusal(tmp_path, both) == (
-        "2 topics of sensor_msgs/msg/LaserScan, /left/scan, /right/scan; name one with --scan"
+        "2 topics of sensor_msgs/msg/LaserScan, /left/scan, /right/scan; name one with --scan, "
+        "or the lidars of one robot, separated by commas"
     )
     for name, own in (("left", both[: len(both) // 2]), ("right", both[len(both) // 2 :])):
         (tmp_path / name).mkdir()

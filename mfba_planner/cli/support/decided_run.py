@@ -66,8 +66,8 @@ class DecidedRun:
         goals = [goal for _, goal in decider.goals]
         more = f" and {len(goals) - 1} more" if goals[1:] else ""
         print(
-            f"recording: scan {decider.scan}, odometry {decider.odom} in {decider.frame!r}, "
-            f"goal ({goals[0][0]:g}, {goals[0][1]:g}){more}"
+            f"recording: scan {', '.join(decider.scans)}, odometry {decider.odometry} in "
+            f"{decider.frame!r}, goal ({goals[0][0]:g}, {goals[0][1]:g}){more}"
         )
         print(
             f"robot:     radius {planner.robot_radius_m:g} m, {planner.drive.value}, "
@@ -81,7 +81,7 @@ class DecidedRun:
             self._bag = _new_bag(self._out / "bag", self._params, self._decider)
         try:
             if self._bag is not None:
-                self._bag.copy(self._reader, self._decider.scan, self._decider.odom)
+                self._bag.copy(self._reader, self._decider.scans, self._decider.odom)
             for step in self._decider.decide():
                 self._add(step)
             if self._bag is not None:
@@ -101,11 +101,6 @@ class DecidedRun:
         print(f"decided: {count} decisions, digest {self._digest.hexdigest()}")
         if self._out is None or self._metrics is None or self._last is None:
             return
-        if not self._decider.has_same_extrinsics:
-            print(
-                "note: the scans are of lidars with several extrinsics, and parameters hold one: "
-                "`mfba verify` of this run will find other decisions"
-            )
         episode = self._setup().episode(tuple(self._ticks.items))
         names, errors = ["bag"], PostponedErrors()
         with errors.postponed():
@@ -127,7 +122,7 @@ class DecidedRun:
             return
         self._ticks.add(decision)
         self._perceived.add(self._perceive(step) if self._perceived.takes_next else None)
-        self._bag.add(decision, step.log_time_ns, decider.goal_id, decider.local_map)
+        self._bag.add(decision, step.log_time_ns, decider.goal_id, decider.local_map, step.fields)
 
     def _perceive(self, step: DecidedScan) -> Perceived | None:
         if step.scan is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,11 @@ def add_to(group: Any) -> None:
         choices=[member.value for member in NoReturn],
         help="range by which the lidar reports that nothing is there (default: inf, as REP-117)",
     )
-    group.add_argument("--scan", metavar="TOPIC", help="scan topic, if there are several")
+    group.add_argument(
+        "--scan",
+        metavar="TOPIC",
+        help="scan topic, if there are several; of several lidars all, separated by commas",
+    )
     group.add_argument("--odom", metavar="TOPIC", help="odometry topic, if there are several")
 
 
@@ -78,10 +83,23 @@ def add_params_file(group: Any) -> None:
 
 
 def given_parameters(parsed: argparse.Namespace) -> Parameters:
-    """The parameters of --params-file, none without it. Raises ConfigError."""
+    """The parameters of --params-file, none without it. Raises ConfigError.
+
+    As the nodes do, it warns of names that no node has: a file may be for other nodes too.
+    """
     if parsed.params_file is None:
         return {}
-    return read_params_file(parsed.params_file, NODES)
+    from ...ros.node_help import parameter_names  # a bag of mfba does not need it
+
+    found = read_params_file(parsed.params_file, NODES)
+    known = {name for node in NODES for name in parameter_names(node)}
+    for name in sorted({name for values in found.values() for name in values} - known):
+        print(
+            f"note: --params-file {parsed.params_file}: {name}: no such parameter of "
+            f"{' or '.join(NODES)}; `{PLANNER} --help` and `{SENSOR} --help` list them",
+            file=sys.stderr,
+        )
+    return found
 
 
 def with_parameters(

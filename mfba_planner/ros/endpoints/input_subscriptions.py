@@ -6,24 +6,24 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from ...core.errors import InputError
-from ...core.lidar_extrinsics import CENTRED
-from ...core.planner_types import Observation, Scan
-from ...perception.near_returns import blind_ring
+from ...core.geometry import Pose2D
+from ...core.planner_types import Observation, RefusalReason
 from ...perception.scan_to_sectors import aligned
 from ...planning.planner_params import PerceptionInput, PlannerParams
 from ...recording.from_messages import (
-    extrinsics_fields,
     laser_scan,
     robot_pose,
     scan_fields,
     sector_ranges,
     stamp_ns,
 )
+from ...recording.scan_parts import LidarMerging, MountedScan
 from ..interface import topics
 from ..node_settings import PlannerSettings
 from ..runtime.base_node import GraphNode
@@ -33,6 +33,7 @@ from ..runtime.refused_inputs import RefusedInputs
 from ..runtime.stale_inputs import NewestInputs
 from ..runtime.stamp_pairing import StampPairs
 from .known_map_subscription import KnownMapSubscription
+from .odometry_source import OdometrySource
 from .planner_diagnostics import PlannerDiagnostics
 from .scan_extrinsics import ScanExtrinsics
 from .transform_subscription import TransformSubscription
@@ -68,7 +69,14 @@ class InputSubscriptions:
             node, settings.odom_frame, refused_inputs, diagnostics, self._deliver_held
         )
         self._transforms, self.extrinsics = transforms, ScanExtrinsics(settings, transforms)
-        self._extrinsics = CENTRED  # of the newest scan
+        self.odometry = OdometrySource(node, settings, transforms, monitor, self._on_odom)
+        self._lidars = LidarMerging(
+            self.extrinsics.of,
+            self.extrinsics.name,
+            lambda message: laser_scan(message, settings.scan_frame, settings.scan_no_return),
+            lambda: self._params.robot_radius_m,
+            settings.scan_frame,
+        )
         self.range_max_m = 0.0  # of the newest sectors
         self.fields: dict[str, str] = {}  # of planner/decision: see scan_fields
         self.reset()
@@ -82,6 +90,7 @@ class InputSubscriptions:
         limit = None if lockstep else PAIRED
         self._held: deque[Inputs] = deque(maxlen=MOST_HELD)  # lockstep: until there is a map
         self._scan_pairs: StampPairs[Any, Any] = StampPairs(repeat=True, limit=limit)
+        self._lidars.reset()
         self._monitor.reset()
 
     def subscribe(self) -> None:
@@ -93,7 +102,7 @@ class InputSubscriptions:
         self._is_subscribed, self._is_subscribed_to_scan = True, False
         self.set_params(self._params)
         frame = self._settings.odom_frame
-        self._monitor.subscribe(topics.ODOM, self._on_odom, frame=frame)
+        self.odometry.subscribe()
         self._monitor.subscribe(topics.SECTORS, self._on_sectors, frame=frame)
 
     def text(self, params: PlannerParams) -> str:
@@ -103,7 +112,7 @@ class InputSubscriptions:
             by, lidar = f"perception {params.perception.value}", f"; {self.extrinsics.text}"
         return (
             f"decides: {params.label}, {by}, {params.drive.value}, robot radius "
-            f"{params.robot_radius_m:g} m, {params.speed_mps:g} m/s{lidar}"
+            f"{params.robot_radius_m:g} m, {params.speed_mps:g} m/s{lidar}{self.odometry.text}"
         )
 
     def set_params(self, params: PlannerParams) -> None:
@@ -115,7 +124,13 @@ class InputSubscriptions:
             frame = self._settings.scan_frame
             if self.extrinsics.reads_tf:
                 self._transforms.subscribe()
-            self._monitor.subscribe(topics.SCAN, self._on_scan, depth=PAIRED, frame=frame)
+            self._monitor.subscribe(
+                topics.SCAN,
+                self._on_scan,
+                depth=PAIRED,
+                frame=frame,
+                is_merged=self.extrinsics.is_known,
+            )
             self._is_subscribed_to_scan = True
 
     def unsubscribed(self) -> None:
@@ -143,10 +158,10 @@ class InputSubscriptions:
         if inputs.sensed:
             self.fields = scan_fields(inputs.pose_stamp_ns, pose)
         if self.extrinsics.reads_tf:
-            self.fields |= extrinsics_fields(self._extrinsics)
+            self.fields |= inputs.scan.fields
         return replace(
             observation,
-            scan=aligned(inputs.scan, pose.yaw, self._extrinsics),
+            scan=aligned(inputs.scan.scan, pose.yaw, inputs.scan.extrinsics),
             sensed=inputs.sensed,
             pose_stamp_ns=inputs.pose_stamp_ns,
         )
@@ -155,7 +170,13 @@ class InputSubscriptions:
         self.extrinsics.robot_is(message.child_frame_id)
         fault = self._check("odom", message)
         if fault is not None:
-            self._receive("odom", message, robot_pose, self._pairs.add_odom, fault)
+            self._receive("odom", message, robot_pose, self._add_odom, fault)
+
+    def _add_odom(self, stamp: int, pose: Pose2D | RefusalReason, now_s: float) -> Inputs | None:
+        inputs = self._pairs.add_odom(stamp, pose, now_s)
+        if not isinstance(pose, str):
+            self._lidars.poses.add(stamp, pose)
+        return inputs
 
     def _on_sectors(self, message: Any) -> None:
         fault = self._check("sectors", message)
@@ -179,7 +200,14 @@ class InputSubscriptions:
         fault = self._check("scan", message)
         if fault is not None:
             self._diagnostics.set_fault("scan", fault)
+            if not fault:
+                self._keep_scan(message)
             self._pair_scan(message, fault, self._scan_pairs.add_b)
+
+    def _keep_scan(self, message: Any) -> None:
+        """Keep a scan for sectors by another lidar's, unless it is refused when it is paired."""
+        with suppress(InputError):
+            self._lidars.add(message, self._monitor.timeout_s)
 
     def _check(self, name: str, message: Any) -> str | None:
         """Why a message is refused, "" if it is not; None: it must not even be paired."""
@@ -201,22 +229,21 @@ class InputSubscriptions:
             return
         if pair is not None:
             (sectors, fault), (scan, scan_fault) = pair
-            converted, conversion_fault = self._convert(
-                "scan", scan, self._mounted_scan, self._settings.scan_frame
-            )
+            mounted, conversion_fault = self._convert("scan", scan, self._mounted_scan, "")
             if not conversion_fault:
-                in_base = aligned(converted, 0.0, self._extrinsics)
-                self._monitor.scan_note = blind_ring(in_base, self._params.robot_radius_m)
+                self._monitor.scan_note = self._lidars.note
             fault = fault or scan_fault or conversion_fault
-            self._receive_sectors(sectors, fault, None if fault else converted)
+            self._receive_sectors(sectors, fault, None if fault else mounted)
 
-    def _mounted_scan(self, message: Any, frame: str) -> Scan:
-        """The scan, once it is known where its lidar is mounted."""
-        scan = laser_scan(message, frame, self._settings.scan_no_return)
-        self._extrinsics = self.extrinsics.of(message.header.frame_id)
-        return scan
+    def _mounted_scan(self, message: Any, _frame: str) -> MountedScan:
+        """The scan, merged with those of other lidars that are not newer."""
+        stamp, lidars = stamp_ns(message.header.stamp), self._lidars
+        mounted = lidars.alone(message)  # it may be refused
+        if not lidars.sets.are_several:
+            return mounted
+        return lidars.at(stamp, self._monitor.timeout_s)
 
-    def _receive_sectors(self, message: Any, fault: str, scan: Scan | None = None) -> None:
+    def _receive_sectors(self, message: Any, fault: str, scan: MountedScan | None = None) -> None:
         self.range_max_m = message.range_max
         add = partial(self._pairs.add_sectors, scan=scan)
         self._receive("sectors", message, sector_ranges, add, fault)

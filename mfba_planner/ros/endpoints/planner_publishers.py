@@ -12,6 +12,7 @@ from ...core.planner_types import Decision, Mode
 from ...planning.odometry_jump import is_odometry_jump
 from ...planning.supervised_planner import SupervisedPlanner
 from ..interface import markers, to_messages, topics
+from ..interface.tick_serializers import CommandSerializer, GoalStepSerializer, PlanSerializer
 from ..node_settings import PlannerSettings
 from ..runtime.base_node import GraphNode
 from .local_map_publisher import LocalMapPublisher
@@ -30,6 +31,9 @@ class PlannerPublishers:
         self._settings, self._path_planner = settings, path_planner
         self._log = node.get_logger()
         self._node_name = node.get_fully_qualified_name()
+        self._serialized_goal_step = GoalStepSerializer(settings.odom_frame)
+        self._serialized_command = CommandSerializer()
+        self._serialized_plan = PlanSerializer(settings.odom_frame)
         self._goal_step = node.advertise(topics.GOAL_STEP)
         self._plan = node.advertise(topics.PLAN)
         self._decision = node.advertise(topics.DECISION)
@@ -51,7 +55,7 @@ class PlannerPublishers:
         if decision.mode is Mode.STOPPED or is_odometry_jump(decision.reason):
             self._log.warning(decision.reason, throttle_duration_sec=1.0)
         frame = self._settings.odom_frame
-        self._plan.publish(to_messages.plan_msg(decision, frame))
+        self._plan.publish(self._serialized_plan(decision))
         self._decision.publish(
             to_messages.decision_msg(
                 decision, self._path_planner().params.label, refused, self._node_name, goal_fields
@@ -64,19 +68,17 @@ class PlannerPublishers:
     def publish_command(self, decision: Decision) -> None:
         """Publish goal_step, then cmd_vel: the stamp of goal_step is also that of cmd_vel."""
         s, stamp, params = self._settings, decision.stamp_ns, self._path_planner().params
-        self._goal_step.publish(
-            to_messages.pose_stamped_msg(decision.waypoint, stamp, s.odom_frame)
-        )
+        self._goal_step.publish(self._serialized_goal_step(decision.waypoint, stamp))
         if s.enable_stamped_cmd_vel:
             twist = to_messages.twist_stamped_msg(decision, s.base_frame, params, params.tick_ns)
             self._cmd_vel.publish(twist)
         else:
-            self._cmd_vel.publish(to_messages.twist_msg(decision, params, params.tick_ns))
+            self._cmd_vel.publish(self._serialized_command(decision, params, params.tick_ns))
 
     def publish_stop(self, position: Point, stamp_ns: int) -> None:
         """Command rest at this position, without a decision."""
         s = self._settings
-        self._goal_step.publish(to_messages.pose_stamped_msg(position, stamp_ns, s.odom_frame))
+        self._goal_step.publish(self._serialized_goal_step(position, stamp_ns))
         if s.enable_stamped_cmd_vel:
             rest = TwistStamped()
             to_messages.set_header(rest.header, stamp_ns, s.base_frame)

@@ -11,9 +11,9 @@ from ...core.lidar_extrinsics import CENTRED, PARAMETERS, LidarExtrinsics
 from ...recording.planar_poses import lidar_extrinsics
 from ..interface import topics
 from ..node_settings import ExtrinsicsSource, PlannerSettings, VirtualSensorSettings
-from .transform_subscription import TransformSubscription
+from ..runtime.input_monitor import SEVERAL_REMEDY
+from .transform_subscription import DISCOVERY_S, TransformSubscription
 
-_DISCOVERY_S = 2.0  # until all publishers are known
 _REMEDY = f"publish it, or set {', '.join(PARAMETERS)}"
 
 
@@ -30,8 +30,9 @@ class ScanExtrinsics:
         self._transforms = transforms
         self._base_frame = self.base = settings.base_frame
         self._found: dict[str, LidarExtrinsics] = {}
+        self._frame, self._is_lockstep = "", settings.lockstep
         # In lockstep all publishers have been discovered before the first tick.
-        self._discovered_s = -math.inf if settings.lockstep else time.monotonic() + _DISCOVERY_S
+        self._discovered_s = -math.inf if settings.lockstep else time.monotonic() + DISCOVERY_S
         source = settings.scan_extrinsics
         self.is_required = source is ExtrinsicsSource.TF
         self.reads_tf = bool(topics.TRANSFORMS) and (
@@ -50,19 +51,49 @@ class ScanExtrinsics:
             self.base = base
             self._found.clear()
 
+    def is_known(self, frame: str) -> bool:
+        """Whether tf gives where the lidar with this frame is."""
+        if not (self.reads_tf and frame):
+            return False
+        try:
+            self._find(frame)
+        except FrameError:
+            return False
+        return True
+
+    def name(self, frame: str) -> str:
+        """The lidar's name: its frame where tf gives it, else "", that of any single lidar.
+
+        Raises FrameError as of().
+        """
+        self.of(frame)
+        return frame if self.is_known(frame) else ""
+
     def of(self, frame: str) -> LidarExtrinsics:
         """The extrinsics of the lidar with this frame; FrameError while they are not known."""
         if not self.reads_tf:
+            self._require_one(frame)
             return self._given
+        try:
+            return self._find(frame)
+        except FrameError as error:
+            if not self._found and self._is_without_tf():
+                self._require_one(frame)
+                return self._given
+            raise FrameError(f"scan: {error}; {_REMEDY}") from None
+
+    def _find(self, frame: str) -> LidarExtrinsics:
         if frame not in self._found:
-            try:
-                found = lidar_extrinsics(self._transforms.tree, frame, self.base)
-            except FrameError as error:
-                if self._is_without_tf():
-                    return self._given
-                raise FrameError(f"scan: {error}; {_REMEDY}") from None
-            self._found[frame] = found
+            self._found[frame] = lidar_extrinsics(self._transforms.tree, frame, self.base)
         return self._found[frame]
+
+    def _require_one(self, frame: str) -> None:
+        """In lockstep, where frames are not watched as in real time, refuse a second lidar."""
+        self._frame = self._frame or frame
+        if self._is_lockstep and frame != self._frame:
+            raise FrameError(
+                f"scan changes its frame from {self._frame!r} to {frame!r}; {SEVERAL_REMEDY}"
+            )
 
     def _is_without_tf(self) -> bool:
         """Whether no tf is to be expected: nothing publishes any."""

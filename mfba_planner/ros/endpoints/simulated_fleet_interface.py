@@ -10,7 +10,8 @@ from ...simulation.episode import Outcome
 from ...simulation.fleet import Fleet
 from ...simulation.scenario import Scenario
 from ...simulation.world import World
-from ..interface import to_messages, topics
+from ..interface import topics
+from ..interface.tick_serializers import ClockSerializer
 from ..node_settings import WorldSimSettings
 from ..runtime.base_node import GraphNode
 from ..runtime.refused_inputs import RefusedInputs
@@ -53,6 +54,7 @@ class FleetInterface:
         """Advertise and subscribe for all robots; reset() must be called first."""
         self._settings, self._scenario = settings, scenario
         self._clock = node.advertise(topics.CLOCK)
+        self._serialized_clock = ClockSerializer()
         self.robots = [
             RobotInterface(node, settings, name, scenario, refused_inputs, on_cmd_vel)
             for name in scenario.robot_names or ("",)
@@ -92,7 +94,7 @@ class FleetInterface:
 
     def repeat_tick(self, stamp_ns: int) -> None:
         """Publish the present tick of the robots whose command is missing."""
-        self._clock.publish(to_messages.clock_msg(stamp_ns))
+        self._clock.publish(self._serialized_clock(stamp_ns))
         # In real time robots that have arrived too: their planners would call their inputs stale.
         for robot in self._active.values() if self._settings.lockstep else self.robots:
             if not robot.has_command:

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from ...recording.transform_tree import TransformTree
 from ..interface import topics
 from ..runtime.base_node import GraphNode
+
+DISCOVERY_S = 2.0  # until all publishers are known
 
 
 class TransformSubscription:
@@ -18,6 +21,7 @@ class TransformSubscription:
         self._node, self._is_subscribed = node, False
         self.tree = TransformTree()
         self.on_new: Callable[[], None] = lambda: None  # called after each message
+        self.on_moving: Callable[[Any], None] = lambda _: None  # called with each of /tf
 
     @property
     def is_published(self) -> bool:
@@ -30,12 +34,16 @@ class TransformSubscription:
         if self._is_subscribed:
             return
         self._is_subscribed = True
-        for topic in topics.TRANSFORMS:
-            self._node.subscribe(topic, self._take)
+        for topic, take in zip(topics.TRANSFORMS, (self._take_moving, self._take)):
+            self._node.subscribe(topic, take)
 
-    def _take(self, message: object) -> None:
+    def _take(self, message: Any) -> None:
         self.tree.add(message)
         self.on_new()
+
+    def _take_moving(self, message: Any) -> None:
+        self._take(message)
+        self.on_moving(message)
 
     def unsubscribed(self) -> None:
         """The node has destroyed all subscriptions."""

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import replace
 
 from ...core.geometry import Point, towards
@@ -12,11 +11,10 @@ from ...simulation.scenario import Scenario
 from ...simulation.scenario_map import scenario_grid
 from ...simulation.world import World
 from ..interface import markers, to_messages, topics
+from ..interface.tick_serializers import ObstaclesSerializer, OdometrySerializer
 from ..node_settings import WorldSimSettings
 from ..runtime.base_node import GraphNode
 from .robot_namespace import NamespacedNode
-
-TRAIL_POINTS = 500  # one per view period; of a longer trail the newest is shown
 
 
 class WorldPublishers:
@@ -28,6 +26,8 @@ class WorldPublishers:
         """Advertise all topics. Raises ConfigError where publish_map needs too large a map."""
         robot = scenario.robot
         self._frame, self._base_frame = settings.odom_frame, settings.base_frame
+        self._serialized_odom = OdometrySerializer(self._frame, self._base_frame)
+        self._serialized_obstacles = ObstaclesSerializer(self._frame)
         self._odom = node.advertise(topics.ODOM)
         noisy = robot.noise.affects_odometry
         self._truth = node.advertise(topics.GROUND_TRUTH) if noisy else None
@@ -51,7 +51,7 @@ class WorldPublishers:
                 self._tf_static.publish(
                     markers.lidar_tf_msg(robot.lidar, self._base_frame, self._scan_frame)
                 )
-        self._positions: deque[Point] = deque(maxlen=TRAIL_POINTS)
+        self._positions = markers.Trail(self._frame)
         self._view = markers.RateLimit(settings.view_period_s)
 
     @property
@@ -75,29 +75,23 @@ class WorldPublishers:
     def publish_tick(self, world: World, velocity: Point, stamp_ns: int) -> None:
         """Publish one tick: the sensor's inputs first, odom last of them; then views."""
         frame, reading = self._frame, world.read()
-        centers = world.centers()
         turn = 0.0
         if world.scenario.robot.turns:
             velocity, turn = (
                 towards((0.0, 0.0), reading.pose.yaw, world.speeds.v),
                 world.speeds.omega,
             )
-        odom = to_messages.odometry_msg(
-            reading.pose, velocity, stamp_ns, frame, self._base_frame, turn
-        )
-        self._obstacles.publish(to_messages.obstacles_msg(centers, stamp_ns, frame))
+        self._obstacles.publish(self._serialized_obstacles(world.centers(), stamp_ns))
         if self._tf:
+            odom = to_messages.odometry_msg(
+                reading.pose, velocity, stamp_ns, frame, self._base_frame, turn
+            )
             self._tf.publish(markers.tf_msg(odom))
         if self._truth:
-            self._truth.publish(
-                to_messages.odometry_msg(
-                    world.pose, velocity, stamp_ns, frame, self._base_frame, turn
-                )
-            )
+            self._truth.publish(self._serialized_odom(world.pose, velocity, stamp_ns, turn))
         if self._scan and reading.scan:
             self._scan.publish(to_messages.scan_msg(reading.scan, stamp_ns, self._scan_frame))
-        self._odom.publish(odom)
+        self._odom.publish(self._serialized_odom(reading.pose, velocity, stamp_ns, turn))
         if self._view.due(stamp_ns):
-            self._positions.append(world.pose.position)
-            self._trail.publish(to_messages.path_msg(list(self._positions), stamp_ns, frame))
+            self._trail.publish(self._positions.add(world.pose.position, stamp_ns))
             self._markers.publish(markers.world_markers(world, stamp_ns, frame))

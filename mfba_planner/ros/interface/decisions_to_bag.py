@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,18 +41,25 @@ class DecisionBag:
         for topic in _TOPICS:
             self._writer.add_topic(_name(topic), type_name(topic.type), offered(topic.qos))
 
-    def copy(self, reader: BagReader, scan: str, odom: str) -> None:
-        """Copy the messages of two topics, as `scan` and `odom`."""
-        names = {scan: _name(topics.SCAN), odom: _name(topics.ODOM)}
+    def copy(self, reader: BagReader, scans: Sequence[str], odom: str) -> None:
+        """Copy the messages of some topics, as `scan` and `odom`; odom may be ""."""
+        names = dict.fromkeys(scans, _name(topics.SCAN))
+        if odom:
+            names[odom] = _name(topics.ODOM)
         for message in reader.messages(names):
             self._writer.write(
                 names[message.topic], message.data, message.log_time_ns, message.publish_time_ns
             )
 
     def add(
-        self, decision: Decision, log_time_ns: int, goal_id: int, local_map: StaticMap | None
+        self,
+        decision: Decision,
+        log_time_ns: int,
+        goal_id: int,
+        local_map: StaticMap | None,
+        fields: Mapping[str, str],
     ) -> None:
-        """Write the messages of sensor and planner of one decision."""
+        """Write the messages of sensor and planner of one decision; fields are keys more."""
         stamp, planner = decision.stamp_ns, self._planner
         if goal_id != self._goal_id and decision.goal is not None:
             goal = to_messages.pose_stamped_msg(decision.goal, stamp, self._frame)
@@ -71,8 +78,9 @@ class DecisionBag:
         twist = to_messages.twist_msg(decision, planner, planner.tick_ns)
         self._write(topics.CMD_VEL, twist, log_time_ns)
         self._write(topics.PLAN, to_messages.plan_msg(decision, self._frame), log_time_ns)
+        fields = {"goal_id": str(goal_id), **fields}
         message = to_messages.decision_msg(
-            decision, planner.label, 0, f"/{topics.PLANNER}", {"goal_id": str(goal_id)}
+            decision, planner.label, 0, f"/{topics.PLANNER}", fields
         )
         self._write(topics.DECISION, message, log_time_ns)
         self._write_map(local_map, stamp, log_time_ns)

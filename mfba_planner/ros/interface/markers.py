@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 from geometry_msgs.msg import Point as PointMsg
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
-from nav_msgs.msg import Odometry
+from geometry_msgs.msg import PoseStamped, Quaternion, Transform, TransformStamped, Vector3
+from nav_msgs.msg import Odometry, Path
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -17,7 +19,7 @@ from ...core.geometry import Point, bearing, quaternion_from_yaw, towards
 from ...core.planner_types import NANO, Decision, Mode, Ranges
 from ...simulation.robot_model import Lidar
 from ...simulation.world import World
-from .to_messages import pose_msg, set_header
+from .to_messages import pose_msg, set_header, set_pose
 
 Rgba = tuple[float, float, float, float]
 
@@ -39,6 +41,7 @@ MODE_COLORS = {
     Mode.STOPPED: VERMILION,
     Mode.ARRIVED: GREEN,
 }
+TRAIL_POINTS = 500  # one per view period; of a longer trail the newest is shown
 ARROW_S = 2.0  # a velocity arrow ends where the obstacle will be after this time
 
 
@@ -57,6 +60,30 @@ class RateLimit:
             return False
         self._last_ns = stamp_ns
         return True
+
+
+class Trail:
+    """The newest positions as a Path; all its poses have the header of the newest."""
+
+    def __init__(self, frame_id: str) -> None:
+        """Start without a position."""
+        self._path = Path()
+        self._path.header.frame_id = frame_id
+        self._poses: deque[PoseStamped] = deque(maxlen=TRAIL_POINTS)
+
+    def clear(self) -> None:
+        """Forget all positions."""
+        self._poses.clear()
+
+    def add(self, position: Point, stamp_ns: int) -> Path:
+        """Add a position; the message is the same object every time."""
+        header = set_header(self._path.header, stamp_ns, self._path.header.frame_id)
+        pose = PoseStamped()
+        pose.header = header  # shared, and so of the newest stamp
+        set_pose(pose.pose, *position)
+        self._poses.append(pose)
+        self._path.poses = list(self._poses)
+        return self._path
 
 
 def world_markers(world: World, stamp_ns: int, frame_id: str) -> MarkerArray:
@@ -169,12 +196,23 @@ def _array(marks: list[Marker], stamp_ns: int, frame_id: str) -> MarkerArray:
     return MarkerArray(markers=marks)
 
 
+def _marker(**fields: Any) -> Marker:
+    """A Marker; what is not given is shared with all others, and never changed."""
+    mark = copy(_BLANK)
+    for name, value in fields.items():
+        setattr(mark, name, value)
+    return mark
+
+
+_BLANK = Marker()  # copied, as constructing one takes four times as long
+
+
 def _deleted(namespace: str, number: int) -> Marker:
-    return Marker(ns=namespace, id=number, action=Marker.DELETE)
+    return _marker(ns=namespace, id=number, action=Marker.DELETE)
 
 
 def _disc(namespace: str, number: int, center: Point, radius: float, rgba: Rgba) -> Marker:
-    return Marker(
+    return _marker(
         ns=namespace,
         id=number,
         type=Marker.CYLINDER,
@@ -215,7 +253,7 @@ def _text(namespace: str, position: Point, text: str, rgba: Rgba) -> Marker:
 
 def _points(namespace: str, number: int, points: Sequence[Point], rgba: Rgba) -> Marker:
     """A list of points; an empty one is deleted, as viewers report it as an error."""
-    return Marker(
+    return _marker(
         ns=namespace,
         id=number,
         type=Marker.POINTS,

@@ -25,5 +25,10 @@ def has_header(message_type: Any) -> bool:
 
 def header_stamp_ns(data: bytes) -> int:
     """Stamp (ns) of a message whose first field is a Header, from its CDR bytes."""
+    return clock_ns(data)  # a Header begins with its stamp
+
+
+def clock_ns(data: bytes) -> int:
+    """Time (ns) of a rosgraph_msgs/Clock, from its CDR bytes."""
     sec, nanosec = _STAMP[data[1] & 1].unpack_from(data, _ENCAPSULATION_BYTES)
     return int(sec) * SECOND_NS + int(nanosec)

@@ -150,14 +150,19 @@ def path_msg(points: Sequence[Point], stamp_ns: int, frame_id: str) -> Path:
     return message
 
 
-def plan_msg(decision: Decision, frame_id: str) -> Path:
+def plan_points(decision: Decision) -> list[Point]:
     """Polyline from the pose over the goal step to the goal."""
     points = [decision.pose.position]
     if decision.waypoint != points[-1]:
         points.append(decision.waypoint)
     if decision.goal is not None and decision.goal != points[-1]:
         points.append(decision.goal)
-    return path_msg(points, decision.stamp_ns, frame_id)
+    return points
+
+
+def plan_msg(decision: Decision, frame_id: str) -> Path:
+    """plan_points() as a message."""
+    return path_msg(plan_points(decision), decision.stamp_ns, frame_id)
 
 
 def occupancy_grid_msg(grid: occupancy_grid.OccupancyGrid, frame_id: str) -> OccupancyGrid:

@@ -11,20 +11,17 @@ from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 from rclpy.executors import Executor
-from rclpy.serialization import deserialize_message
-from rosgraph_msgs.msg import Clock as ClockMsg
 
 from ...core.errors import ConfigError
 from ...core.output_files import new_run_directory
 from ...recording.bag_qos import OfferedQos
 from ...recording.bag_writer import BagWriter
 from ...recording.configuration_attachment import attach_configuration
-from ...recording.from_messages import stamp_ns
 from ...recording.message_definitions import definition_of
 from ..endpoints.robot_namespace import graph_topics
 from ..interface import parameters, topics
 from ..interface.qos_conversion import offered
-from ..interface.serialized_message import has_header, header_stamp_ns, type_name
+from ..interface.serialized_message import clock_ns, has_header, header_stamp_ns, type_name
 from ..node_settings import RecorderSettings, names
 from ..runtime.base_node import GraphNode
 from ..runtime.drain_subscriptions import drain
@@ -75,7 +72,7 @@ class Recorder(GraphNode):
 
     def _on_clock(self, message: SerializedMessage) -> None:
         self._previous_tick_ns = self._log_time_ns
-        self._log_time_ns = stamp_ns(deserialize_message(message.data, ClockMsg).clock)
+        self._log_time_ns = clock_ns(message.data)
         for name, data in [*self._held, ("/clock", message.data)]:
             self._write(name, data, self._log_time_ns)
         self._held.clear()

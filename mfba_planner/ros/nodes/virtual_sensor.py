@@ -9,15 +9,14 @@ from typing import Any
 from ...core.errors import InputError
 from ...core.geometry import Pose2D
 from ...core.planner_types import Ranges
-from ...core.segments import Segments
-from ...perception.sense_segments import sense_circles_and_segments
-from ...perception.sensory_vector import SensorParams, enlarged_radii, sensory_vector
-from ...recording.from_messages import obstacle_centers, robot_pose, stamp_ns
-from ...scenarios.scenario_json import parse_segments
-from ..endpoints.scan_sensing import ScanSensing
+from ...perception.sensory_vector import SensorParams, sensory_vector
+from ...recording.from_messages import robot_pose, stamp_ns
+from ..endpoints.obstacle_sensing import ObstacleSensing
+from ..endpoints.odometry_source import OdometrySource
+from ..endpoints.scan_sensing import KEPT_POSES, ScanSensing
 from ..endpoints.sensor_diagnostics import SensorDiagnostics
 from ..interface import parameters, topics
-from ..interface.to_messages import sectors_msg, sensory_vector_msg
+from ..interface.tick_serializers import SectorsSerializer, SensoryVectorSerializer
 from ..node_settings import Source, VirtualSensorSettings, names
 from ..runtime.base_node import GraphNode
 from ..runtime.input_monitor import NEWEST, PAIRED, InputMonitor, InputVerdict
@@ -29,7 +28,7 @@ from ..runtime.stamp_pairing import StampPairs
 class VirtualSensor(GraphNode):
     """The ring of virtual sensors; a refused input becomes NaN sectors, never free ones.
 
-    One tick: _on_odom, _on_source -> pair -> _on_inputs -> _perceive -> _publish.
+    One tick: _on_odom, _on_source -> pair -> _on_inputs -> _measure -> _publish.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -37,24 +36,30 @@ class VirtualSensor(GraphNode):
         super().__init__(topics.VIRTUAL_SENSOR, **kwargs)
         self.settings = s = parameters.declare(self, VirtualSensorSettings(), read_only=True)
         self.sensor = parameters.declare(self, SensorParams())
-        self.radii = parameters.declare_radii(self, [0.3])
-        self.segments = Segments.of(parse_segments(s.segments_m))
         parameters.follow(self, lambda: self.sensor, self._set_sensor)
         self._refused_inputs = RefusedInputs(self)
         self._monitor = InputMonitor(self, s, self._refused_inputs, s.input_timeout_s, self._reset)
+        self._scan_sensing = scans = ScanSensing(self, s, self._monitor)
+        obstacles = ObstacleSensing(self, s)
+        self._measure = scans.measure if s.source is Source.SCAN else obstacles.measure
         self._by_stamp = s.lockstep or s.source is Source.OBSTACLES
         self._reset()
+        self._serialized_sectors = SectorsSerializer(s.odom_frame)
+        self._serialized_vector = SensoryVectorSerializer()
         self._sectors = self.advertise(topics.SECTORS)
         self._vector = self.advertise(topics.SENSORY_VECTOR)
         self._source = topics.OBSTACLES if s.source is Source.OBSTACLES else topics.SCAN
         self._diagnostics = SensorDiagnostics(
             self, s, self._refused_inputs, self._monitor, self._source.name
         )
-        self._scan_sensing = ScanSensing(self, s, self._monitor)
         depth = PAIRED if self._by_stamp else NEWEST
-        self._monitor.subscribe(topics.ODOM, self._on_odom, depth=depth, frame=s.odom_frame)
-        self._monitor.subscribe(self._source, self._on_source, depth=depth, frame=s.scan_frame)
-        self.announce(self._scan_sensing.text(self.sensor))
+        odometry = OdometrySource(self, s, scans.transforms, self._monitor, self._on_odom)
+        odometry.subscribe(depth)
+        depth, known = max(depth, scans.depth), scans.extrinsics.is_known
+        self._monitor.subscribe(
+            self._source, self._on_source, depth=depth, frame=s.scan_frame, is_merged=known
+        )
+        self.announce(scans.text(self.sensor) + odometry.text)
         self.advertise_ready(names(s.wait_for))
 
     def _set_sensor(self, sensor: SensorParams) -> None:
@@ -62,9 +67,11 @@ class VirtualSensor(GraphNode):
 
     def _reset(self) -> None:
         # A repeated pair is measured again: a planner may have been restarted.
-        self._pairs: StampPairs[Pose2D | None, Any] = StampPairs(repeat=True)
+        kept = KEPT_POSES if self.settings.source is Source.SCAN else 0
+        self._pairs: StampPairs[Pose2D | None, Any] = StampPairs(repeat=True, kept=kept)
         self._pose: Pose2D | None = None  # None: no odom yet, or the newest was refused
         self._monitor.reset()
+        self._scan_sensing.reset()
 
     def _on_odom(self, message: Any) -> None:
         stamp, (fault, is_ordered) = stamp_ns(message.header.stamp), self._check("odom", message)
@@ -73,12 +80,14 @@ class VirtualSensor(GraphNode):
             self._pose = None if fault else robot_pose(message)
         except InputError as error:
             self._pose, fault = None, self._refuse(error, "odom")
+        if self._pose is not None:
+            self._scan_sensing.add_pose(stamp, self._pose)
         self._diagnostics.set_fault("odom", fault)
         if self._by_stamp and is_ordered:
             self._pair("odom", stamp, self._pose, self._pairs.add_a)
 
     def _on_source(self, message: Any) -> None:
-        """Obstacles or scan: converted in _perceive, where a refusal becomes NaN sectors."""
+        """Obstacles or scan: converted in _measure, where a refusal becomes NaN sectors."""
         stamp, name = stamp_ns(message.header.stamp), self._source.name
         fault, is_ordered = self._check(name, message)
         if not is_ordered:
@@ -113,31 +122,21 @@ class VirtualSensor(GraphNode):
             )
         elif not fault:
             try:
-                ranges = self._perceive(pose, message)
+                measured = self._measure(stamp, message, pose, self.sensor)
             except InputError as error:
                 fault = self._refuse(error, self._source.name)
+            else:
+                if measured is None:  # another lidar's scan is about to come
+                    return
+                stamp, ranges = measured
         self._publish(stamp, ranges)
         self._diagnostics.set_fault(self._source.name, fault)
 
-    def _perceive(self, pose: Pose2D, message: Any) -> Ranges:
-        """Convert obstacles or scan and measure; InputError where it is refused."""
-        s = self.settings
-        if s.source is Source.SCAN:
-            return self._scan_sensing.measure(message, pose.yaw, self.sensor)
-        centers = obstacle_centers(message)
-        radii = enlarged_radii(len(centers), self.radii, s.robot_radius_m)
-        circles = zip(centers, radii)
-        return sense_circles_and_segments(
-            pose.position, circles, self.segments, s.robot_radius_m, self.sensor
-        )
-
     def _publish(self, stamp: int, ranges: Ranges) -> None:
-        s = self.settings
-        self._sectors.publish(
-            sectors_msg(ranges, self.sensor, s.robot_radius_m, stamp, s.odom_frame)
-        )
+        radius_m = self.settings.robot_radius_m
+        self._sectors.publish(self._serialized_sectors(ranges, self.sensor, radius_m, stamp))
         if not math.isnan(ranges[0]):
-            self._vector.publish(sensory_vector_msg(sensory_vector(ranges)))
+            self._vector.publish(self._serialized_vector(sensory_vector(ranges)))
 
     def _refuse(self, error: InputError, source: str) -> str:
         self._refused_inputs.add(error, source)

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import inspect
 import json
+import sys
 import time
 from collections.abc import Callable, Collection
 from typing import Any
@@ -11,6 +13,7 @@ from typing import Any
 from rclpy.clock import Clock, ClockType, JumpHandle, JumpThreshold
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -19,9 +22,13 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
+from ...core.errors import ConfigError
+from ...core.ros_arguments import split_ros_args
 from ..interface import parameters
+from ..interface.tick_decoders import decoder
 from ..interface.topics import PARAMETERS, Topic, expected_readers, reading_qos, with_depth
 from .connection_check import type_mismatch
+from .given_parameters import check_given_parameters
 from .polled_subscriptions import Deliver, DuplicateFilter, PolledSubscriptions
 
 SPIN_S = 0.1  # longest time until a signal is noticed
@@ -32,14 +39,32 @@ class GraphNode(Node):
     """A node of the graph: publishers made from topics.py, and the service ~/ready."""
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Pass rclpy's keyword arguments on (context, parameter_overrides, ...)."""
-        super().__init__(name, **kwargs)
+        """Pass rclpy's keyword arguments on (context, parameter_overrides, ...).
+
+        Raises ConfigError for parameters of the command line that cannot be used.
+        """
+        try:
+            super().__init__(name, **kwargs)
+        except InvalidParameterTypeException:  # of rclpy's own parameter
+            raise ConfigError("use_sim_time: wrong type; give true or false") from None
+        if kwargs.get("context") is None:  # the program's own node
+            check_given_parameters(self, split_ros_args(sys.argv[1:])[1])
+        self._leave_qos_events()
         self.finished = False
         self._kind = name
         self._advertised: list[tuple[Topic, Publisher]] = []
         self._subscribed: list[Subscription] = []
         self._peers: set[str] = set()
         self._jump_handles: list[JumpHandle] = []
+
+    def _leave_qos_events(self) -> None:
+        """Remove the QoS events of rclpy's own topics, for which the executor would wait."""
+        endpoints: list[Any] = [*self.publishers, *self.subscriptions]
+        for endpoint in endpoints:
+            while endpoint.event_handlers:
+                handler = endpoint.event_handlers.pop()
+                self.remove_waitable(handler)
+                handler.destroy()
 
     def advertise(self, topic: Topic, message_type: Any = None) -> Publisher:
         """Create the publisher of a topic of topics.py.
@@ -86,14 +111,20 @@ class GraphNode(Node):
         """Subscribe with each QoS profile; a message that fits more than one is delivered once.
 
         With one profile, or with info, a callback of two arguments gets rclpy's MessageInfo too.
+        Messages of the types of tick_decoders.py are named tuples.
         """
         # Without rclpy's QoS events, as in advertise(); connection_check.py names what does not
         # fit, and not a publisher that fits another of the profiles.
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
-        call: Any = _without_duplicates(callback, info=info) if len(profiles) > 1 else callback
+        decode = decoder(message_type)
+        call: Any = callback if decode is None else _decoded(callback, decode)
+        if len(profiles) > 1:
+            call = _without_duplicates(call, info=info)
         for qos in profiles:
             self._subscribed.append(
-                self.create_subscription(message_type, name, call, qos, event_callbacks=events)
+                self.create_subscription(
+                    message_type, name, call, qos, event_callbacks=events, raw=decode is not None
+                )
             )
 
     def subscribe_polled(
@@ -181,11 +212,8 @@ class GraphNode(Node):
             expected = expected_readers(topic, self._peers - {self.get_name()})
             if not expected:
                 continue
-            known = self.get_subscriptions_info_by_topic(publisher.topic_name)
-            found = [info.node_name for info in known if info.node_name in expected]
-            absent = expected.difference(found)
-            if absent or publisher.get_subscription_count() < len(found):
-                return f"{topic.name} waits for {', '.join(sorted(absent or expected))}"
+            if not_reached := readers_not_reached(self, publisher, expected):
+                return f"{topic.name} waits for {', '.join(sorted(not_reached))}"
         outputs = [made.topic_name for topic, made in self._advertised if topic.readers]
         inputs = [subscription.topic_name for subscription in self._subscribed]
         mismatch = type_mismatch(self, [*outputs, *inputs])
@@ -231,6 +259,23 @@ class GraphNode(Node):
         while self._jump_handles:
             self._jump_handles.pop().unregister()
         super().destroy_node()
+
+
+def _decoded(callback: Callable[..., None], decode: Callable[[bytes], Any]) -> Any:
+    """The callback for serialized messages, with as many arguments."""
+    try:
+        inspect.signature(callback).bind(None)
+    except TypeError:
+        return lambda data, info: callback(decode(data), info)
+    return lambda data: callback(decode(data))
+
+
+def readers_not_reached(node: Node, publisher: Publisher, readers: set[str]) -> set[str]:
+    """Which of these nodes do not subscribe yet, or all if not every subscription is matched."""
+    known = node.get_subscriptions_info_by_topic(publisher.topic_name)
+    found = [info.node_name for info in known if info.node_name in readers]
+    absent = readers.difference(found)
+    return absent if absent or publisher.get_subscription_count() >= len(found) else readers
 
 
 def _without_duplicates(

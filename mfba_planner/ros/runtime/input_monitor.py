@@ -19,10 +19,10 @@ from .stamp_check import StampCheck
 NEWEST = 1  # queue of an input of which only the newest message counts
 PAIRED = 10  # queue of an input that is looked up by the stamp of another
 
-_REMEDIES = {
-    "odom": "stop or remap all but one",
-    "scan": "merge the lidars into one topic, or set scan_frame to the one to use",
-}
+SEVERAL_REMEDY = (
+    "give each lidar a frame of its own that tf knows, or set scan_frame to the one to use"
+)
+_REMEDIES = {"odom": "stop or remap all but one", "scan": SEVERAL_REMEDY}
 
 
 class InputVerdict(NamedTuple):
@@ -59,6 +59,7 @@ class InputMonitor:
         self._receptions: dict[str, Reception] = {}
         self.timeout_s = timeout_s  # how far a stamp may be off
         self.scan_note = ""  # what to warn of in the newest scan
+        self.odom_source = ""  # where odometry is from, if that is not the topic
         self.reset()
         node.on_time_set_back(on_time_set_back)
 
@@ -73,8 +74,12 @@ class InputMonitor:
         *,
         depth: int = NEWEST,
         frame: str = "",
+        is_merged: Callable[[str], bool] = lambda _: False,
     ) -> None:
-        """Subscribe to an input; frame is the one required, if any; depth is that in real time."""
+        """Subscribe to an input; frame is the one required, if any; depth is that in real time.
+
+        is_merged(frame): whether messages of this frame may come beside those of others.
+        """
         name = topic.name
         if self._lockstep:
             # Foreign writers send scans, but no odometry that a lockstep world would not.
@@ -85,6 +90,7 @@ class InputMonitor:
             lambda: [p.node_name for p in self._node.get_publishers_info_by_topic(name)],
             _REMEDIES.get(name, "stop all but one"),
             frame,
+            is_merged,
         )
 
         def deliver(message: Any, info: Mapping[str, Any]) -> None:
@@ -105,7 +111,8 @@ class InputMonitor:
             name, stamp, clock_ns, now_s, self.timeout_s
         )
         error: InputError = StampError(fault)
-        if not fault and (fault := self._receptions[name].fault(now_s)):
+        reception = self._receptions.get(name)  # none of odometry by tf alone
+        if not fault and reception and (fault := reception.fault(now_s)):
             error = InputError(fault)
         if fault:
             self._refused_inputs.add(error, name)
@@ -121,7 +128,7 @@ class InputMonitor:
     @property
     def values(self) -> dict[str, str]:
         """What /diagnostics reports of each input besides its rate and age."""
-        values = {}
+        values = {"odom: source": self.odom_source} if self.odom_source else {}
         for name, reception in self._receptions.items():
             values[f"{name}: dropped"] = str(reception.dropped)
             if reception.ignored:

@@ -6,7 +6,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ...core.geometry import Pose2D
-from ...core.planner_types import Ranges, RefusalReason, Scan
+from ...core.planner_types import Ranges, RefusalReason
+from ...recording.scan_parts import MountedScan
 from .stamp_pairing import StampPairs
 
 
@@ -21,7 +22,7 @@ class Inputs(NamedTuple):
     pose: Pose2D | RefusalReason
     ranges_m: Ranges | RefusalReason
     age_s: float = 0.0
-    scan: Scan | None = None
+    scan: MountedScan | None = None
     pose_stamp_ns: int | None = None
     sensed: tuple[int, Pose2D] | None = None
 
@@ -32,7 +33,7 @@ class LockstepInputs:
     def __init__(self) -> None:
         """Start with nothing received."""
         self._pairs: StampPairs[
-            Pose2D | RefusalReason, tuple[Ranges | RefusalReason, Scan | None]
+            Pose2D | RefusalReason, tuple[Ranges | RefusalReason, MountedScan | None]
         ] = StampPairs(repeat=True)
 
     def add_odom(
@@ -46,7 +47,7 @@ class LockstepInputs:
         stamp_ns: int,
         ranges_m: Ranges | RefusalReason,
         _now_s: float,
-        scan: Scan | None = None,
+        scan: MountedScan | None = None,
     ) -> Inputs | None:
         """Add sectors and their scan; StampError for a stamp older than the last pair's."""
         return _inputs(stamp_ns, self._pairs.add_b(stamp_ns, (ranges_m, scan)))
@@ -61,7 +62,7 @@ class LockstepInputs:
 
 def _inputs(
     stamp_ns: int,
-    pair: tuple[Pose2D | RefusalReason, tuple[Ranges | RefusalReason, Scan | None]] | None,
+    pair: tuple[Pose2D | RefusalReason, tuple[Ranges | RefusalReason, MountedScan | None]] | None,
 ) -> Inputs | None:
     if pair is None:
         return None

@@ -8,12 +8,13 @@ import time
 from collections.abc import Callable
 
 import rclpy
-from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.signals import SignalHandlerOptions
 
 from ...core.interrupts import interrupts_held
 from .base_node import SPIN_S, GraphNode
 from .environment_notes import environment_notes
+from .node_executor import NodeExecutor
 
 # Longest time that a node stays after its end by a service call, for callers that stay too.
 CALLERS_TIMEOUT_S = 2.0
@@ -34,7 +35,7 @@ class StopFlag:
 
 def make_executor(context: rclpy.Context | None = None) -> Executor:
     """The executor all nodes use; MultiThreadedExecutor is far slower and drops messages."""
-    return SingleThreadedExecutor(context=context)
+    return NodeExecutor(context=context)
 
 
 def wait_for_callers(

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from ...core.errors import StampError
 from ...core.geometry import Pose2D
-from ...core.planner_types import Ranges, RefusalReason, Scan
+from ...core.planner_types import Ranges, RefusalReason
+from ...perception.pose_history import PoseHistory
+from ...recording.scan_parts import MountedScan
 from .lockstep_inputs import Inputs
-from .pose_history import PoseHistory
 
 
 def watch_period_s(timeout_s: float, *, lockstep: bool) -> float:
@@ -25,7 +26,7 @@ class NewestInputs:
         """Start with nothing received."""
         self._pose: Pose2D | RefusalReason = "no odom yet"
         self._ranges: Ranges | RefusalReason = "no sectors yet"
-        self._scan: Scan | None = None
+        self._scan: MountedScan | None = None
         self._history = PoseHistory()
         self._odom_ns = self._sectors_ns = -1
         self._odom_s = self._sectors_s = 0.0
@@ -46,7 +47,7 @@ class NewestInputs:
         stamp_ns: int,
         ranges_m: Ranges | RefusalReason,
         now_s: float,
-        scan: Scan | None = None,
+        scan: MountedScan | None = None,
     ) -> Inputs | None:
         """Return sectors with the newest odom; StampError for a stamp that does not rise."""
         if stamp_ns <= self._sectors_ns:

@@ -20,9 +20,12 @@ class StampPairs(Generic[A, B]):
     With `repeat`, the last pair is returned again when both its messages are received again.
     """
 
-    def __init__(self, *, repeat: bool = False, limit: int | None = None) -> None:
-        """Start with nothing waiting; limit replaces WAITING_LIMIT."""
-        self._repeat = repeat
+    def __init__(self, *, repeat: bool = False, limit: int | None = None, kept: int = 0) -> None:
+        """Start with nothing waiting; limit replaces WAITING_LIMIT.
+
+        So many messages of topic a, with the newest stamps, are kept for several of topic b.
+        """
+        self._repeat, self._kept = repeat, kept
         self._limit = WAITING_LIMIT if limit is None else limit
         self._a: OrderedDict[int, A] = OrderedDict()
         self._b: OrderedDict[int, B] = OrderedDict()
@@ -33,6 +36,8 @@ class StampPairs(Generic[A, B]):
         self._refuse_old(stamp_ns)
         if stamp_ns in self._b:
             pair = (value, self._b[stamp_ns])
+            if self._kept:
+                self._keep(stamp_ns, value, self._a)
             self._drop_up_to(stamp_ns)
             return pair
         self._keep(stamp_ns, value, self._a)
@@ -40,7 +45,8 @@ class StampPairs(Generic[A, B]):
 
     def add_b(self, stamp_ns: int, value: B) -> tuple[A, B] | None:
         """Add a message of topic b; StampError for a stamp that was paired before."""
-        self._refuse_old(stamp_ns)
+        if not (self._kept and stamp_ns in self._a):
+            self._refuse_old(stamp_ns)
         if stamp_ns in self._a:
             pair = (self._a[stamp_ns], value)
             self._drop_up_to(stamp_ns)
@@ -57,9 +63,9 @@ class StampPairs(Generic[A, B]):
             )
 
     def _drop_up_to(self, stamp_ns: int) -> None:
-        self._paired_ns = stamp_ns
-        for waiting in (self._a, self._b):
-            while waiting and next(iter(waiting)) <= stamp_ns:
+        self._paired_ns = max(stamp_ns, self._paired_ns)
+        for waiting, kept in ((self._a, self._kept), (self._b, 0)):
+            while len(waiting) > kept and next(iter(waiting)) <= stamp_ns:
                 waiting.popitem(last=False)
 
     def _keep(self, stamp_ns: int, value: Any, waiting: OrderedDict[int, Any]) -> None:
