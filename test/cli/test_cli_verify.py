@@ -51,7 +51,7 @@ def test_digest_of_a_run_directory_without_a_bag(
     [["info"], ["verify"], ["export", "x.csv"], ["picture", "x.png"], ["recover", "x"],
      ["diff", "run"], ["decide"]],
 )  # fmt: skip
-def test_commands_that_need_a_bag_say_what_a_result_is_good_for(
+def test_commands_that_need_a_bag_name_those_for_a_result(
     command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
