@@ -57,7 +57,8 @@ def distance_field(
 
     The grid is aligned with multiples of cell_m. The nearest occupied cell is that of the
     Euclidean distance transform; the distance is that to the nearest of the points in it and in
-    the nearest cells of the four neighbours, not to its centre.
+    the nearest cells of the four neighbours, not to its centre. Of the points in a cell one
+    counts, so a distance may be too long by the cell's diagonal.
     """
     width, height = (max(math.ceil((b - a) / cell_m), 2) for a, b in zip(low, high))
     pad = math.ceil(cap_m / cell_m) + 1  # points outside the rectangle count as well

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 
@@ -34,6 +34,7 @@ def test_between_the_middles_of_cells_it_is_bilinear_and_beyond_them_constant(
 
 
 @settings(max_examples=60, deadline=None)
+@example([(-0.09375, 0.0), (-0.015625, 0.0)], (0.0, 0.0), (1.0, 1.0))  # both in one cell
 @given(
     st.lists(st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0)), min_size=1, max_size=30),
     st.tuples(st.floats(-5.0, 2.0), st.floats(-5.0, 2.0)),
@@ -51,5 +52,5 @@ def test_distances_in_a_rectangle_are_those_to_the_nearest_point(
     at_x = field.origin_m[0] + (np.arange(width) + 0.5) * cell_m
     at_y = field.origin_m[1] + (np.arange(height)[:, None] + 0.5) * cell_m
     true = np.sqrt((at_x[..., None] - x) ** 2 + (at_y[..., None] - y) ** 2).min(axis=-1)
-    assert field.distance_m == pytest.approx(np.minimum(true, CAP_M), abs=0.75 * cell_m)
+    assert field.distance_m == pytest.approx(np.minimum(true, CAP_M), abs=1.42 * cell_m)
     assert (field.distance_m >= np.minimum(true, CAP_M) - 1e-5).all()

@@ -18,9 +18,11 @@ from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
 from waiting import spin_until
 
+from mfba_planner.ros.runtime import node_executor
 from mfba_planner.ros.runtime.base_node import GraphNode
 from mfba_planner.ros.runtime.node_executor import NodeExecutor
 from mfba_planner.ros.runtime.polled_subscriptions import PolledSubscriptions, SerializedMessage
+from mfba_planner.ros.runtime.spin_node import make_executor
 
 DEEP = QoSProfile(depth=100)
 
@@ -303,3 +305,15 @@ def test_nothing_is_called_after_shutdown(node: Node, executor: NodeExecutor) ->
     for _ in range(3):
         executor.spin_once(timeout_sec=0.01)
     assert len(called) == before
+
+
+def test_another_rclpy_gets_its_own_executor(
+    ros_context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = make_executor(ros_context)
+    assert isinstance(usual, NodeExecutor)
+    usual.shutdown()
+    monkeypatch.setattr(node_executor, "OF_RCLPY", ["_of_a_later_version"])
+    own = make_executor(ros_context)
+    assert type(own) is SingleThreadedExecutor
+    own.shutdown()

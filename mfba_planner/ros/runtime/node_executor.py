@@ -31,6 +31,12 @@ TIMER, SUBSCRIPTION, CONDITION, CLIENT, SERVICE = KINDS = (
     "service",
 )
 
+# What rclpy 7.1 does not promise to keep.
+OF_RCLPY = [
+    "_context", "_guard", "_is_shutdown", "_make_handler", "_sigint_gc", "_take_client",
+    "_take_guard_condition", "_take_service", "_take_waitable", "_tasks", "_tasks_lock",
+]  # fmt: skip
+
 
 class Entity(NamedTuple):
     """What the executor waits for: a timer, subscription, guard condition, client or service."""
@@ -63,6 +69,11 @@ class NodeExecutor(SingleThreadedExecutor):
         self._round: Iterator[Subscription] = iter(())
         self._received = False  # a message in this round
         self._waited_s = -READ_S
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether this rclpy has all that is used of its inner parts."""
+        return all(hasattr(self, name) for name in OF_RCLPY)
 
     def wake(self) -> None:
         """Called by rclpy whenever an entity of a node was created or destroyed."""

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 import rclpy
-from rclpy.executors import Executor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from ...core.interrupts import interrupts_held
@@ -34,8 +34,15 @@ class StopFlag:
 
 
 def make_executor(context: rclpy.Context | None = None) -> Executor:
-    """The executor all nodes use; MultiThreadedExecutor is far slower and drops messages."""
-    return NodeExecutor(context=context)
+    """The executor all nodes use; MultiThreadedExecutor is far slower and drops messages.
+
+    With an rclpy whose inner parts have other names it is rclpy's own, which is slower.
+    """
+    executor = NodeExecutor(context=context)
+    if executor.is_usable:
+        return executor
+    executor.shutdown()
+    return SingleThreadedExecutor(context=context)
 
 
 def wait_for_callers(
