@@ -9,6 +9,7 @@ given with each drawing. No text of a run is in a drawing.
 from __future__ import annotations
 
 import io
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -62,7 +63,11 @@ def _chart(
         figure.patch.set_visible(False)
         room = height - _TOP - _BOTTOM - _GAP
         low = (1.0 - _SHARE) * room
-        upper = _axes(figure, "Clearance, edge to edge (m)", _BOTTOM + low + _GAP, _SHARE * room)
+        gaps = [clearances(episode) for episode in episodes]
+        # Nobody knows the obstacles of a real robot: what it perceives is not the truth.
+        known = any(map(math.isfinite, itertools.chain(*gaps)))
+        title = "Clearance, edge to edge (m)" if known else "Clearance: no obstacle is known"
+        upper = _axes(figure, title, _BOTTOM + low + _GAP, _SHARE * room)
         lower = _axes(figure, "Speed (m/s)", _BOTTOM, low)
         upper.tick_params(labelbottom=False)
         upper.axhline(0.0, color=_PLACEHOLDERS["bad"], linewidth=0.9, linestyle=(0, (2, 2)))
@@ -75,13 +80,16 @@ def _chart(
             }
             if len(episodes) == 1:
                 looks["color"] = _PLACEHOLDERS["ink"]  # the bands are coloured
-            _step_plot(upper, episode, clearances(episode), looks)
+            _step_plot(upper, episode, gaps[number], looks)
             _step_plot(lower, episode, speeds(episode), looks)
         for ax in (upper, lower):
             ax.set_xlim(start, end)
             ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
             if len(episodes) == 1:
                 _bands(ax, episodes[0])
+        if not known:
+            upper.set_ylim(0.0, 1.0)
+            upper.set_yticks([])
         lower.xaxis.set_major_formatter("{x:g} s")
         return {
             "from_px": from_px,
