@@ -153,11 +153,8 @@ def read_config(parsed: argparse.Namespace, **more: Any) -> RunConfig:
 
     Raises ConfigError for what contradicts or has no effect.
     """
-    for option in ("reading", "swarm"):
-        if getattr(parsed, option) and parsed.planner == Method.PREDICTIVE.value:
-            raise ConfigError(
-                f"--{option}: of planner paper only; leave it out with {parsed.planner}"
-            )
+    if parsed.planner == Method.PREDICTIVE.value:
+        refuse_options_of_paper(parsed, "reading", "swarm")
     planner = readings_of_paper.planner(parsed.reading or readings_of_paper.DEFAULT_METHOD)
     if parsed.swarm:
         planner = replace(planner, bat=readings_of_paper.swarm(parsed.swarm))
@@ -176,6 +173,15 @@ def read_config(parsed: argparse.Namespace, **more: Any) -> RunConfig:
         seed=parsed.seed,
         **more,
     )
+
+
+def refuse_options_of_paper(parsed: argparse.Namespace, *options: str) -> None:
+    """Raise ConfigError for one of these options beside another planner than paper."""
+    for option in options:
+        if getattr(parsed, option):
+            raise ConfigError(
+                f"--{option}: of planner paper only; leave it out with {parsed.planner}"
+            )
 
 
 def _build_request(parsed: argparse.Namespace) -> RunRequest:

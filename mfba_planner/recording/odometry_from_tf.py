@@ -3,55 +3,16 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..core.errors import FrameError
 from ..core.planner_types import NANO
 from .from_messages import stamp_ns
+from .message_fields import Header, OdometryFields, Pose, PoseOnly, Quaternion, Time, Vector
 from .transform_tree import TransformTree, frame_name
 
 ODOM_FRAME, BASE_FRAME = "odom", "base_link"  # REP-105
 _SECOND_NS = round(1.0 / NANO)
-
-
-class _Time(NamedTuple):
-    sec: int
-    nanosec: int
-
-
-class _Header(NamedTuple):
-    stamp: _Time
-    frame_id: str
-
-
-class _Point(NamedTuple):
-    x: float
-    y: float
-    z: float
-
-
-class _Quaternion(NamedTuple):
-    x: float
-    y: float
-    z: float
-    w: float
-
-
-class _Pose(NamedTuple):
-    position: _Point
-    orientation: _Quaternion
-
-
-class _PoseWithoutCovariance(NamedTuple):
-    pose: _Pose
-
-
-class TransformOdometry(NamedTuple):
-    """What the nodes read of a nav_msgs/Odometry."""
-
-    header: _Header
-    child_frame_id: str
-    pose: _PoseWithoutCovariance
 
 
 class OdometryFromTf:
@@ -67,7 +28,7 @@ class OdometryFromTf:
         self._stamps: dict[str, int] = {}  # of the newest transform of /tf, by child frame
         self._last_ns = -1
 
-    def of(self, message: Any) -> TransformOdometry | None:
+    def of(self, message: Any) -> OdometryFields | None:
         """The odometry by a message of /tf, None if it tells nothing new of the robot's pose."""
         for transform in message.transforms:
             stamp = stamp_ns(transform.header.stamp)
@@ -81,6 +42,6 @@ class OdometryFromTf:
         except FrameError:
             return None
         self._last_ns = min(moving)
-        pose = _Pose(_Point(*position[:3]), _Quaternion(*rotation))
-        header = _Header(_Time(*divmod(self._last_ns, _SECOND_NS)), self.odom_frame)
-        return TransformOdometry(header, self.base_frame, _PoseWithoutCovariance(pose))
+        pose = Pose(Vector(*position[:3]), Quaternion(*rotation))
+        header = Header(Time(*divmod(self._last_ns, _SECOND_NS)), self.odom_frame)
+        return OdometryFields(header, self.base_frame, PoseOnly(pose))

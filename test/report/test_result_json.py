@@ -4,15 +4,13 @@
 import json
 import math
 import os
-import resource
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from full_disk import file_size_limit
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -152,18 +150,8 @@ def test_a_write_failure_gives_one_line_with_the_reason(
     assert os.listdir(tmp_path) == ["file"]
 
 
-@contextmanager
-def _file_size_limit(size: int) -> Iterator[None]:
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-
 def test_a_file_that_is_too_large_leaves_nothing_behind(tmp_path: Path) -> None:
-    with _file_size_limit(1000), pytest.raises(OutputError, match="file too large"):
+    with file_size_limit(1000), pytest.raises(OutputError, match="file too large"):
         write_new(tmp_path / "result.json", b"x" * 100_000)
     assert os.listdir(tmp_path) == []
 

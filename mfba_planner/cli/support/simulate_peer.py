@@ -14,6 +14,7 @@ from ...evaluation.metrics import evaluate
 from ...evaluation.suites.scenario_suite import single_scenario
 from ...evaluation.sweep.single_run import run_one
 from ...evaluation.sweep.sweep_spec import Run, SweepSpec, default_setting, own_preset
+from ...launcher.run_arguments import refuse_options_of_paper
 from ...launcher.run_directory import RunDirectory
 from ...launcher.run_result import show, why_no_success
 from ...launcher.set_option import settings_of, with_robot_settings, with_settings
@@ -30,11 +31,7 @@ class Peer:
     def __init__(self, parsed: argparse.Namespace) -> None:
         """Check the arguments. Raises ConfigError, with the nearest name for an unknown one."""
         self._name: str = parsed.planner
-        for option in ("algorithm", "reading", "swarm"):
-            if getattr(parsed, option):
-                raise ConfigError(
-                    f"--{option}: of planner paper only; leave it out with {self._name}"
-                )
+        refuse_options_of_paper(parsed, "algorithm", "reading", "swarm")
         if parsed.optimizer and ":" not in self._name:
             raise ConfigError(
                 f"--optimizer: of paper and predictive only; leave it out with {self._name}"

@@ -17,61 +17,19 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import LaserScan
 
+from ...recording.message_fields import (
+    Header,
+    OdometryFields,
+    Pose,
+    PoseOnly,
+    Quaternion,
+    Time,
+    Vector,
+)
+
 _ODOMETRY_DOUBLES = 7 + 36 + 6 + 36  # pose and twist, each with its covariance
 _BODY = 4  # bytes of the encapsulation; alignment begins after them
 _ORDERS = {b"\0\0": ">", b"\0\1": "<"}  # of plain CDR, version 1
-
-
-class Time(NamedTuple):
-    """builtin_interfaces/Time."""
-
-    sec: int
-    nanosec: int
-
-
-class Header(NamedTuple):
-    """std_msgs/Header."""
-
-    stamp: Time
-    frame_id: str
-
-
-class Vector(NamedTuple):
-    """geometry_msgs/Point or Vector3."""
-
-    x: float
-    y: float
-    z: float
-
-
-class Quaternion(NamedTuple):
-    """geometry_msgs/Quaternion."""
-
-    x: float
-    y: float
-    z: float
-    w: float
-
-
-class Pose(NamedTuple):
-    """geometry_msgs/Pose."""
-
-    position: Vector
-    orientation: Quaternion
-
-
-class PoseOnly(NamedTuple):
-    """geometry_msgs/PoseWithCovariance without the covariance."""
-
-    pose: Pose
-
-
-class OdometryFields(NamedTuple):
-    """nav_msgs/Odometry without twist and covariances."""
-
-    header: Header
-    child_frame_id: str
-    pose: PoseOnly
 
 
 class PoseArrayFields(NamedTuple):
