@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Chunks on any executor: workers that die, and the chunks kept after an early end."""
 
+import multiprocessing
 import os
+import re
+import signal
 from collections.abc import Mapping
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +15,9 @@ from typing import Any
 import pytest
 
 from mfba_planner.core.errors import ConfigError, MfbaError
+from mfba_planner.core.interrupts import start_own_program
 from mfba_planner.evaluation.study.chunk_store import Store
-from mfba_planner.evaluation.study.compute_chunks import TRIES, compute
+from mfba_planner.evaluation.study.compute_chunks import TRIES, compute, initialize_worker
 
 
 @dataclass(frozen=True)
@@ -130,3 +134,29 @@ def test_an_exception_of_a_chunk_is_raised_unchanged() -> None:
 def test_numbers_of_workers_out_of_range() -> None:
     with pytest.raises(ConfigError, match=r"--workers=0: out of range; give 1 to 256"):
         compute([], workers=0)
+
+
+def _threads_that_take_an_interrupt() -> list[bool]:
+    """In a worker: for each of its threads whether it is the main one, if SIGINT may reach it."""
+    found = []
+    for task in Path("/proc/self/task").iterdir():
+        held = re.search(r"^SigBlk:\s*(\w+)", (task / "status").read_text(), re.MULTILINE)
+        assert held
+        if not int(held[1], 16) >> (signal.SIGINT - 1) & 1:
+            found.append(task.name == str(os.getpid()))
+    return found
+
+
+def test_only_the_main_thread_of_a_worker_takes_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Another one would get it while the main thread computes the distance to go."""
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, context, initializer=_start_worker) as executor:
+        assert executor.submit(_threads_that_take_an_interrupt).result() == [True]
+
+
+def _start_worker() -> None:
+    start_own_program()
+    initialize_worker()
