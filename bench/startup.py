@@ -21,7 +21,7 @@ from pathlib import Path
 
 MFBA = "import sys; from mfba_planner import entry_points; sys.exit(entry_points.mfba())"
 NODE = "import rclpy; rclpy.init(); n = rclpy.create_node('n'); n.destroy_node(); rclpy.shutdown()"
-NEW = "new"  # what a row writes; removed before each round
+NEW, NEW_PAGE = "new", "new.html"  # what a row writes; removed before each round
 ROWS: dict[str, list[str]] = {
     "python": ["pass"],
     "node": [NODE],
@@ -31,7 +31,7 @@ ROWS: dict[str, list[str]] = {
     "sim case1, predictive": [MFBA, "sim", "case1"],
     "sim case1 --out": [MFBA, "sim", "case1", "--planner=paper", "--out", NEW],
     "verify": [MFBA, "verify", "recorded"],
-    "report": [MFBA, "report", "recorded", "--out", NEW],
+    "report": [MFBA, "report", "recorded", "--out", NEW_PAGE],
     "--help": [MFBA, "--help"],
 }
 SLOW_US = 5000  # of --imports
@@ -39,9 +39,8 @@ SLOW_US = 5000  # of --imports
 
 def seconds(row: list[str], directory: Path, *options: str) -> tuple[float, str]:
     """Wall time of a row and what it wrote to stderr. RuntimeError where it fails."""
-    new = directory / NEW
-    shutil.rmtree(new, ignore_errors=True)
-    new.unlink(missing_ok=True)
+    shutil.rmtree(directory / NEW, ignore_errors=True)
+    (directory / NEW_PAGE).unlink(missing_ok=True)
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     started = time.perf_counter()
     done = subprocess.run(

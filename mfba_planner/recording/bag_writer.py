@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 from mcap.well_known import MessageEncoding, Profile
 from mcap.writer import CompressionType, Writer
@@ -93,6 +94,11 @@ class BagWriter:
     def message_count(self) -> int:
         """Messages written, including the chunk in progress."""
         return self._stored_count + self._pending_count
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Messages written so far, by topic: a view that goes on counting."""
+        return MappingProxyType(self._counts)
 
     @property
     def topics(self) -> dict[str, BagTopic]:

@@ -48,7 +48,7 @@ def read_recording(
         omitted: dict[str, str] = {}
         for recorded in stream_decisions(reader, names, omitted):
             ticks[recorded.robot].setdefault(recorded.decision.stamp_ns, recorded.decision)
-        truth = read_truth(reader, names)
+        truth = read_truth(reader, setups)
     episodes = {
         name: setup.episode(
             tuple(decision for _, decision in sorted(ticks[name].items())), truth[name]
@@ -89,7 +89,8 @@ def summarize(path: str | Path, *, salvage: bool = False) -> Summary:
     Raises as read_episode(), and BagError if the stamp of a decision decreases.
     """
     with BagReader(path, salvage=salvage) as reader:
-        setup, truth = read_setup(reader), read_truth(reader, [NO_NAMESPACE])[NO_NAMESPACE]
+        setup = read_setup(reader)
+        truth = read_truth(reader, {NO_NAMESPACE: setup})[NO_NAMESPACE]
         omitted: dict[str, str] = {}
         stream = (
             recorded.decision for recorded in rising_decisions(reader, [NO_NAMESPACE], omitted)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from ..core.errors import BagError, InputError
 from ..core.geometry import Point, Pose2D
@@ -12,21 +12,29 @@ from ..simulation.triggers import Moment
 from .bag_reader import BagReader
 from .fleet_topics import NO_NAMESPACE, messages_by_robot, robot_topic
 from .from_messages import robot_pose, stamp_ns
+from .run_setup import Setup
 
 ODOM, TRUTH = "/odom", "/ground_truth"  # odometry with errors is recorded beside the truth
 
 
-def read_truth(reader: BagReader, robots: Sequence[str]) -> dict[str, dict[int, Pose2D]]:
-    """The true pose of each robot by stamp; empty if the bag has no ground truth."""
-    recorded: dict[str, dict[int, Pose2D]] = {robot: {} for robot in robots}
-    if not any(robot_topic(robot, TRUTH) in reader.topics for robot in robots):
-        return recorded
-    for robot, message in messages_by_robot(reader, robots, [TRUTH]):
+def read_truth(reader: BagReader, setups: Mapping[str, Setup]) -> dict[str, dict[int, Pose2D]]:
+    """The true pose of each robot by stamp; empty where decisions hold it, or nobody knows it.
+
+    In real time a decision may be on odometry older than its stamp, so the odometry of a simulated
+    robot without errors is read then. Raises BagError for a pose that is none.
+    """
+    recorded: dict[str, dict[int, Pose2D]] = {robot: {} for robot in setups}
+    topic = TRUTH
+    if not any(robot_topic(robot, TRUTH) in reader.topics for robot in setups):
+        if all(setup.lockstep or not setup.is_simulated for setup in setups.values()):
+            return recorded
+        topic = ODOM
+    for robot, message in messages_by_robot(reader, list(setups), [topic]):
         odom = message.message
         try:
-            recorded[robot][stamp_ns(odom.header.stamp)] = robot_pose(odom)
+            recorded[robot].setdefault(stamp_ns(odom.header.stamp), robot_pose(odom))
         except InputError as error:
-            raise BagError(f"{reader.path}: {robot_topic(robot, TRUTH)}: {error}") from None
+            raise BagError(f"{reader.path}: {robot_topic(robot, topic)}: {error}") from None
     return recorded
 
 

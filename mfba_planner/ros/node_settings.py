@@ -6,9 +6,12 @@ No ROS here: the launcher, the documentation and the nodes read the same declara
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
+from ..core.errors import ConfigError
 from ..core.option_specs import check, option
 from ..core.planner_types import ROBOT_RADIUS_M
 from ..perception.no_return import NoReturn
@@ -211,6 +214,19 @@ class RecorderSettings:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value out of range."""
         check(self)
+        self.facts()
+
+    def facts(self) -> dict[str, Any]:
+        """The object in `run`."""
+        try:
+            facts = json.loads(self.run)
+        except ValueError:
+            facts = None
+        if not isinstance(facts, dict):
+            raise ConfigError(
+                f"parameter run={self.run!r}: not JSON of an object; give '{{}}' or more"
+            )
+        return facts
 
 
 def names(text: str) -> set[str]:

@@ -146,8 +146,8 @@ def test_nodes_of_a_private_run_announce_themselves_often(domain_id: int) -> Non
     with private_domain() as domain:
         profile = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
         root = ElementTree.parse(profile).getroot()
-        found = {e.tag.rpartition("}")[2]: (e.text or "").strip() for e in root.iter()}
-        assert (found["count"], found["nanosec"]) == ("20", "50000000")
+        texts = {e.tag.rpartition("}")[2]: "".join(e.itertext()).split() for e in root.iter()}
+        assert texts["initialAnnouncements"] == ["20", "0", "50000000"]
         code = "import rclpy; rclpy.init(); rclpy.create_node('a'); rclpy.shutdown()"
         env = {**os.environ, "RCUTILS_LOGGING_USE_STDOUT": "0"}
         done = subprocess.run(

@@ -191,3 +191,35 @@ def test_a_run_cut_short_is_interrupted_and_reads_with_salvage(bag: Path, tmp_pa
     with pytest.raises(BagError, match="mfba recover"):
         read_episode(killed)
     assert read_episode(killed, salvage=True).ticks == read_episode(copy).ticks
+
+
+def test_in_real_time_a_run_is_judged_by_where_the_robot_was(bag: Path, tmp_path: Path) -> None:
+    """A decision may be on the odometry before: the one at the goal, and any other."""
+    episode = read_episode(bag)
+    stamps = [tick.stamp_ns for tick in episode.ticks]
+    late = (stamps[20], stamps[-1])
+
+    def change(name: str, message: Any) -> Any:
+        stamp_ns = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        if stamp_ns in late:
+            before = episode.ticks[stamps.index(stamp_ns) - 1].pose
+            values = {item.key: item for item in message.status[0].values}
+            values["pose"].value = f"{before.x!r},{before.y!r},{before.yaw!r}"
+        return message
+
+    def in_real_time(content: Any) -> Any:
+        content["nodes"]["planner"]["lockstep"] = False
+        return content
+
+    def of_decisions(name: str, message: Any) -> Any:
+        return change(name, message) if name == "/planner/decision" else message
+
+    copy = edited(bag, tmp_path / "late", of_decisions, in_real_time)
+    found = read_episode(copy)
+    assert found.ticks[20].pose == found.ticks[19].pose
+    assert found.outcome is Outcome.GOAL_REACHED
+    assert found.truth == tuple(tick.pose for tick in episode.ticks)
+    assert evaluate(found).length_m == evaluate(episode).length_m
+    summary = summarize(copy)
+    assert (summary.episode.outcome, summary.result) == (found.outcome, evaluate(found))
+    assert read_episode(bag).truth == (), "in lockstep a decision holds the pose of its stamp"

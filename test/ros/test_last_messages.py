@@ -13,6 +13,7 @@ from builtin_interfaces.msg import Time
 from project import ROOT
 from ros_graph import Graph
 
+from mfba_planner.core.shipped_files import config_path
 from mfba_planner.ros.interface import topics
 from mfba_planner.ros.runtime.base_node import GraphNode
 
@@ -108,3 +109,34 @@ def test_a_reader_that_never_runs_again_does_not_keep_the_node(
         reader.send_signal(signal.SIGSTOP)
         publisher.publish(topics.CLOCK.type(clock=Time(sec=2)))
         assert not node.wait_for_readers(0.2)
+
+
+ASKING = """
+import rclpy
+from builtin_interfaces.msg import Time
+from mfba_planner.ros.interface import topics
+from mfba_planner.ros.runtime.base_node import GraphNode
+rclpy.init()
+node = GraphNode("asking")
+publisher = node.advertise(topics.CLOCK)
+while not publisher.get_subscription_count():
+    rclpy.spin_once(node, timeout_sec=0.05)
+for sec in range(1, 6):
+    publisher.publish(topics.CLOCK.type(clock=Time(sec=sec)))
+    if not node.wait_for_readers(1.0):  # without the profile it takes up to 3 s
+        print("not acknowledged", flush=True)
+print("done", flush=True)
+"""
+
+
+def test_nodes_of_a_run_need_not_wait_for_acknowledgements(
+    ros_env: dict[str, str],
+) -> None:
+    profile = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(config_path("private_discovery.xml"))}
+    env = {**ros_env, **profile}
+    with started(READER, env) as reader, started(ASKING, env) as asking:
+        read_until(reader, "up")
+        assert asking.stdout is not None
+        lines = asking.stdout.read().split("\n")
+        assert lines.count("not acknowledged") <= 1, "but for one that discovery delayed"
+        assert "done" in lines

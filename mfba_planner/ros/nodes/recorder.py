@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from functools import partial
 from pathlib import Path
@@ -12,13 +11,13 @@ from typing import Any
 from geometry_msgs.msg import TwistStamped
 from rclpy.executors import Executor
 
-from ...core.errors import ConfigError
 from ...core.output_files import new_run_directory
 from ...recording.bag_qos import OfferedQos
 from ...recording.bag_writer import BagWriter
 from ...recording.configuration_attachment import attach_configuration
 from ...recording.message_definitions import definition_of
 from ..endpoints.robot_namespace import graph_topics
+from ..endpoints.tick_counts import are_unequal
 from ..interface import parameters, topics
 from ..interface.qos_conversion import offered
 from ..interface.serialized_message import clock_ns, has_header, header_stamp_ns, type_name
@@ -39,7 +38,7 @@ class Recorder(GraphNode):
         """Raise ConfigError or OutputError for what cannot be accepted or written."""
         super().__init__(topics.RECORDER, **kwargs)
         self.settings = s = parameters.declare(self, RecorderSettings(), read_only=True)
-        self._facts = _facts(s.run)
+        self._facts = s.facts()
         self._log_time_ns = self._previous_tick_ns = 0
         self._held: list[tuple[str, bytes]] = []
         self._attached = False
@@ -116,7 +115,13 @@ class Recorder(GraphNode):
 
     def drain(self, executor: Executor) -> None:
         """Record what was sent already."""
-        drain(executor, self._count)
+        drain(executor, self._count, self._is_behind)
+
+    def _is_behind(self) -> bool:
+        """Whether messages of a tick are missing; in real time some may have been dropped."""
+        robots = names(self.settings.namespaces)
+        counts = self.writer.counts
+        return self.settings.sim_time and are_unequal(counts, robots, self.resolve_topic_name)
 
     def _count(self) -> int:
         self._polled.poll()
@@ -130,16 +135,6 @@ class Recorder(GraphNode):
             self._write(name, held, time.time_ns())  # no /clock was received
         self.attach_parameters(self._parameter_client.values)
         self.writer.close()
-
-
-def _facts(text: str) -> dict[str, Any]:
-    try:
-        facts = json.loads(text)
-    except ValueError:
-        facts = None
-    if not isinstance(facts, dict):
-        raise ConfigError(f"parameter run={text!r}: not JSON of an object; give '{{}}' or more")
-    return facts
 
 
 def main(args: list[str]) -> int:
