@@ -60,7 +60,9 @@ def test_a_bug_in_a_node_is_a_traceback_in_its_output(server: ForkServer) -> Non
 def test_a_node_process_has_its_own_session_environment_and_files(
     server: ForkServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first = NodeProcess(server, "waits", [], Lines())
+    up = Lines()
+    first = NodeProcess(server, "waits", [], up)
+    wait_until(lambda: bool(up.all))  # it names itself after the fork
     monkeypatch.setenv("MFBA_TEST_NEW", "set after the server's start")
     lines = Lines()
     child = NodeProcess(server, "robot/describes_itself", ["--some", "arg"], lines)
