@@ -83,7 +83,7 @@ def main(args: list[str]) -> int:
     names = [f"table.{parsed.format}", "timings.csv"]
     write(directory / names[0], swept.rows, kinds_of(spec))
     write(directory / names[1], swept.timings, TIMINGS)
-    _report(swept, directory)
+    useless = _report(swept, directory)
     print(f"wrote {directory}: {', '.join([*names, 'report.md'])}")
     print(f"sorted hash {swept.hash}")
     if left_out:
@@ -91,6 +91,8 @@ def main(args: list[str]) -> int:
             f"{len(left_out)} scenario file{'s' * (len(left_out) > 1)} left out, see above; mend "
             "them and sweep into another --out"
         )
+    if useless:
+        raise MfbaError("; ".join(useless) + f"; see {directory / 'report.md'} and mfba show")
     return 0
 
 
@@ -235,7 +237,8 @@ def _non_default(params: Any, default: Any) -> Iterator[tuple[str, Scalar]]:
     )
 
 
-def _report(swept: SweepResult, directory: Path) -> None:
+def _report(swept: SweepResult, directory: Path) -> list[str]:
+    """Write and print the report; return a line for each planner that failed in all its runs."""
     from rich.console import Console
 
     from ..evaluation.sweep.summary import comparisons, planner_summaries
@@ -250,3 +253,12 @@ def _report(swept: SweepResult, directory: Path) -> None:
     console = Console()
     for table in tables(ranking, pairs, title):
         print_encodable(console, lambda encodable, table=table: encodable.print(table))  # type: ignore[misc]
+    for one in ranking:
+        for reason, count in one.failures:
+            print(f"{one.planner} failed in {count} of {one.runs} runs: {reason}")
+    failed = {one: sum(count for _, count in one.failures) for one in ranking}
+    return [
+        f"{one.planner} failed in each of its {one.runs} runs: {one.failures[0][0]}"
+        for one, count in failed.items()
+        if count == one.runs
+    ]

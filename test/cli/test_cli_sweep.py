@@ -372,8 +372,15 @@ def test_a_failure_of_a_planner_is_shown(
     out = tmp_path / "out"
     args = ["--planner", f"faulty_planners:{planner}", "--worlds", "1", "--no-oracle"]
     args += ["--patience", "1", "--workers", "1"]
-    assert mfba("sweep", "random-3", *args, "--out", str(out)) == 0
+    assert mfba("sweep", "random-3", *args, "--out", str(out)) == 1
     assert "1 x " in (out / "report.md").read_text()
+    reason = line.partition("at tick 5: ")[2].removeprefix("hung: ")
+    printed = capsys.readouterr()
+    assert f"faulty_planners:{planner} failed in 1 of 1 runs: {reason}\n" in printed.out
+    assert printed.err.count("\n") == 1
+    assert f"faulty_planners:{planner} failed in each of its 1 runs: {reason}; see " in printed.err
+    beside = [*args, "--planner", "straight", "--out", str(tmp_path / "both")]
+    assert mfba("sweep", "random-3", *beside) == 1, "a planner that never works is no result"
     capsys.readouterr()
     assert mfba("show", str(out), "0", "--out", str(tmp_path / "shown")) == 0
     output = capsys.readouterr().out
