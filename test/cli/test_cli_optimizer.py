@@ -80,7 +80,7 @@ def test_a_fault_ends_a_simulation_in_one_line(capsys: Capture) -> None:
 def test_a_sweep_goes_on_with_the_run_marked_failed(name: str, fault: str, tmp_path: Path) -> None:
     args = ["--worlds=2", "--no-oracle", "--workers=1", "--patience=2", "--planner=paper"]
     args += ["--set", f"planner.optimizer=faulty_optimizers:{name}"]
-    # A lidar far from all obstacles at first: the first decision searches. Exit code 1: it never works.
+    # A lidar far from all obstacles at first: the first decision searches. It never works: 1.
     assert mfba("sweep", "random-3", *args, "--out", str(tmp_path / "out")) == 1
     assert [row["success"] for row in rows(tmp_path / "out")] == ["false", "false"]
     assert fault in (tmp_path / "out/table.csv").read_text()
