@@ -256,9 +256,8 @@ def _report(swept: SweepResult, directory: Path) -> list[str]:
     for one in ranking:
         for reason, count in one.failures:
             print(f"{one.planner} failed in {count} of {one.runs} runs: {reason}")
-    failed = {one: sum(count for _, count in one.failures) for one in ranking}
     return [
         f"{one.planner} failed in each of its {one.runs} runs: {one.failures[0][0]}"
-        for one, count in failed.items()
-        if count == one.runs
+        for one in ranking
+        if sum(count for _, count in one.failures) == one.runs
     ]

@@ -129,9 +129,7 @@ print("done", flush=True)
 """
 
 
-def test_nodes_of_a_run_need_not_wait_for_acknowledgements(
-    ros_env: dict[str, str],
-) -> None:
+def test_nodes_of_a_run_need_not_wait_for_acknowledgements(ros_env: dict[str, str]) -> None:
     profile = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(config_path("private_discovery.xml"))}
     env = {**ros_env, **profile}
     with started(READER, env) as reader, started(ASKING, env) as asking:
