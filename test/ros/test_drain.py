@@ -2,12 +2,15 @@
 """How long a recorder goes on receiving before its end."""
 
 import time
+from pathlib import Path
 
 import pytest
 from ros_graph import Graph
+from rosgraph_msgs.msg import Clock
 
 from mfba_planner.ros.endpoints.tick_counts import are_unequal
 from mfba_planner.ros.interface import topics
+from mfba_planner.ros.nodes.recorder import Recorder
 from mfba_planner.ros.runtime.base_node import GraphNode
 from mfba_planner.ros.runtime.drain_subscriptions import BEHIND_S, QUIET_S, drain
 
@@ -51,3 +54,18 @@ def test_robots_are_compared_with_themselves() -> None:
         assert unequal(), name
         assert not unequal(()), "r1 is not of this run"
         counts[f"/r1/{name}"] = 5
+
+
+def test_a_recorder_waits_for_what_is_missing_of_a_tick(graph: Graph, tmp_path: Path) -> None:
+    clock = graph.writer(topics.CLOCK)
+    writers = [graph.writer(topic) for topic in (topics.ODOM, topics.SECTORS)]
+    recorder = graph.start(Recorder, {"output": str(tmp_path / "bag"), "sim_time": True})
+    message = Clock()
+    message.clock.sec = 1
+    clock.publish(message)
+    for writer in [*writers, writers[0]]:
+        writer.publish(writer.msg_type())
+    graph.until(lambda: recorder.writer.message_count == 4)
+    started = time.monotonic()
+    recorder.drain(graph.executor)
+    assert time.monotonic() - started >= BEHIND_S
