@@ -58,13 +58,13 @@ def test_robots_are_compared_with_themselves() -> None:
 
 def test_a_recorder_waits_for_what_is_missing_of_a_tick(graph: Graph, tmp_path: Path) -> None:
     clock = graph.writer(topics.CLOCK)
-    writers = [graph.writer(topic) for topic in (topics.ODOM, topics.SECTORS)]
+    odom, sectors = graph.writer(topics.ODOM), graph.writer(topics.SECTORS)
     recorder = graph.start(Recorder, {"output": str(tmp_path / "bag"), "sim_time": True})
     message = Clock()
     message.clock.sec = 1
     clock.publish(message)
-    for writer in [*writers, writers[0]]:
-        writer.publish(writer.msg_type())
+    for writer, topic in ((odom, topics.ODOM), (sectors, topics.SECTORS), (odom, topics.ODOM)):
+        writer.publish(topic.type())
     graph.until(lambda: recorder.writer.message_count == 4)
     started = time.monotonic()
     recorder.drain(graph.executor)
