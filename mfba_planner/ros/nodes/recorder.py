@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,11 @@ from ...recording.bag_writer import BagWriter
 from ...recording.configuration_attachment import attach_configuration
 from ...recording.message_definitions import definition_of
 from ..endpoints.robot_namespace import graph_topics
+from ..endpoints.simulated_log_times import SimulatedLogTimes, Timed
 from ..endpoints.tick_counts import are_unequal
 from ..interface import parameters, topics
 from ..interface.qos_conversion import offered
-from ..interface.serialized_message import clock_ns, has_header, header_stamp_ns, type_name
+from ..interface.serialized_message import has_header, header_stamp_ns, type_name
 from ..node_settings import RecorderSettings, names
 from ..runtime.base_node import GraphNode
 from ..runtime.drain_subscriptions import drain
@@ -39,8 +41,7 @@ class Recorder(GraphNode):
         super().__init__(topics.RECORDER, **kwargs)
         self.settings = s = parameters.declare(self, RecorderSettings(), read_only=True)
         self._facts = s.facts()
-        self._log_time_ns = self._previous_tick_ns = 0
-        self._held: list[tuple[str, bytes]] = []
+        self._log_times = SimulatedLogTimes()
         self._attached = False
         self._types: dict[str, tuple[str, OfferedQos]] = {}
         self.directory = Path(s.output) if s.output else new_run_directory()
@@ -70,22 +71,18 @@ class Recorder(GraphNode):
         self.subscribe_polled(self._polled, message_type, relative_name, deliver, profiles)
 
     def _on_clock(self, message: SerializedMessage) -> None:
-        self._previous_tick_ns = self._log_time_ns
-        self._log_time_ns = clock_ns(message.data)
-        for name, data in [*self._held, ("/clock", message.data)]:
-            self._write(name, data, self._log_time_ns)
-        self._held.clear()
+        self._write_all(self._log_times.add_clock("/clock", message))
 
     def _on_message(self, name: str, is_of_tick: bool, message: SerializedMessage) -> None:
-        log_time_ns = self._log_time_ns
-        if not self.settings.sim_time:
-            log_time_ns = message.received_ns or time.time_ns()  # not all middleware sets it
-        elif not log_time_ns:
-            self._held.append((name, message.data))  # latched before the first tick
-            return
-        elif is_of_tick and header_stamp_ns(message.data) == self._previous_tick_ns:
-            log_time_ns = self._previous_tick_ns or log_time_ns  # published after the next tick
-        self._write(name, message.data, log_time_ns)
+        if self.settings.sim_time:
+            stamp_ns = header_stamp_ns(message.data) if is_of_tick else 0
+            self._write_all(self._log_times.add(name, message, stamp_ns))
+        else:  # not all middleware sets the time of reception
+            self._write(name, message.data, message.received_ns or time.time_ns())
+
+    def _write_all(self, messages: Iterable[Timed]) -> None:
+        for message in messages:
+            self._write(*message)
 
     def _write(self, name: str, data: bytes, log_time_ns: int) -> None:
         if name in self._types:  # it had no publisher when the parameters were attached
@@ -131,8 +128,7 @@ class Recorder(GraphNode):
         """Write what was received or is held and finish the bag."""
         for _ in range(2):  # what was sent during the first poll waits for the second
             self._polled.poll()
-        for name, held in self._held:
-            self._write(name, held, time.time_ns())  # no /clock was received
+        self._write_all(self._log_times.take_held())
         self.attach_parameters(self._parameter_client.values)
         self.writer.close()
 
