@@ -23,14 +23,14 @@ from pathlib import Path
 import numpy as np
 
 from mfba_planner.core.geometry import Pose2D
-from mfba_planner.core.planner_types import Circle, Mode, Observation
+from mfba_planner.core.planner_types import Circle, Mode
 from mfba_planner.evaluation.suites.named_suites import suite
 from mfba_planner.perception.obstacle_tracker import Tracker
 from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.planner_factory import make_planner
+from mfba_planner.planning.planner_factory import make_loaded_planner, make_planner
 from mfba_planner.planning.planner_params import Method, PlannerParams
-from mfba_planner.planning.predictive_planner import Predictive, preset
+from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.simulation.lidar_perception import with_lidar
 from mfba_planner.simulation.planner_observations import observe_scan
 from mfba_planner.simulation.robot_model import Lidar
@@ -43,7 +43,7 @@ TICKS = 30
 SETTLED = 5  # scans in view after which errors count
 ROBOT_MPS = 0.8
 REACH_M = 10.0
-MEMORY_WORLD, LONGEST_TRIP = 70000, 1000  # ticks
+MEMORY_WORLD, TIMED_WORLD, LONGEST_TRIP = 70000, 90000, 1000  # ticks
 
 
 @dataclass(frozen=True)
@@ -226,44 +226,37 @@ def table(seeds: int, only: str) -> None:
         )
 
 
-def timing(rounds: int) -> None:
-    """Print the time of a scan, of a decision on it, and of the floor, measured in turn."""
-    rng, row = np.random.default_rng(0), Row(scan_m=0.01, speed=(0.1, 0.5), radius=(0.3, 0.3))
-    truth, lidar = discs(row, rng), Lidar(beams=360, range_max_m=REACH_M)
-    away = np.hypot(truth[:, 0], truth[:, 1])
-    truth[:, 2:4] = np.column_stack((-truth[:, 1], truth[:, 0])) * (0.3 / away)[:, None]
-    scans = []
-    for k in range(40):
-        turn = 0.3 * k * TICK_S / away  # on circles around the robot
-        c, s = np.cos(turn), np.sin(turn)
-        x, y = c * truth[:, 0] - s * truth[:, 1], s * truth[:, 0] + c * truth[:, 1]
-        places = list(zip(x.tolist(), y.tolist(), truth[:, 4].tolist()))
-        scan = scan_at(Pose2D(0.0, 0.0), lidar, places, None)
-        noise = rng.normal(size=360) * row.scan_m
-        scans.append(replace(scan, ranges_m=scan.ranges_m + noise))
+def timing(worlds: int) -> None:
+    """Print the time of a scan, of a decision on it, and of the floor, measured in turn.
+
+    The robot drives through worlds of ten obstacles, from its lidar, and follows its decisions.
+    """
     times: dict[str, list[float]] = {"floor": [], "tracking": [], "decision": []}
-    x, y = rng.random(360), rng.random(360)
-    pose, goal = Pose2D(0.0, 0.0), (8.0, 6.0)
-    for _ in range(rounds):
-        tracker = Tracker()
-        planner = Predictive(preset(), SensorParams(), 0)
-        for k, scan in enumerate(scans, start=1):
-            stamp = k * TICK_NS
+    x, y = np.random.default_rng(0).random((2, 360))
+    for index in range(TIMED_WORLD, TIMED_WORLD + worlds):
+        scenario = with_lidar(suite("random-10").world(index), "lidar")
+        params = scenario.planner_params(preset(PlannerParams(method=Method.PREDICTIVE)))
+        planner, sensor = make_loaded_planner(params, 0), SensorParams()
+        tracker, decision = Tracker(), None
+        world = World(scenario, params.tick_ns, params.goal_tolerance_m)
+        for _ in range(LONGEST_TRIP):
+            obs = replace(observe_scan(world, sensor), goal=scenario.goal_m)
+            assert obs.scan is not None
             start = time.perf_counter()
             np.hypot(x, y)
             hypot = time.perf_counter()
-            tracker.update(stamp, pose, scan)
-            tracker.circles(stamp, 0.3)
+            tracker.update(obs.stamp_ns, obs.pose, aligned(obs.scan, obs.pose.yaw))
+            tracker.circles(obs.stamp_ns, 0.3)
             tracked = time.perf_counter()
-            planner.plan(
-                Observation(
-                    stamp_ns=stamp, pose=pose, ranges_m=(), goal=goal, now_ns=stamp, scan=scan
-                )
-            )
+            decision = planner.plan(obs)
             decided = time.perf_counter()
             for name, span in zip(times, (hypot - start, tracked - hypot, decided - tracked)):
                 times[name].append(span)
+            if decision.mode is Mode.ARRIVED:
+                break
+            world.step(world.command(decision))
     floor = statistics.median(times["floor"])
+    print(f"\nworlds {TIMED_WORLD} to {index} of random-10, {len(times['floor'])} decisions")
     print("\n| 360 beams, ten discs | median, us | 99 %, us | median / floor |\n|---|---|---|---|")
     names = ("floor: np.hypot of 360", "tracking: update and circles", "decision with tracking")
     for name, spans in zip(names, times.values()):
@@ -298,15 +291,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seeds", type=int, default=40)
     parser.add_argument("--only", default="", help="rows whose name holds this")
-    parser.add_argument("--rounds", type=int, default=20, help="of the timing; 0: none")
+    parser.add_argument("--worlds", type=int, default=20, help="of the timing; 0: none")
     parser.add_argument("--memory", type=int, default=0, metavar="TICKS", help="only memory")
     found = parser.parse_args()
     if found.memory:
         memory(found.memory)
         return
     table(found.seeds, found.only)
-    if found.rounds:
-        timing(found.rounds)
+    if found.worlds:
+        timing(found.worlds)
 
 
 if __name__ == "__main__":

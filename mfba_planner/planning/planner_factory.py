@@ -42,3 +42,14 @@ def make_planner(
 
         return SupervisedPlanner(Predictive(params, sensor or SensorParams(), seed))
     return supervised_algorithm_1(params, seed)
+
+
+def make_loaded_planner(params: PlannerParams, seed: int) -> SupervisedPlanner:
+    """make_planner(), with all imported that otherwise the first decision imports that needs it.
+
+    It takes 0.1 s and more, for which no decision on a robot should wait.
+    """
+    if params.method is Method.PREDICTIVE:
+        import eikonalfm  # noqa: F401
+        import scipy.ndimage  # noqa: F401
+    return make_planner(params, seed=seed)

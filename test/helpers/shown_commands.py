@@ -65,7 +65,7 @@ REDUCED = {
     "python bench/robots.py": "python bench/robots.py --worlds 1 --only sectors",
     "python bench/kidnapped.py --graph 5": "python bench/kidnapped.py --graph 1 --count 1",
     "python bench/tracking.py --seeds 30": (
-        "python bench/tracking.py --seeds 1 --only 1.5 --rounds 1"
+        "python bench/tracking.py --seeds 1 --only 1.5 --worlds 1"
     ),
     "python bench/static_map.py --worlds 5": (
         "python bench/static_map.py --worlds 1 --only fast-20"

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...core.geometry import Pose2D
 from ...core.planner_types import NANO, Decision, Mode, Observation, observe
-from ...planning.planner_factory import check_usable, make_planner
+from ...planning.planner_factory import check_usable, make_loaded_planner
 from ...planning.planner_params import PlannerParams
 from ...planning.recovery import Phase
 from ..endpoints.goal_subscriptions import GoalSubscriptions
@@ -31,7 +31,7 @@ class PlannerNode(ManagedNode):
         """Raise ConfigError for a parameter that cannot be accepted."""
         super().__init__(topics.PLANNER, **kwargs)
         self.settings = s = parameters.declare(self, PlannerSettings(), read_only=True)
-        self.path_planner = make_planner(parameters.declare(self, PlannerParams()), seed=s.seed)
+        self.path_planner = make_loaded_planner(parameters.declare(self, PlannerParams()), s.seed)
         parameters.follow(self, lambda: self.path_planner.params, self._set_params, check_usable)
         params = self.path_planner.params
         self._refused_inputs = refused = RefusedInputs(self)
@@ -88,7 +88,7 @@ class PlannerNode(ManagedNode):
 
     def _set_params(self, changed: PlannerParams) -> None:
         if changed.method is not self.path_planner.params.method:
-            self.path_planner = make_planner(changed, seed=self.settings.seed)
+            self.path_planner = make_loaded_planner(changed, self.settings.seed)
         self.path_planner.params = changed
         self._inputs.set_params(changed)
         self._timer.timer_period_ns = round(self._watch_period_s() / NANO)
