@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+# An argument of a node's own: of a fleet each service of each node is told to every other one.
+NO_PARAMETER_SERVICES = "--no-parameter-services"
+
 
 def split_ros_args(args: list[str]) -> tuple[list[str], list[str]]:
     """A program's own arguments, and those from --ros-args to -- or the end.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import inspect
 import json
 import os
 import select
@@ -24,6 +25,7 @@ from ..core.child_process import end_with_parent, set_command_line
 
 MAX_BYTES = 100_000  # of one message
 _PRELOADED = (
+    "mfba_planner.ros.node_help",
     "mfba_planner.ros.nodes.recorder",
     "mfba_planner.ros.nodes.world_sim",
     "mfba_planner.ros.nodes.virtual_sensor",
@@ -48,12 +50,17 @@ def _preload() -> None:
     gc.disable()  # nothing that is imported is garbage
     for name in _PRELOADED:
         import_module(name)
+    from rcl_interfaces import srv as parameter_services
     from rclpy.type_support import check_for_type_support
+    from std_srvs.srv import SetBool, Trigger
 
     from ..ros.interface import topics
 
-    for topic in topics.GRAPH:
-        check_for_type_support(topic.type)
+    services = [one for one in vars(parameter_services).values() if hasattr(one, "Request")]
+    for kind in (*(topic.type for topic in topics.GRAPH), *services, SetBool, Trigger):
+        check_for_type_support(kind)
+    # The first line that rclpy logs in a process looks for its caller among all modules' files.
+    inspect.getframeinfo(sys._getframe())
     # Else a collection in a node would write to, and so copy, the memory that all share.
     gc.collect()
     gc.freeze()

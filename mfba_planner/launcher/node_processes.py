@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 from ..core.errors import GraphError
+from ..core.ros_arguments import NO_PARAMETER_SERVICES
 from ..scenarios.run_config import Parameters
 from .forked_process import ForkServer
 
@@ -124,12 +125,13 @@ class NodeProcesses:
         """Start a node per entry of parameters, one after the other.
 
         Names are NODE or NAMESPACE/NODE. extra_args holds more --ros-args by NODE, for all
-        namespaces.
+        namespaces. The nodes of a fleet have no services for parameters and the life cycle.
         """
+        own = [NO_PARAMETER_SERVICES] if any("/" in name for name in parameters) else []
         for name, values in parameters.items():
             path = Path(self._files.name) / f"{name.replace('/', '.')}.yaml"
             path.write_text(parameters_yaml({**values, **NO_EXTRA_SERVICES}), encoding="utf-8")
-            args = ["--ros-args", "--disable-external-lib-logs", "--params-file", str(path)]
+            args = [*own, "--ros-args", "--disable-external-lib-logs", "--params-file", str(path)]
             args += extra_args.get(name.rpartition("/")[2], [])
             self.children.append(NodeProcess(self._server, name, args, self._sink))
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..core.argument_parser import Parser
 from ..core.option_specs import Spec, walk
+from ..core.ros_arguments import NO_PARAMETER_SERVICES
 from ..perception.sensory_vector import SensorParams
 from ..planning.planner_params import PlannerParams
 from ..simulation.robot_model import Robot
@@ -38,9 +39,14 @@ def check_arguments(node: str, own: list[str]) -> None:
     """Print the help for --help, and exit. Raises ConfigError for any other argument."""
     parser = Parser(
         prog=node,
-        usage=f"{node} [-h] [--ros-args ...]",
+        usage=f"{node} [-h] [{NO_PARAMETER_SERVICES}] [--ros-args ...]",
         description=_DESCRIPTIONS[node],
         epilog=_EPILOG + "\n".join(_lines(node)),
+    )
+    parser.add_argument(
+        NO_PARAMETER_SERVICES,
+        action="store_true",
+        help="no services for parameters and the life cycle; for many nodes in one graph",
     )
     parser.parse(own)
 

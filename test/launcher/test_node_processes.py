@@ -50,6 +50,22 @@ def test_all_output_and_the_exit_of_a_node_process(server: ForkServer) -> None:
     assert lines.all[-1] == ("prints_bytes", "\ufffd\ufffd ok")
 
 
+@pytest.mark.parametrize(
+    ("names", "own"),
+    [(["describes_itself"], []), (["r1/describes_itself"], ["--no-parameter-services"])],
+)
+def test_nodes_of_a_fleet_have_no_parameter_services(
+    server: ForkServer, names: list[str], own: list[str]
+) -> None:
+    lines = Lines()
+    with NodeProcesses(server, lines, lambda: False) as processes:
+        processes.start({name: {"seed": 1} for name in names}, {})
+        for child in processes.children:
+            assert child.wait_for_exit(10.0)
+    about = lines.all[0][1]
+    assert f"['describes_itself', {', '.join(map(repr, [*own, '--ros-args']))}, " in about
+
+
 def test_a_bug_in_a_node_is_a_traceback_in_its_output(server: ForkServer) -> None:
     child = NodeProcess(server, "raises", [], Lines())
     assert child.wait_for_exit(10.0)

@@ -15,6 +15,7 @@ from launched_programs import PROGRAM, ROOT, Program
 from nav_msgs.msg import Path as PathMsg
 from rclpy.context import Context
 from ros_graph import Graph
+from std_srvs.srv import Trigger
 from waiting import wait_until
 
 from mfba_planner.core.errors import ConfigError
@@ -196,6 +197,21 @@ def test_a_misspelt_parameter_is_named(ros_env: dict[str, str]) -> None:
     assert planner.returncode == 0
 
 
+@pytest.mark.parametrize("node", ["planner", "virtual_sensor", "world_sim"])
+def test_a_node_may_go_without_the_services_of_parameters(
+    graph: Graph, ros_env: dict[str, str], node: str
+) -> None:
+    less = parameters("start_type_description_service:=false")
+    with start(node, "--no-parameter-services", *less, env=ros_env) as process:
+        graph.call(Trigger, f"{node}/ready")  # advertised last
+        services = dict(graph.probe.get_service_names_and_types())
+        process.terminate()
+        assert process.wait(timeout=60) == 0
+    own = {"planner": {"cancel"}, "world_sim": {"pause", "reset", "step"}}.get(node, set())
+    offered = {name for name in services if name.startswith(f"/{node}/")}
+    assert offered == {f"/{node}/{name}" for name in own | {"ready"}}
+
+
 def test_a_world_without_commands_gives_up_in_one_line(
     graph: Graph, ros_env: dict[str, str]
 ) -> None:
@@ -287,14 +303,14 @@ def test_help_answers_instead_of_starting_a_node(ros_env: dict[str, str], node: 
     process = start(node, "--help", env={**ros_env, "RMW_IMPLEMENTATION": "rmw_none"})
     out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (0, "")
-    assert out.startswith(f"usage: {node} [-h] [--ros-args ...]")
+    assert out.startswith(f"usage: {node} [-h] [--no-parameter-services] [--ros-args ...]")
     documented = {name for settings in PARAMETERS[node] for name, _, _ in walk(settings)}
     assert set(re.findall(r"^  ([a-z_0-9.]+) \(", out, re.MULTILINE)) == documented
 
 
 def test_an_unknown_argument_is_refused(ros_env: dict[str, str]) -> None:
     line = refused("planner", "--speed", "1.0", "--ros-args", "-p", "seed:=1", env=ros_env)
-    assert line == "planner: --speed: unknown argument; known: --help"
+    assert line == "planner: --speed: unknown argument; known: --help, --no-parameter-services"
     line = refused("recorder", "runs/mine", env=ros_env)
     assert line == "recorder: runs/mine: unknown argument; see `recorder --help`"
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """recorder: every message once, with the right log time, and the configuration."""
 
+import json
 import time
 from collections import Counter
 from contextlib import ExitStack
@@ -168,6 +169,7 @@ def test_a_parameter_client_that_gets_no_response_is_replaced(
 ) -> None:
     """As when the server has never discovered it."""
     monkeypatch.setattr(parameter_client, "RENEW_S", 0.3)
+    monkeypatch.setattr(parameter_client, "PUBLISHED_S", 0.1)
     made: list[Any] = []
     create = Recorder.create_client
 
@@ -180,11 +182,57 @@ def test_a_parameter_client_that_gets_no_response_is_replaced(
         return client
 
     monkeypatch.setattr(Recorder, "create_client", create_client)
-    graph.start(VirtualSensor, {})
-    recorder = record(graph, tmp_path / "bag", nodes="virtual_sensor")
+    graph.probe.declare_parameter("gains", [0.5, 2.0])  # of a node that does not publish them
+    recorder = record(graph, tmp_path / "bag", nodes="probe")
+    assert recorder.missing() == "parameters of probe not read yet"
     graph.until(lambda: not recorder.missing())
     assert len(made) > 1
     graph.until(lambda: not list(recorder.clients))
+    graph.stop(recorder)
+    with BagReader(tmp_path / "bag") as reader:
+        assert read_configuration(reader)["nodes"]["probe"]["gains"] == [0.5, 2.0]
+
+
+def test_what_our_nodes_publish_needs_no_service(graph: Graph, tmp_path: Path) -> None:
+    graph.start(PlannerNode, {"seed": 3}, start_parameter_services=False, namespace="robot1")
+    recorder = record(graph, tmp_path / "bag", nodes="robot1/planner", namespaces="robot1")
+    graph.until(lambda: not recorder.missing())
+    assert not list(recorder.clients)
+    graph.stop(recorder)
+    with BagReader(tmp_path / "bag") as reader:
+        configuration = read_configuration(reader)
+        assert reader.topics["/robot1/planner/parameters"].message_count == 1
+    assert configuration["nodes"]["robot1/planner"]["seed"] == 3
+
+
+def test_a_recording_has_the_parameters_as_they_are_when_it_begins(
+    graph: Graph, tmp_path: Path
+) -> None:
+    """Also one by rosbag2, which knows of no service: the topic is all that it gets."""
+    graph.start(PlannerNode, {})
+    assert graph.set_parameter("planner", "speed_mps", 0.4) == ""
+    assert graph.set_parameter("planner", "speed_mps", -1.0) != ""
+    published = graph.collect(topics.PARAMETERS["planner"])
+    recorder = record(graph, tmp_path / "bag", nodes="planner")
+    graph.until(lambda: not recorder.missing() and bool(published))
+    graph.stop(recorder)
+    assert json.loads(published[-1].data)["speed_mps"] == 0.4
+    with BagReader(tmp_path / "bag") as reader:
+        assert read_configuration(reader)["nodes"]["planner"]["speed_mps"] == 0.4
+
+
+@pytest.mark.parametrize("text", ["no JSON", "[1]"])
+def test_parameters_that_cannot_be_read_are_requested(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    monkeypatch.setattr(parameter_client, "PUBLISHED_S", 0.0)
+    topic = topics.PARAMETERS["planner"]
+    graph.writer(topic).publish(topic.type(data=text))
+    recorder = record(graph, tmp_path / "bag", nodes="planner")
+    graph.until(lambda: recorder.writer.message_count == 1)
+    assert recorder.missing() == "parameters of planner not read yet"
+    graph.start(PlannerNode, {})
+    graph.until(lambda: not recorder.missing())
 
 
 def record(graph: Graph, path: Path, **parameters: Any) -> Recorder:

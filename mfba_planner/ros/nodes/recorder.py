@@ -11,11 +11,13 @@ from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 from rclpy.executors import Executor
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import String
 
 from ...core.output_files import new_run_directory
 from ...recording.bag_qos import OfferedQos
 from ...recording.bag_writer import BagWriter
-from ...recording.configuration_attachment import attach_configuration
+from ...recording.configuration_attachment import PARAMETERS, attach_configuration
 from ...recording.message_definitions import definition_of
 from ..endpoints.robot_namespace import graph_topics
 from ..endpoints.simulated_log_times import SimulatedLogTimes, Timed
@@ -65,6 +67,8 @@ class Recorder(GraphNode):
         deliver: Deliver = partial(self._on_message, name, is_of_tick)
         if topic is topics.CLOCK and self.settings.sim_time:
             deliver = self._on_clock
+        elif topic in topics.PARAMETERS.values():
+            deliver = partial(self._on_parameters, name, relative_name)
         # In simulated time only nodes of ours publish the topics of every tick.
         foreign_writers = not (topic.every_tick and self.settings.sim_time)
         profiles = topics.recording_qos(topic, foreign_writers=foreign_writers)
@@ -79,6 +83,11 @@ class Recorder(GraphNode):
             self._write_all(self._log_times.add(name, message, stamp_ns))
         else:  # not all middleware sets the time of reception
             self._write(name, message.data, message.received_ns or time.time_ns())
+
+    def _on_parameters(self, name: str, relative_name: str, message: SerializedMessage) -> None:
+        node = relative_name.removesuffix(PARAMETERS)
+        self._parameter_client.published(node, deserialize_message(message.data, String).data)
+        self._on_message(name, False, message)
 
     def _write_all(self, messages: Iterable[Timed]) -> None:
         for message in messages:

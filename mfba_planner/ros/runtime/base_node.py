@@ -180,23 +180,31 @@ class GraphNode(Node):
         Called last in a constructor: parameters that were given but not declared are logged.
         """
         parameters.warn_of_unknown(self)
-        self._publish_parameters()
+        self._advertise_parameters()
         self._peers = peers
         self.create_service(Trigger, "~/ready", self._on_ready)
 
-    def _publish_parameters(self) -> None:
-        """Publish the parameters, latched: a recording can then be decided again."""
+    def _advertise_parameters(self) -> None:
+        """Publish the parameters, latched, now and when they change.
+
+        A recording can then be decided again, whoever makes it.
+        """
         topic = PARAMETERS.get(self._kind)
         if topic is None:
             return
-        self._parameters_publisher = self.create_publisher(
+        publisher = self.create_publisher(
             topic.type,
             topic.name,
             topic.qos,
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         )
-        text = json.dumps(parameters.values(self), sort_keys=True)
-        self._parameters_publisher.publish(topic.type(data=text))
+
+        def publish(_: object = None) -> None:
+            text = json.dumps(parameters.values(self), sort_keys=True)
+            publisher.publish(topic.type(data=text))
+
+        publish()
+        self.add_post_set_parameters_callback(publish)
 
     def announce(self, text: str) -> None:
         """Log which topics the node listens to, and what it does with them."""

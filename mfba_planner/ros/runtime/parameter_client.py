@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads all parameters of other nodes through their parameter services."""
+"""Reads all parameters of other nodes: as they publish them, or through their services."""
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -16,6 +18,7 @@ from ..interface import parameters
 from .base_node import GraphNode
 
 PERIOD_S = 0.05
+PUBLISHED_S = 1.0  # from a node's discovery; until then only what it publishes counts
 RETRY_S = 1.0  # a response can get lost while a server has not discovered its client yet
 RENEW_S = 4.0  # a client that gets none for so long is replaced: a server may never discover it
 
@@ -23,10 +26,11 @@ NodeParameters = dict[str, dict[str, Any]]  # by node, by parameter
 
 
 class ParameterClient:
-    """Requests every node's parameters until it responds; then calls on_done(values) once.
+    """Waits for all parameters of the nodes; then calls on_done(values) once.
 
-    With the two clients that this takes: rclpy's AsyncParameterClient has six per node, of which
-    every node of the graph is told.
+    Our nodes publish theirs, latched. Those of which published() is not called are requested until
+    they respond, with the two clients that this takes: rclpy's AsyncParameterClient has six per
+    node, of which every node of the graph is told.
     """
 
     def __init__(
@@ -40,17 +44,40 @@ class ParameterClient:
         self._created_s: dict[str, float] = {}
         self._nodes = nodes
         self.values: NodeParameters = {}
+        self._discovered_s: dict[str, float] = {}
         if nodes:
-            self._timer = node.create_wall_timer(PERIOD_S, self._request)
+            self._timer = node.create_wall_timer(PERIOD_S, self._on_timer)
 
     @property
     def pending(self) -> list[str]:
         """Nodes whose parameters are not read yet."""
         return sorted(self._nodes - self.values.keys())
 
-    def _request(self) -> None:
-        now = time.monotonic()
+    def published(self, name: str, text: str) -> None:
+        """Take what a node publishes on its topic of parameters; what is no JSON is ignored."""
+        with suppress(ValueError):
+            values = json.loads(text)
+            if name in self.pending and isinstance(values, dict):
+                self.values[name] = values
+
+    def _on_timer(self) -> None:
+        self._request(time.monotonic())
+        if not self.pending:
+            self._node.destroy_timer(self._timer)
+            for name in list(self._clients):
+                self._destroy(name)
+            self._on_done(self.values)
+
+    def _request(self, now: float) -> None:
+        known = self._node.get_node_names_and_namespaces()
+        below = self._node.get_namespace()
         for name in self.pending:
+            full_name = f"{below}/{name}".strip("/")
+            if any(f"{ns}/{node}".strip("/") == full_name for node, ns in known):
+                self._discovered_s.setdefault(name, now)
+            discovered_s = self._discovered_s.get(name)
+            if discovered_s is None or now - discovered_s < PUBLISHED_S:
+                continue
             if now - self._created_s.get(name, float("-inf")) >= RENEW_S:
                 self._create(name, now)
             clients = self._clients[name]
@@ -59,11 +86,6 @@ class ParameterClient:
                 self._requested_s[name] = now
                 request = clients[0].call_async(ListParameters.Request())
                 request.add_done_callback(partial(self._on_names, name))
-        if not self.pending:
-            self._node.destroy_timer(self._timer)
-            for name in list(self._clients):
-                self._destroy(name)
-            self._on_done(self.values)
 
     def _create(self, name: str, now: float) -> None:
         """Create the client of a node, or replace it."""

@@ -12,6 +12,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from ...core.interrupts import interrupts_held
+from ...core.ros_arguments import NO_PARAMETER_SERVICES, split_ros_args
 from .base_node import SPIN_S, GraphNode
 from .environment_notes import environment_notes
 from .node_executor import NodeExecutor
@@ -62,16 +63,18 @@ def wait_for_callers(
         executor.spin_once(timeout_sec=SPIN_S / 5)
 
 
-def spin_node(make_node: Callable[[], GraphNode], args: list[str]) -> int:
+def spin_node(make_node: Callable[..., GraphNode], args: list[str]) -> int:
     """Run one node until a signal or its own end; return 0. Its MfbaErrors pass through."""
     stop = StopFlag()
+    own, args = split_ros_args(args)
+    options = {"start_parameter_services": False} if NO_PARAMETER_SERVICES in own else {}
     with interrupts_held():  # by the middleware's threads, for ever
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node: GraphNode | None = None
     executor = make_executor()
     try:
         with interrupts_held():
-            node = make_node()
+            node = make_node(**options)
         for note in environment_notes(rclpy.get_default_context().get_domain_id()):
             node.get_logger().warning(note)
         executor.add_node(node)
