@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import BagError, OutputError
@@ -52,6 +53,21 @@ def _parameter_topics(reader: BagReader) -> dict[str, str]:
         and name.removesuffix(PARAMETERS).rpartition("/")[2] in _NODES
         and name.endswith(PARAMETERS)
     }
+
+
+def parameter_changes(reader: BagReader) -> dict[str, list[str]]:
+    """By node, with its namespace, the parameters that changed during the recording."""
+    names = _parameter_topics(reader)
+    first: dict[str, dict[str, Any]] = {}
+    found: dict[str, set[str]] = {}
+    for message in reader.decoded(names) if names else ():
+        with suppress(ValueError):
+            values = json.loads(message.message.data)
+            if isinstance(values, dict):
+                before = first.setdefault(node := names[message.topic], values)
+                changed = {name for name in values if values[name] != before.get(name)}
+                found[node] = found.get(node, set()) | changed
+    return {node: sorted(changed) for node, changed in found.items() if changed}
 
 
 def _from_topics(reader: BagReader) -> dict[str, Any] | None:

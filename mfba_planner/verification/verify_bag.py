@@ -22,6 +22,7 @@ from ..perception.sensory_vector import sensory_vector
 from ..planning.planner_factory import make_planner
 from ..planning.planner_params import Method
 from ..recording.bag_reader import BagReader
+from ..recording.configuration_attachment import parameter_changes
 from ..recording.fleet_topics import NO_NAMESPACE, select_robots
 from ..recording.from_messages import (
     body_velocity,
@@ -128,6 +129,7 @@ def verify_each(
                     "imported; if you trust the bag, give --allow-modules"
                 )
         messages = read_tick_messages(reader, names)
+        changes = parameter_changes(reader)
     found = {}
     for name in names:
         setup = setups[name]
@@ -139,12 +141,20 @@ def verify_each(
             inputs=_inputs(setup),
             is_simulated=setup.is_simulated,
         )
-        found[name] = _check(setup, tick_records, progress)
+        notes = [
+            f"{node}: {', '.join(changed)} changed during the recording; decided again with the "
+            "values at its begin"
+            for node, changed in changes.items()
+            if node.rpartition("/")[0] == name
+        ]
+        found[name] = _check(setup, tick_records, notes, progress)
     return found
 
 
-def _check(setup: Setup, tick_records: TickRecords, progress: Progress) -> Report:
-    faults, notes = [*tick_records.faults], [*tick_records.notes]
+def _check(
+    setup: Setup, tick_records: TickRecords, notes: list[str], progress: Progress
+) -> Report:
+    faults, notes = [*tick_records.faults], [*notes, *tick_records.notes]
     read_odom = partial(robot_pose, frame=setup.odom_frame)
     read_sectors = partial(sector_ranges, frame=setup.odom_frame)
     planner = make_planner(setup.planner, setup.sensor, setup.seed)

@@ -203,9 +203,11 @@ def test_a_node_may_go_without_the_services_of_parameters(
 ) -> None:
     less = parameters("start_type_description_service:=false")
     with start(node, "--no-parameter-services", *less, env=ros_env) as process:
-        graph.call(Trigger, f"{node}/ready")  # advertised last
-        services = dict(graph.probe.get_service_names_and_types())
-        process.terminate()
+        try:
+            graph.call(Trigger, f"{node}/ready")  # advertised last
+            services = dict(graph.probe.get_service_names_and_types())
+        finally:
+            process.terminate()
         assert process.wait(timeout=60) == 0
     own = {"planner": {"cancel"}, "world_sim": {"pause", "reset", "step"}}.get(node, set())
     offered = {name for name in services if name.startswith(f"/{node}/")}
