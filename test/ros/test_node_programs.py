@@ -152,6 +152,25 @@ def test_a_parameter_beside_a_file_counts_or_is_refused(
     assert refused("planner", *arguments, env=ros_env).startswith(line)
 
 
+def test_a_file_that_follows_a_parameter_counts_and_says_so(
+    tmp_path: Path, ros_env: dict[str, str]
+) -> None:
+    file = tmp_path / "planner.yaml"
+    file.write_text("/**: {ros__parameters: {speed_mps: 0.4}}\n")
+    given = [*parameters("speed_mps:=0.5", "step_length_m:=0.2"), "--params-file", str(file)]
+    environment = {**ros_env, "RCUTILS_LOGGING_BUFFERED_STREAM": "1"}
+    with start("planner", *given, env=environment) as planner:
+        assert planner.stdout is not None
+        line = planner.stdout.readline()
+        planner.terminate()
+        rest, err = planner.communicate(timeout=60)
+    assert line.endswith(
+        "[planner]: -p speed_mps:=0.5 has no effect: a parameter file that follows it says 0.4; "
+        "give -p after the file\n"
+    )
+    assert (rest.count("has no effect"), err, planner.returncode) == (0, "", 0)
+
+
 def test_in_a_namespace_no_option_names_the_node(tmp_path: Path, ros_env: dict[str, str]) -> None:
     file = tmp_path / "planner.yaml"
     file.write_text("/**: {ros__parameters: {speed_mps: 0.4}}\n")

@@ -21,8 +21,11 @@ def check_given_parameters(node: Node, args: list[str]) -> None:
     """Raise ConfigError for a -p NAME:=VALUE that the node has not got.
 
     rcl lets a file's section of the node's name count more than -p, which is one for all nodes;
-    and it drops a -p whose type differs from that of the same parameter in a file.
+    and it drops a -p whose type differs from that of the same parameter in a file. A file that
+    follows a -p may change what it says, as later arguments do: that is a warning.
     """
+    files = [index for index, arg in enumerate(args) if arg == "--params-file"]
+    after = {name for _, name, _ in _assignments(args[files[-1] :] if files else args)}
     given: dict[str, list[str]] = {}
     for prefix, name, text in _assignments(args):
         if prefix in ("", node.get_name()):
@@ -32,6 +35,12 @@ def check_given_parameters(node: Node, args: list[str]) -> None:
         value = None if override is None else plain(override.value)
         is_empty = override is not None and value is None  # an empty list
         if is_empty or any(_is_value(text, value) for text in texts):
+            continue
+        if name not in after and override is not None:
+            node.get_logger().warning(
+                f"-p {name}:={texts[-1]} has no effect: a parameter file that follows it says "
+                f"{value!r}; give -p after the file"
+            )
             continue
         remedy = "change it there"
         if node.get_namespace() == "/":
