@@ -102,8 +102,9 @@ SERVICES_TEXT = """\
 the topic and the nodes that are missing. `planner/ready` also fails while the planner is not
 active.
 
-All nodes except `replay` have the parameter services of ROS 2 as well (`ros2 param`). A node that is started with
-`--no-parameter-services`, as those of a fleet are, has neither these nor the services of the life cycle.
+All nodes except `replay` have the parameter services of ROS 2 as well (`ros2 param`). A node that
+is started with `--no-parameter-services`, as those of a fleet are, has neither these nor the
+services of the life cycle.
 """
 
 PARAMETERS_TEXT = """\
