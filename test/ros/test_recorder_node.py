@@ -221,6 +221,18 @@ def test_a_recording_has_the_parameters_as_they_are_when_it_begins(
         assert read_configuration(reader)["nodes"]["planner"]["speed_mps"] == 0.4
 
 
+@pytest.mark.parametrize(("name", "namespace"), [("probe", "/"), ("/probe", "/robot1")])
+def test_parameters_of_others_nodes_are_requested_where_they_are(
+    graph: Graph, tmp_path: Path, name: str, namespace: str
+) -> None:
+    settings = {"output": str(tmp_path / "bag"), "nodes": name}
+    recorder = graph.start(Recorder, settings, namespace=namespace)
+    graph.until(lambda: not recorder.missing())
+    graph.stop(recorder)
+    with BagReader(tmp_path / "bag") as reader:
+        assert set(read_configuration(reader)["nodes"]) == {"probe"}
+
+
 @pytest.mark.parametrize("text", ["no JSON", "[1]"])
 def test_parameters_that_cannot_be_read_are_requested(
     graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str

@@ -69,11 +69,11 @@ class ParameterClient:
             self._on_done(self.values)
 
     def _request(self, now: float) -> None:
-        known = self._node.get_node_names_and_namespaces()
-        below = self._node.get_namespace()
+        found = self._node.get_node_names_and_namespaces()
+        known = {f"{namespace.rstrip('/')}/{node}" for node, namespace in found}
         for name in self.pending:
-            full_name = f"{below}/{name}".strip("/")
-            if any(f"{ns}/{node}".strip("/") == full_name for node, ns in known):
+            service = self._node.resolve_service_name(f"{name}/list_parameters")
+            if service.rpartition("/")[0] in known:
                 self._discovered_s.setdefault(name, now)
             discovered_s = self._discovered_s.get(name)
             if discovered_s is None or now - discovered_s < PUBLISHED_S:
@@ -116,4 +116,7 @@ class ParameterClient:
 
 def with_full_names(values: NodeParameters, namespace: str) -> NodeParameters:
     """The same with the nodes' names below the root, of a client in this namespace."""
-    return {f"{namespace}/{name}".strip("/"): found for name, found in values.items()}
+    return {
+        (name if name.startswith("/") else f"{namespace}/{name}").strip("/"): found
+        for name, found in values.items()
+    }
