@@ -57,7 +57,11 @@ def _parameter_topics(reader: BagReader) -> dict[str, str]:
 
 def parameter_changes(reader: BagReader) -> dict[str, list[str]]:
     """By node, with its namespace, the parameters that changed during the recording."""
-    names = _parameter_topics(reader)
+    names = {
+        topic: node
+        for topic, node in _parameter_topics(reader).items()
+        if reader.topics[topic].message_count > 1  # most bags need not be read for it
+    }
     first: dict[str, dict[str, Any]] = {}
     found: dict[str, set[str]] = {}
     for message in reader.decoded(names) if names else ():
