@@ -171,13 +171,13 @@ def test_of_two_returns_in_one_direction_the_nearest_counts() -> None:
 
 
 def test_a_surface_between_two_returns_is_met_by_the_beams_between_them() -> None:
-    """A wall 0.5 m ahead of the robot, seen from 1 m behind: three beams to a lidar's one."""
+    """A wall 0.5 m ahead of the robot, from a lidar 1 m behind: three beams to a lidar's one."""
     lidar = Lidar(beams=360, x_m=-1.0)
-    seen = scan_in_base(lidar, Pose2D(0.0, 0.0), [])
-    angles = seen.angles_rad(np.arange(360))
+    scan = scan_in_base(lidar, Pose2D(0.0, 0.0), [])
+    angles = scan.angles_rad(np.arange(360))
     ahead = np.cos(angles) > 0.9
     ranges = np.where(ahead, 1.5 / np.where(ahead, np.cos(angles), 1.0), np.inf)
-    merged = merged_scan([PlacedScan(replace(seen, ranges_m=ranges))], RADIUS_M)
+    merged = merged_scan([PlacedScan(replace(scan, ranges_m=ranges))], RADIUS_M)
     bearing = merged.angles_rad(np.arange(360))
     wall = np.cos(bearing) > math.cos(math.atan(1.5 * math.tan(math.acos(0.9)) / 0.5) - 0.03)
     assert np.count_nonzero(wall) > 100
@@ -187,11 +187,11 @@ def test_a_surface_between_two_returns_is_met_by_the_beams_between_them() -> Non
 def test_a_surface_between_returns_is_ahead_and_within_range() -> None:
     """Of what lies between two returns, the part behind the merged range is not met."""
     lidar = Lidar(beams=360, x_m=-1.0, range_max_m=3.5)
-    seen = scan_in_base(lidar, Pose2D(0.0, 0.0), [])
-    angles = seen.angles_rad(np.arange(360))
+    scan = scan_in_base(lidar, Pose2D(0.0, 0.0), [])
+    angles = scan.angles_rad(np.arange(360))
     ahead = np.cos(angles) > 0.9
     ranges = np.where(ahead, 3.4 / np.where(ahead, np.cos(angles), 1.0), np.inf)
-    merged = merged_scan([PlacedScan(replace(seen, ranges_m=ranges))], RADIUS_M)
+    merged = merged_scan([PlacedScan(replace(scan, ranges_m=ranges))], RADIUS_M)
     assert merged.range_max_m == 2.5
     returns = merged.ranges_m[np.isfinite(merged.ranges_m)]
     assert returns.size > 30

@@ -140,7 +140,7 @@ def test_a_track_without_returns_is_dropped() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seen", "kept"),
+    ("visible", "kept"),
     [
         ("y-", False),  # known for less than three scans
         ("yy-", False),
@@ -152,12 +152,14 @@ def test_a_track_without_returns_is_dropped() -> None:
         ("yyyyyy-y--", False),
     ],
 )
-def test_a_track_is_dropped_when_two_scans_in_a_row_see_through_it(seen: str, kept: bool) -> None:
+def test_a_track_is_dropped_when_two_scans_in_a_row_see_through_it(
+    visible: str, kept: bool
+) -> None:
     tracker = Tracker()
-    for k, letter in enumerate(seen, start=1):
-        circles = [(0.8, 0.0, 0.3)] if letter == "y" else []
+    for k, now in enumerate(visible, start=1):
+        circles = [(0.8, 0.0, 0.3)] if now == "y" else []
         tracker.update(k * TICK_NS, Pose2D(0.0, 0.0), scan_of((0.0, 0.0), circles, 360, 0.0))
-    assert (tracker.circles(len(seen) * TICK_NS, 0.3) != ()) == kept
+    assert (tracker.circles(len(visible) * TICK_NS, 0.3) != ()) == kept
 
 
 def test_circles_are_predicted_to_now() -> None:
