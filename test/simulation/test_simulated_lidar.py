@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mfba_planner.core.errors import ConfigError
-from mfba_planner.core.geometry import Pose2D
+from mfba_planner.core.geometry import Pose2D, ray_circle_distance
 from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.recording.perceived import returns_of
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.obstacle_motion import Walls
 from mfba_planner.simulation.robot_model import FULL_CIRCLE_RAD, Lidar
-from mfba_planner.simulation.simulated_lidar import rays, scan_at
+from mfba_planner.simulation.simulated_lidar import cast_rays, rays, scan_at
 
 FRONT = math.radians(270.0)
 WALLS = Walls(lower_m=(-2.0, -1.0), upper_m=(3.0, 4.0))
@@ -100,3 +100,17 @@ def test_it_is_an_option_of_scenario_files() -> None:
     assert (lidar.beams, lidar.fov_rad) == (270, 4.7124)
     with pytest.raises(ConfigError, match=r"fov_rad=7"):
         Lidar(fov_rad=7.0)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.05, 0.9), st.floats(-3.0, 3.0))
+def test_ranges_to_one_circle_from_outside_on_it_and_inside(
+    x: float, y: float, r: float, turned_rad: float
+) -> None:
+    """Against the general formula for a ray and a circle; inside it every range is 0."""
+    found = cast_rays((0.25, -0.5), [(x, y, r)], 24, 5.0, turned_rad)
+    away, bearing = math.hypot(x - 0.25, y + 0.5), math.atan2(y + 0.5, x - 0.25)
+    for k, value in enumerate(found.tolist()):
+        off = turned_rad + (k + 0.5) * math.pi / 12.0 - bearing
+        if abs(abs(away * math.sin(off)) - r) > 1e-9 and abs(away - r) > 1e-9:
+            expected = ray_circle_distance(away, r, off)
+            assert value == pytest.approx(expected, abs=1e-7)
