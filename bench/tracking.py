@@ -28,7 +28,7 @@ from mfba_planner.evaluation.suites.named_suites import suite
 from mfba_planner.perception.obstacle_tracker import Tracker
 from mfba_planner.perception.scan_to_sectors import aligned
 from mfba_planner.perception.sensory_vector import SensorParams
-from mfba_planner.planning.planner_factory import make_loaded_planner, make_planner
+from mfba_planner.planning.planner_factory import make_loaded_planner
 from mfba_planner.planning.planner_params import Method, PlannerParams
 from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.simulation.lidar_perception import with_lidar
@@ -237,7 +237,7 @@ def timing(worlds: int) -> None:
         scenario = with_lidar(suite("random-10").world(index), "lidar")
         params = scenario.planner_params(preset(PlannerParams(method=Method.PREDICTIVE)))
         planner, sensor = make_loaded_planner(params, 0), SensorParams()
-        tracker, decision = Tracker(), None
+        tracker = Tracker()
         world = World(scenario, params.tick_ns, params.goal_tolerance_m)
         for _ in range(LONGEST_TRIP):
             obs = replace(observe_scan(world, sensor), goal=scenario.goal_m)
@@ -270,7 +270,7 @@ def memory(ticks: int) -> None:
     params = scenario.planner_params(
         preset(PlannerParams(method=Method.PREDICTIVE, speed_mps=ROBOT_MPS))
     )
-    planner, sensor = make_planner(params), SensorParams()
+    planner, sensor = make_loaded_planner(params, 0), SensorParams()
     world = World(scenario, params.tick_ns, params.goal_tolerance_m)
     goals, arrived, since = [scenario.goal_m, scenario.start_m], 0, 0
     print("\n| tick | MB | trips |\n|---|---|---|")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import BagError, OutputError
@@ -55,6 +54,15 @@ def _parameter_topics(reader: BagReader) -> dict[str, str]:
     }
 
 
+def published_parameters(text: str) -> dict[str, Any] | None:
+    """The parameters that a node publishes as text; None for what is not JSON of an object."""
+    try:
+        values = json.loads(text)
+    except ValueError:
+        return None
+    return values if isinstance(values, dict) else None
+
+
 def parameter_changes(reader: BagReader) -> dict[str, list[str]]:
     """By node, with its namespace, the parameters that changed during the recording."""
     names = {
@@ -65,12 +73,10 @@ def parameter_changes(reader: BagReader) -> dict[str, list[str]]:
     first: dict[str, dict[str, Any]] = {}
     found: dict[str, set[str]] = {}
     for message in reader.decoded(names) if names else ():
-        with suppress(ValueError):
-            values = json.loads(message.message.data)
-            if isinstance(values, dict):
-                before = first.setdefault(node := names[message.topic], values)
-                changed = {name for name in values if values[name] != before.get(name)}
-                found[node] = found.get(node, set()) | changed
+        if (values := published_parameters(message.message.data)) is not None:
+            before = first.setdefault(node := names[message.topic], values)
+            changed = {name for name in values if values[name] != before.get(name)}
+            found[node] = found.get(node, set()) | changed
     return {node: sorted(changed) for node, changed in found.items() if changed}
 
 
@@ -79,11 +85,8 @@ def _from_topics(reader: BagReader) -> dict[str, Any] | None:
     names = _parameter_topics(reader)
     nodes: dict[str, Any] = {}
     for message in reader.decoded(names) if names else ():
-        try:
-            values = json.loads(message.message.data)
-        except ValueError:
-            values = None
-        if not isinstance(values, dict):
+        values = published_parameters(message.message.data)
+        if values is None:
             raise BagError(
                 f"{reader.path}: {message.topic} is not JSON of an object; give the parameters "
                 "with `mfba verify --params-file FILE`"

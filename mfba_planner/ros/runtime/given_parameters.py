@@ -25,18 +25,14 @@ def check_given_parameters(node: Node, args: list[str]) -> None:
     follows a -p may change what it says, as later arguments do: that is a warning.
     """
     files = [index for index, arg in enumerate(args) if arg == "--params-file"]
-    after = {name for _, name, _ in _assignments(args[files[-1] :] if files else args)}
-    given: dict[str, list[str]] = {}
-    for prefix, name, text in _assignments(args):
-        if prefix in ("", node.get_name()):
-            given.setdefault(name, []).append(text)
-    for name, texts in given.items():
+    after_files = _given(node, args[files[-1] :] if files else args)
+    for name, texts in _given(node, args).items():
         override = node._parameter_overrides.get(name)
         value = None if override is None else plain(override.value)
         is_empty = override is not None and value is None  # an empty list
         if is_empty or any(_is_value(text, value) for text in texts):
             continue
-        if name not in after and override is not None:
+        if name not in after_files and override is not None:
             node.get_logger().warning(
                 f"-p {name}:={texts[-1]} has no effect: a parameter file that follows it says "
                 f"{value!r}; give -p after the file"
@@ -47,6 +43,15 @@ def check_given_parameters(node: Node, args: list[str]) -> None:
             remedy += f", or give -p {node.get_name()}:{name}:={texts[-1]}"
         says = "" if override is None else f": a parameter file says {value!r} for this node"
         raise ConfigError(f"-p {name}:={texts[-1]} has no effect{says}; {remedy}")
+
+
+def _given(node: Node, args: list[str]) -> dict[str, list[str]]:
+    """The texts of every -p for this node, by parameter."""
+    given: dict[str, list[str]] = {}
+    for prefix, name, text in _assignments(args):
+        if prefix in ("", node.get_name()):
+            given.setdefault(name, []).append(text)
+    return given
 
 
 def _assignments(args: list[str]) -> Iterator[tuple[str, str, str]]:

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -14,6 +12,7 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.client import Client
 from rclpy.parameter import parameter_value_to_python
 
+from ...recording.configuration_attachment import published_parameters
 from ..interface import parameters
 from .base_node import GraphNode
 
@@ -55,18 +54,18 @@ class ParameterClient:
 
     def published(self, name: str, text: str) -> None:
         """Take what a node publishes on its topic of parameters; what is no JSON is ignored."""
-        with suppress(ValueError):
-            values = json.loads(text)
-            if name in self.pending and isinstance(values, dict):
-                self.values[name] = values
+        values = published_parameters(text)
+        if name in self.pending and values is not None:
+            self.values[name] = values
 
     def _on_timer(self) -> None:
-        self._request(time.monotonic())
-        if not self.pending:
-            self._node.destroy_timer(self._timer)
-            for name in list(self._clients):
-                self._destroy(name)
-            self._on_done(self.values)
+        if self.pending:
+            self._request(time.monotonic())
+            return
+        self._node.destroy_timer(self._timer)
+        for name in list(self._clients):
+            self._destroy(name)
+        self._on_done(self.values)
 
     def _request(self, now: float) -> None:
         found = self._node.get_node_names_and_namespaces()
