@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Programs for a fork server's processes that start faster than nodes."""
 
+import inspect
 import os
 import signal
 import sys
@@ -26,6 +27,14 @@ def ignores_sigterm() -> int:
 def waits() -> int:
     print("up", flush=True)
     signal.pause()
+    return 0
+
+
+def knows_all_files() -> int:
+    """Whether nothing is left to look for when rclpy logs a node's first line."""
+    names = [name for name in sys.modules if name.startswith("mfba_planner.ros.nodes.")]
+    known = set(inspect.modulesbyfile.values())  # type: ignore[attr-defined]
+    print(len(names) >= 4 and known.issuperset(names), flush=True)
     return 0
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Record a bag of a real run, and make edited copies of it."""
 
+import json
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -69,6 +70,21 @@ def changed(message: RawMessage, change: Callable[[Any], None]) -> RawMessage:
     decoded = deserialize_message(message.data, kind_of(message.topic))
     change(decoded)
     return message._replace(data=serialize_message(decoded))
+
+
+def parameter_set(node: str, name: str, value: Any) -> Edit:
+    """Edit: the node publishes its parameters again at the end, one of them changed."""
+
+    def edit(messages: list[RawMessage]) -> list[RawMessage]:
+        (first,) = (m for m in messages if m.topic == f"/{node}/parameters")
+
+        def change(message: Any) -> None:
+            message.data = json.dumps({**json.loads(message.data), name: value})
+
+        again = changed(first, change)
+        return [*messages, again._replace(log_time_ns=messages[-1].log_time_ns)]
+
+    return edit
 
 
 def one_changed(topic: str, index: int, change: Callable[[Any], None]) -> Edit:

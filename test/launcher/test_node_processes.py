@@ -66,6 +66,13 @@ def test_nodes_of_a_fleet_have_no_parameter_services(
     assert f"['describes_itself', {', '.join(map(repr, [*own, '--ros-args']))}, " in about
 
 
+def test_the_first_log_line_of_a_node_process_looks_for_no_file(server: ForkServer) -> None:
+    lines = Lines()
+    child = NodeProcess(server, "knows_all_files", [], lines)
+    assert child.wait_for_exit(10.0)
+    assert lines.all == [("knows_all_files", "True")]
+
+
 def test_a_bug_in_a_node_is_a_traceback_in_its_output(server: ForkServer) -> None:
     child = NodeProcess(server, "raises", [], Lines())
     assert child.wait_for_exit(10.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from edited_bags import last_bit, one_changed, record, rewrite, set_field
+from edited_bags import last_bit, one_changed, parameter_set, record, rewrite, set_field
 from pyarrow import parquet
 from recorded_bags import FOREIGN
 from report_readers import data_of, rows_of
@@ -26,7 +26,7 @@ from mfba_planner.simulation.decision_digest import digest
 from mfba_planner.simulation.episode import Episode
 from mfba_planner.simulation.fleet import run_fleet
 from mfba_planner.simulation.obstacle_motion import center_at
-from mfba_planner.verification.verify_bag import verify
+from mfba_planner.verification.verify_bag import verify, verify_each
 
 Capture = pytest.CaptureFixture[str]
 
@@ -130,6 +130,14 @@ def test_verify_names_the_robot_that_differs(edited: Path, capsys: Capture) -> N
     assert lines(capsys, "verify", edited, "--robot", "a")[0].startswith("a: identical, ")
     with pytest.raises(BagError, match="b: not identical"):
         cli.main(["verify", str(edited), "--robot", "b"])
+
+
+def test_verify_names_the_robot_whose_parameters_changed(bag: Path, tmp_path: Path) -> None:
+    slower = rewrite(bag, tmp_path / "slower", parameter_set("b/planner", "speed_mps", 0.4))
+    notes = {robot: report.notes for robot, report in verify_each(slower).items()}
+    before = {robot: report.notes for robot, report in verify_each(bag).items()}
+    line = "b/planner: speed_mps changed during the recording; decided again with the values at "
+    assert notes == before | {"b": (f"{line}its begin", *before["b"])}
 
 
 def test_verify_names_the_robot_with_wrong_sectors(

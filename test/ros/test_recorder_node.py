@@ -195,13 +195,15 @@ def test_a_parameter_client_that_gets_no_response_is_replaced(
 
 def test_what_our_nodes_publish_needs_no_service(graph: Graph, tmp_path: Path) -> None:
     graph.start(PlannerNode, {"seed": 3}, start_parameter_services=False, namespace="robot1")
+    graph.start(PlannerNode, {"seed": 4})  # publishes too, but nobody asked for it
     recorder = record(graph, tmp_path / "bag", nodes="robot1/planner", namespaces="robot1")
-    graph.until(lambda: not recorder.missing())
+    graph.until(lambda: not recorder.missing() and recorder.writer.message_count == 2)
     assert not list(recorder.clients)
     graph.stop(recorder)
     with BagReader(tmp_path / "bag") as reader:
         configuration = read_configuration(reader)
         assert reader.topics["/robot1/planner/parameters"].message_count == 1
+    assert set(configuration["nodes"]) == {"robot1/planner"}
     assert configuration["nodes"]["robot1/planner"]["seed"] == 3
 
 

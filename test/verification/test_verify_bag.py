@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """mfba verify: an unedited bag is identical, and every edit is detected and named."""
 
-import json
 import math
 import struct
 from pathlib import Path
@@ -11,10 +10,10 @@ import numpy as np
 import pytest
 from edited_bags import (
     Edit,
-    changed,
     each_changed,
     last_bit,
     one_changed,
+    parameter_set,
     record,
     rewrite,
     set_field,
@@ -276,16 +275,7 @@ def test_verify_does_not_change_the_bag(bag: Path) -> None:
 def test_parameters_that_changed_during_the_recording_are_named(bag: Path, tmp_path: Path) -> None:
     """As after `ros2 param set /planner speed_mps 0.4`: the node publishes them again."""
 
-    def change(messages: list[RawMessage]) -> list[RawMessage]:
-        (first,) = (m for m in messages if m.topic == "/planner/parameters")
-
-        def slower(message: Any) -> None:
-            message.data = json.dumps({**json.loads(message.data), "speed_mps": 0.4})
-
-        again = changed(first, slower)
-        return [*messages, first, again._replace(log_time_ns=messages[-1].log_time_ns)]
-
-    report = verify(rewrite(bag, tmp_path / "edited", change))
+    report = verify(rewrite(bag, tmp_path / "edited", parameter_set("planner", "speed_mps", 0.4)))
     assert report.is_identical
     assert report.notes == (
         "planner: speed_mps changed during the recording; decided again with the values at its "
