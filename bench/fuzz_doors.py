@@ -126,8 +126,14 @@ def parameters(rng: Rng, _: Path) -> None:
     for _k in range(int(rng.integers(1, 4))):
         name = pick(rng, [*_PLANNER, *(f"sensor:{key}" for key in _SENSOR)])
         value: Any = pick(rng, VALUES)
-        if rng.integers(2):
+        kind = rng.integers(6)
+        default = (_PLANNER | {f"sensor:{key}": known for key, known in _SENSOR.items()})[name]
+        if kind == 0:
             value = float(rng.normal()) * 10.0 ** int(rng.integers(-9, 10))
+        elif kind > 1 and isinstance(default, float):  # most often one that may be good
+            value = default * float(np.exp(rng.normal() * pick(rng, [0.1, 1.0, 4.0])))
+        elif kind > 1 and isinstance(default, int):
+            value = int(default + rng.integers(-2, 4))
         changes[name] = value if rng.integers(2) else str(value)
     if rng.integers(2):
         words = ["empty", "--driver", "core"]

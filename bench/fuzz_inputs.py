@@ -47,7 +47,7 @@ def changed_data(rng: Rng, data: Any) -> Any:
         )
         kind = rng.integers(12)
         if kind > 5:  # most often a value that may still be good
-            if isinstance(holder[key], (int, float)) and abs(holder[key]) < 1e300:
+            if _is_moderate(holder[key]):
                 holder[key] = float(
                     holder[key] + rng.normal() * pick(rng, [1e-9, 0.1, 1.0, 100.0])
                 )
@@ -57,13 +57,18 @@ def changed_data(rng: Rng, data: Any) -> Any:
             holder[str(pick(rng, VALUES))] = holder.pop(key)
         elif kind == 1:
             holder.insert(key, copy.deepcopy(holder[key]))
-        elif kind == 2 and isinstance(holder[key], (int, float)):
+        elif kind == 2 and _is_moderate(holder[key]):
             holder[key] = holder[key] * pick(rng, [-1, 0, 1e-6, 10, 1e6]) + pick(rng, [0, 1e-9, 1])
         elif kind == 3:
             holder[key] = [copy.deepcopy(holder[key])] * int(pick(rng, [1, 2, 50]))
         else:
             holder[key] = copy.deepcopy(pick(rng, VALUES))
     return data
+
+
+def _is_moderate(value: Any) -> bool:
+    """Whether it is a number that arithmetic with floats does not refuse."""
+    return isinstance(value, (int, float)) and abs(value) < 1e300
 
 
 def _holders(data: Any) -> list[Any]:
