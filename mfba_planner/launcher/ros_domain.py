@@ -14,7 +14,6 @@ from pathlib import Path
 from ..core.errors import GraphError
 from ..core.shipped_files import config_path
 from .ros_environment import ignored_settings, private_environment, require_isolating_middleware
-from .shared_memory import remove_abandoned
 
 # Domains above 101 map to ports that Linux gives to any program. Each process starts its search
 # at another id and goes round, so that a domain is not reused at once.
@@ -77,12 +76,11 @@ def private_domain(note: Callable[[str], None] = _print_note) -> Iterator[int]:
     """Claim a domain, and set it for this process and its children; discovery is local only.
 
     Settings that could undo this are not in force meanwhile, and are named to note() in one
-    line: a simulated run must not command a robot. What killed nodes have left in shared memory
-    is removed. Raises GraphError for middleware that cannot be isolated.
+    line: a simulated run must not command a robot. Raises GraphError for middleware that cannot
+    be isolated.
     """
     require_isolating_middleware()
     require_network()
-    remove_abandoned()
     if ignored := ignored_settings():
         note(f"ignored, since a run is private: {', '.join(ignored)}")
     domain, lock = claim_domain()

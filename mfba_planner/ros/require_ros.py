@@ -7,6 +7,7 @@ import os
 from ..core.broken_library import explain_broken_library
 from ..core.errors import ConfigError
 from .log_directory import choose_log_directory
+from .shared_memory import require_shared_memory
 
 # With any other value rcutils prints an error for every line that a node logs.
 _LOG_SWITCHES = (
@@ -14,10 +15,6 @@ _LOG_SWITCHES = (
     "RCUTILS_LOGGING_BUFFERED_STREAM",
     "RCUTILS_COLORIZED_OUTPUT",
 )
-_SHARED_MEMORY = "/dev/shm"
-# Some pages that tracing and middleware write to at once: a process without them ends with a bus
-# error, before or after its first line. With less than they would like, they use UDP.
-_SHARED_MEMORY_BYTES = 2**16
 
 
 def _require_ros() -> None:
@@ -29,7 +26,7 @@ def _require_ros() -> None:
         if (value := os.environ.get(switch) or "0") not in ("0", "1"):
             raise ConfigError(f"{switch}={value}: neither 0 nor 1; give one of them or unset it")
     choose_log_directory()
-    _require_shared_memory()
+    require_shared_memory()
     name = os.environ.get("RMW_IMPLEMENTATION")
     try:
         if name:
@@ -51,22 +48,6 @@ def _require_ros() -> None:
         raise ConfigError(
             f"{reason}; source a ROS 2 workspace or pip install -r requirements-ros.txt"
         ) from None
-
-
-def _require_shared_memory() -> None:
-    """Raise ConfigError when shared memory is full."""
-    try:
-        status = os.statvfs(_SHARED_MEMORY)
-    except OSError:
-        return  # the middleware says so, and uses UDP
-    free = status.f_bavail * status.f_frsize
-    # Zero blocks: a file system without a limit.
-    if status.f_blocks and free < _SHARED_MEMORY_BYTES:
-        raise ConfigError(
-            f"{_SHARED_MEMORY}: {free // 1024} kB free, and nodes need "
-            f"{_SHARED_MEMORY_BYTES // 1024}; remove what fills it (`fastdds shm clean`) or make "
-            "it larger"
-        )
 
 
 _require_ros()

@@ -15,8 +15,9 @@ from waiting import wait_until
 
 from mfba_planner.core.errors import ConfigError, InputError
 from mfba_planner.launcher.simulate_launch_description import ARGUMENTS, launch_parameters
-from mfba_planner.ros import log_directory, require_ros
+from mfba_planner.ros import log_directory
 from mfba_planner.ros.runtime.environment_notes import environment_notes
+from mfba_planner.ros.shared_memory import require_shared_memory
 
 NOT_UTF8 = os.fsdecode(b"b\xe9d")
 NO_PICTURE = ("empty", "--driver", "in-process", "--no-picture")
@@ -163,17 +164,19 @@ def test_a_node_logs_what_its_environment_means(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("free", [0, 15])
-def test_full_shared_memory_is_refused(monkeypatch: pytest.MonkeyPatch, free: int) -> None:
+def test_full_shared_memory_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, free: int
+) -> None:
     """Fast DDS and tracing would end the process with a bus error."""
     status = list(os.statvfs("/dev/shm"))
     status[1], status[2], status[4] = 4096, 1024, free  # f_frsize, f_blocks, f_bavail
     monkeypatch.setattr("os.statvfs", lambda _: os.statvfs_result(status))
-    with pytest.raises(ConfigError, match=f"^/dev/shm: {free * 4} kB free, and nodes need 64; "):
-        require_ros._require_shared_memory()
+    with pytest.raises(ConfigError, match=f"^{tmp_path}: {free * 4} kB free, and nodes need 64; "):
+        require_shared_memory(tmp_path)
     status[4] = 16
-    require_ros._require_shared_memory()
+    require_shared_memory(tmp_path)
     status[2] = status[4] = 0  # no limit
-    require_ros._require_shared_memory()
+    require_shared_memory(tmp_path)
 
 
 def closed(name: str, *args: str, cwd: Path, close: str) -> "subprocess.CompletedProcess[str]":

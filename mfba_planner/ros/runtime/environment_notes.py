@@ -7,7 +7,8 @@ import os
 import re
 from pathlib import Path
 
-SHARED_MEMORY = Path("/dev/shm")
+from ..shared_memory import SHARED_MEMORY
+
 # RTPS port mapping: first port of domain 0, ports per domain.
 _FIRST_PORT, _PORTS = 7400, 250
 

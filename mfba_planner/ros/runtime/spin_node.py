@@ -13,6 +13,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from ...core.interrupts import interrupts_held
 from ...core.ros_arguments import NO_PARAMETER_SERVICES, split_ros_args
+from ..shared_memory import remove_abandoned
 from .base_node import SPIN_S, GraphNode
 from .environment_notes import environment_notes
 from .node_executor import NodeExecutor
@@ -68,6 +69,7 @@ def spin_node(make_node: Callable[..., GraphNode], args: list[str]) -> int:
     stop = StopFlag()
     own, args = split_ros_args(args)
     options = {"start_parameter_services": False} if NO_PARAMETER_SERVICES in own else {}
+    remove_abandoned()
     with interrupts_held():  # by the middleware's threads, for ever
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node: GraphNode | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Removes what killed nodes have left in shared memory: half a megabyte for each.
+"""Shared memory: what killed nodes have left is removed, half a megabyte for each.
 
 Fast DDS keeps, in one directory, a segment for every participant and a port for every address
 that it reads from. Each has a file whose lock the system drops when its process ends, even after
@@ -9,16 +9,43 @@ kill -9; the names are those of Fast DDS 2. A file that nobody locks belongs to 
 from __future__ import annotations
 
 import fcntl
+import math
 import os
 import re
 import time
 from contextlib import suppress
 from pathlib import Path
 
+from ..core.errors import ConfigError
+
 SHARED_MEMORY = Path("/dev/shm")
+# Some pages that tracing and middleware write to at once: a process without them ends with a bus
+# error, before or after its first line. With less than they would like, they use UDP.
+_NEEDED_BYTES = 2**16
 # A file is made before it is locked, in some microseconds.
 _LEAST_AGE_S = 10.0
 _LOCK = re.compile(r"(fastrtps_(?:[0-9a-f]{16}|port\d+))_(?:el|sl)")
+
+
+def require_shared_memory(directory: Path = SHARED_MEMORY) -> None:
+    """Raise ConfigError when shared memory is full, also without what killed nodes have left."""
+    if _free_bytes(directory) >= _NEEDED_BYTES:
+        return
+    remove_abandoned(directory)
+    if (free := _free_bytes(directory)) < _NEEDED_BYTES:
+        raise ConfigError(
+            f"{directory}: {free // 1024:.0f} kB free, and nodes need {_NEEDED_BYTES // 1024}; "
+            "remove what fills it (`fastdds shm clean`) or make it larger"
+        )
+
+
+def _free_bytes(directory: Path) -> float:
+    try:
+        status = os.statvfs(directory)
+    except OSError:
+        return math.inf  # the middleware says so, and uses UDP
+    # Zero blocks: a file system without a limit.
+    return status.f_bavail * status.f_frsize if status.f_blocks else math.inf
 
 
 def remove_abandoned(directory: Path = SHARED_MEMORY) -> int:

@@ -11,12 +11,16 @@ import sys
 from pathlib import Path
 
 import pytest
+from launched_programs import Program
 from rclpy.context import Context
 from rclpy.node import Node
-from waiting import claim_domain
+from waiting import claim_domain, wait_until
 
-from mfba_planner.launcher.ros_domain import private_domain
-from mfba_planner.launcher.shared_memory import SHARED_MEMORY, remove_abandoned
+from mfba_planner.ros.shared_memory import (
+    SHARED_MEMORY,
+    remove_abandoned,
+    require_shared_memory,
+)
 
 _KILLED = """
 import os, signal
@@ -37,6 +41,11 @@ def locks_in(text: str) -> list[Path]:
     return [Path(name) for name in re.findall(rf"{SHARED_MEMORY}/fastrtps_\w+_(?:el|sl)\b", text)]
 
 
+def memory_with(lock: Path) -> Path:
+    """The segment or port that a lock file belongs to."""
+    return lock.with_name(lock.name[:-3])
+
+
 def of_age(path: Path, age_s: float = 60.0) -> Path:
     """The file, made if need be, last changed so long ago."""
     path.touch()
@@ -49,7 +58,7 @@ def memory_of(directory: Path, name: str, suffix: str = "_el", age_s: float = 60
     return [of_age(directory / name, age_s), of_age(directory / f"{name}{suffix}", age_s)]
 
 
-def test_a_run_removes_what_a_killed_node_left_and_not_what_a_live_one_has() -> None:
+def test_a_node_removes_what_a_killed_one_left_and_not_what_a_live_one_has(tmp_path: Path) -> None:
     """With Fast DDS itself: its names, and its locks."""
     domain, lock = claim_domain()
     context = Context()
@@ -68,11 +77,10 @@ def test_a_run_removes_what_a_killed_node_left_and_not_what_a_live_one_has() -> 
         assert len(live) >= 2
         for path in (*left, *live):
             of_age(path)
-        with private_domain():
-            assert not [path for path in left if path.exists()]
-            assert not [path for path in left if path.with_name(path.name[:-3]).exists()]
-            assert all(path.exists() for path in live)
-            assert all(path.with_name(path.name[:-3]).exists() for path in live)
+        with Program("virtual_sensor", cwd=tmp_path):
+            wait_until(lambda: not any(path.exists() for path in left))
+        assert not [path for path in left if memory_with(path).exists()]
+        assert all(path.exists() and memory_with(path).exists() for path in live)
     finally:
         node.destroy_node()
         context.shutdown()
@@ -92,7 +100,7 @@ def _open_files() -> str:
 
 @pytest.mark.parametrize("suffix", ["_el", "_sl"])
 @pytest.mark.parametrize("name", [SEGMENT, "fastrtps_port7000"])
-def test_what_nobody_locks_is_removed(tmp_path: Path, name: str, suffix: str) -> None:
+def test_what_no_process_locks_is_removed(tmp_path: Path, name: str, suffix: str) -> None:
     memory_of(tmp_path, name, suffix)
     assert remove_abandoned(tmp_path) == 1
     assert not list(tmp_path.iterdir())
@@ -156,3 +164,18 @@ def test_files_of_other_programs_stay(tmp_path: Path) -> None:
 
 def test_a_directory_that_is_missing_holds_nothing(tmp_path: Path) -> None:
     assert remove_abandoned(tmp_path / "none") == 0
+
+
+def test_memory_is_full_only_without_what_is_abandoned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory, _ = memory_of(tmp_path, SEGMENT)
+    status = list(os.statvfs(tmp_path))
+
+    def statvfs(_path: Path) -> os.statvfs_result:
+        status[1], status[2], status[4] = 4096, 1024, 15 if memory.exists() else 16
+        return os.statvfs_result(status)
+
+    monkeypatch.setattr(os, "statvfs", statvfs)
+    require_shared_memory(tmp_path)
+    assert not memory.exists()
