@@ -40,12 +40,11 @@ class ManualRun:
         self._stack = ExitStack()
 
     def __enter__(self) -> ManualRun:
-        domain = self._stack.enter_context(private_domain())
-        self.monitor = self._stack.enter_context(GraphMonitor(domain))
+        self.domain = self._stack.enter_context(private_domain())
+        self.monitor = self._stack.enter_context(GraphMonitor(self.domain))
         keep_line = lambda name, line: self._lines.append(f"{name}: {line}")  # noqa: E731
         server = self._stack.enter_context(ForkServer())
         self.processes = self._stack.enter_context(NodeProcesses(server, keep_line, lambda: False))
-        self._deadline = time.monotonic() + TIMEOUT_S
         return self
 
     def __exit__(
@@ -58,16 +57,21 @@ class ManualRun:
 
     def until(self, done: Callable[[], Any], what: str) -> None:
         """Spin until done; AssertionError with the nodes' last lines after TIMEOUT_S."""
+        deadline = time.monotonic() + TIMEOUT_S
         while not done():
-            if time.monotonic() > self._deadline:
+            if time.monotonic() > deadline:
                 raise AssertionError(f"{what}: never\n" + "\n".join(self._lines[-20:]))
             self.monitor.spin(0.01)
+
+    def wait(self, delay_s: float) -> None:
+        """Spin for so long."""
+        due = time.monotonic() + delay_s
+        self.until(lambda: time.monotonic() >= due, "delay")
 
     def start(self, names: Sequence[str] = ALL, delays_s: Sequence[float] = ()) -> None:
         """Start the nodes in this sequence, each after a delay; then end the pause."""
         for name, delay_s in zip(names, [*delays_s, *[0.0] * len(names)]):
-            due = time.monotonic() + delay_s
-            self.until(lambda due=due: time.monotonic() >= due, "delay")  # type: ignore[misc]
+            self.wait(delay_s)
             self.processes.start({name: self.parameters[name]}, {})
         for name, question in self.monitor.call_ready(ALL).items():
             ready = lambda q=question: (a := q.response()) is not None and a.success  # noqa: E731
