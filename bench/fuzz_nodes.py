@@ -163,6 +163,16 @@ def _change_odometry(rng: Rng, message: Odometry) -> bool:
     return any(bad.values())
 
 
+def _contradicts_itself(message: LaserScan) -> bool:
+    """Whether the angles make another number of beams than there are ranges."""
+    beams, step = len(message.ranges), message.angle_increment
+    turn_rad = message.angle_max - message.angle_min
+    if (beams == 1 and 0.0 in (turn_rad, step)) or message.angle_min == message.angle_max == 0.0:
+        return False  # some drivers leave them out
+    # One more or less is a driver's rounding, of which large scans have more.
+    return not (step and abs(turn_rad / step + 1.0 - beams) <= max(1.5, 0.1 * beams))
+
+
 def _change_scan(rng: Rng, message: LaserScan) -> bool:
     """Change some fields; return whether the result must not be driven on."""
     bad: dict[str, bool] = {}
@@ -177,7 +187,7 @@ def _change_scan(rng: Rng, message: LaserScan) -> bool:
             bad["ranges"] = True
         elif kind == 2:
             message.ranges = [pick(rng, [1.0, math.inf])] * int(pick(rng, [0, 1, 7, 5000, 70_000]))
-            bad["ranges"] = True
+            bad["ranges"] = False
         elif kind == 3:
             value = pick(rng, _FLOATS)
             name = pick(rng, _SCAN_FIELDS)
@@ -186,4 +196,5 @@ def _change_scan(rng: Rng, message: LaserScan) -> bool:
         else:
             message.header.stamp = time_msg(int(pick(rng, [0, 1, 2**31 * 10**9 - 1])))
             bad["stamp"] = True
+    bad["beams"] = _contradicts_itself(message)
     return any(bad.values())

@@ -40,7 +40,7 @@ from memory import resident_mb
 from rclpy.context import Context
 from rclpy.node import Node
 
-from mfba_planner.core.geometry import Point
+from mfba_planner.core.geometry import Point, distance
 from mfba_planner.core.planner_types import NANO
 from mfba_planner.launcher.in_process_driver import run_in_process
 from mfba_planner.launcher.ros_domain import private_domain
@@ -51,7 +51,7 @@ from mfba_planner.ros.shared_memory import SHARED_MEMORY
 from mfba_planner.scenarios.run_config import Driver, RunConfig, with_perception
 from mfba_planner.scenarios.scenario_files import load_scenario
 from mfba_planner.simulation.robot_model import Lidar
-from mfba_planner.simulation.scenario import Kidnapping
+from mfba_planner.simulation.scenario import Kidnapping, Scenario
 
 READINGS = 20
 MOST_MB, MOST_DESCRIPTORS, MOST_SHARED_MB = 5.0, 2, 1.0
@@ -135,7 +135,7 @@ def in_process(ticks: int, root: Path) -> bool:
     params = PlannerParams(step_length_m=0.001, speed_mps=0.8)
     tick_s = params.tick_ns * NANO
     back = tuple(
-        Kidnapping(at_s=k * TICKS_TO_START * tick_s, to_m=scenario.start_m)
+        _free_place(scenario, k * TICKS_TO_START * tick_s)
         for k in range(1, ticks // TICKS_TO_START + 1)
     )
     scenario = replace(scenario, kidnappings=back, time_limit_s=ticks * tick_s)
@@ -155,6 +155,17 @@ def in_process(ticks: int, root: Path) -> bool:
         )
     print(f"{took_s:.0f} s")
     return readings.growth() | bool(missing_ticks(root / "bag", params.tick_ns))
+
+
+def _free_place(scenario: Scenario, at_s: float) -> Kidnapping:
+    """Near the start at that time."""
+    circles = scenario.enlarged(at_s)
+    x, y = scenario.start_m
+    for k in range(1000):
+        place = x + 0.05 * (k % 30), y + 0.05 * (k // 30)
+        if all(distance(place, center) > radius + 0.1 for center, radius in circles):
+            return Kidnapping(at_s=at_s, to_m=place)
+    raise AssertionError(f"no free place at {at_s} s")
 
 
 class Disturber:

@@ -204,7 +204,7 @@ def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF
         )
     unset = first == last == 0.0 or (count == 1 and (first == last or increment == 0.0))
     spanned = count if unset else (last - first) / increment + 1.0
-    if abs(spanned - count) > max(2.0, 0.02 * count):
+    if abs(spanned - count) > max(1.5, 0.02 * count):
         raise InputError(
             f"scan holds {count} ranges, but angle_min={first:g}, angle_max={last:g} and "
             f"angle_increment={increment:g} make {spanned:.0f}; check the lidar driver"

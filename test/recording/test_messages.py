@@ -406,6 +406,20 @@ def test_a_range_finder_of_one_beam_is_accepted() -> None:
         assert from_messages.laser_scan(a_scan(1, **values)).ranges_m.tolist() == [1.0]
 
 
+@pytest.mark.parametrize("count", [1, 4, 50])
+def test_a_small_scan_may_be_one_beam_off_and_not_two(count: int) -> None:
+    """Ranges of one beam, of which the angles make three, told the robot what is ahead."""
+    for off, accepted in ((-1, True), (1, True), (-2, False), (2, False)):
+        message = a_scan(
+            count, angle_min=-0.5, angle_increment=0.1, angle_max=-0.5 + 0.1 * (count - 1 + off)
+        )
+        if accepted:
+            assert from_messages.laser_scan(message).ranges_m.size == count
+        else:
+            with pytest.raises(InputError, match=rf"^scan holds {count} ranges, but "):
+                from_messages.laser_scan(message)
+
+
 @pytest.mark.parametrize("count", [1, 2, 90])
 def test_beams_in_clockwise_sequence_keep_their_directions(count: int) -> None:
     increment = -math.pi / 180.0
