@@ -19,6 +19,7 @@ from . import atomic_files, bag_metadata, bag_qos
 from .bag_metadata import BagFile, BagMetadata, BagTopic
 from .bag_qos import OfferedQos
 from .message_definitions import Definition, definition_of
+from .packed_chunk_index import pack_last_chunk_index
 
 CHUNK_BYTES = 512 * 1024
 MAX_CHUNK_AGE_S = 0.8  # the limit is 1 s; 0.2 s are left for a late timer
@@ -196,6 +197,7 @@ class BagWriter:
         """End the chunk in progress and write it to the file."""
         with self._writing():
             self._writer.flush()
+        pack_last_chunk_index(self._writer)
         self._stored_count += self._pending_count
         self._pending_count = self._pending_bytes = 0
         self._empty_since_ns = self._last_call_ns or 0
