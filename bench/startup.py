@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import statistics
 import subprocess
@@ -34,11 +35,12 @@ ROWS: dict[str, list[str]] = {
     "report": [MFBA, "report", "recorded", "--out", NEW_PAGE],
     "--help": [MFBA, "--help"],
 }
+READY = re.compile(r"nodes are ready after ([\d.]+) s")  # from the start of the first one
 SLOW_US = 5000  # of --imports
 
 
-def seconds(row: list[str], directory: Path, *options: str) -> tuple[float, str]:
-    """Wall time of a row and what it wrote to stderr. RuntimeError where it fails."""
+def seconds(row: list[str], directory: Path, *options: str) -> tuple[float, str, str]:
+    """Wall time of a row, what it wrote to stdout and stderr. RuntimeError where it fails."""
     shutil.rmtree(directory / NEW, ignore_errors=True)
     (directory / NEW_PAGE).unlink(missing_ok=True)
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
@@ -53,7 +55,7 @@ def seconds(row: list[str], directory: Path, *options: str) -> tuple[float, str]
     took = time.perf_counter() - started
     if done.returncode:
         raise RuntimeError(f"{row[1:]}: exit code {done.returncode}: {done.stderr}")
-    return took, done.stderr
+    return took, done.stdout, done.stderr
 
 
 def fleet(directory: Path, robots: int) -> list[str]:
@@ -82,7 +84,7 @@ def main() -> None:
             rows[f"run, {options.robots} robots"] = fleet(directory, options.robots)
         seconds([MFBA, "run", "case1", "--planner=paper", "--out", "recorded"], directory)
         if options.imports:
-            _, lines = seconds(ROWS[options.imports], directory, "-X", "importtime")
+            _, _, lines = seconds(ROWS[options.imports], directory, "-X", "importtime")
             for line in lines.splitlines():
                 fields = line.removeprefix("import time:").split("|")
                 if len(fields) == 3 and fields[1].strip().isdigit() and int(fields[1]) > SLOW_US:
@@ -91,13 +93,15 @@ def main() -> None:
         taken: dict[str, list[float]] = {name: [] for name in rows}
         for number in range(options.rounds + 1):
             for name, row in rows.items():
-                took, _ = seconds(row, directory)
+                took, lines, _ = seconds(row, directory)
                 if number:
                     taken[name].append(took)
-    print(f"{options.rounds} rounds{'':<15}seconds               ratio to `node`")
+                if number and (ready := READY.search(lines)):
+                    taken.setdefault(f"{name}: ready", []).append(float(ready[1]))
+    print(f"{options.rounds} rounds{'':<21}seconds               ratio to `node`")
     for name, times in taken.items():
         ratios = [one / floor for one, floor in zip(times, taken["node"])]
-        print(f"{name:<22}{_spread(times)}   {_spread(ratios)}")
+        print(f"{name:<28}{_spread(times)}   {_spread(ratios)}")
 
 
 def _spread(values: list[float]) -> str:

@@ -50,8 +50,9 @@ def run_multi_process(run: Run, fork_server: ForkServer) -> None:
         ) as node_processes,
     ):
         run.console.print_line(f"starting the nodes; watch with ROS_DOMAIN_ID={domain}")
+        driver = _MultiProcessDriver(run, monitor, node_processes, list(parameters))
         node_processes.start(parameters, run.request.node_args)
-        ticks = _MultiProcessDriver(run, monitor, node_processes, list(parameters)).run()
+        ticks = driver.run()
     if not config.real_time:
         require_complete(run.directory, ticks)
 
@@ -62,6 +63,7 @@ class _MultiProcessDriver:
     def __init__(
         self, run: Run, monitor: GraphMonitor, node_processes: NodeProcesses, nodes: Sequence[str]
     ) -> None:
+        self._started_at = time.monotonic()
         self._run = run
         self._monitor = monitor
         self._node_processes = node_processes
@@ -121,6 +123,8 @@ class _MultiProcessDriver:
             lambda: "not ready: " + "; ".join(f"{name}: {what}" for name, what in missing.items()),
         )
         self._node_processes.remove_parameter_files()
+        took_s = time.monotonic() - self._started_at
+        self._run.console.print_line(f"{len(ready_calls)} nodes are ready after {took_s:.1f} s")
 
     def _resume_world(self) -> None:
         pause_call = self._monitor.call_pause(False)

@@ -2,6 +2,7 @@
 """The launcher end to end: real processes and real DDS make the core's decisions."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -73,6 +74,8 @@ def test_multi_process_run_equals_the_core_s(
     assert result["result"]["success"] is True
     assert result["result"]["ticks"] == len(expected.ticks)
     assert result["driver"] == "multi-process"
+    (ready_s,) = re.findall(r"^4 nodes are ready after (\d+\.\d) s$", done.stdout, re.MULTILINE)
+    assert 0.0 < float(ready_s) < 60.0
     assert result["extra"]["ticks_per_s"] > 0
     assert f"{scenario}, {algorithm}, seed 3, multi-process driver" in done.stdout
     assert "[world_sim] INFO: run over: goal_reached" in done.stdout
