@@ -62,6 +62,16 @@ _CLOSEST = {
     ],
     "core/option_specs": ["core/test_option_specs"],
     "recording/tick_table": ["cli/test_cli_export"],
+    **{
+        f"recording/{name}": ["recording/test_bag_formats"]
+        for name in ("library_file", "ros1_file", "rosbags_definitions", "sqlite_file")
+    },
+    "recording/read_perceived": ["verification/test_redecide", "recording/test_run_bag"],
+    "recording/params_file": ["cli/test_cli_decide"],
+    "planning/peers/vfh": ["planning/test_peers"],
+    "planning/peers/dwa": ["planning/test_peers"],
+    "planning/peers/orca": ["planning/test_peers"],
+    "planning/peers/apf": ["planning/test_peers"],
 }  # fmt: skip
 # Without processes and DDS, so that a test is a matter of seconds.
 _FAST = (
@@ -69,9 +79,14 @@ _FAST = (
     "evaluation", "recording", "verification",
 )  # fmt: skip
 _MOST_FILES = 5
+# Behind the closest: short runs of every kind, which notice what moves a robot.
+_RUNS = "simulation/test_stored_runs"
+_MOVING = ("swarm", "perception", "planning", "simulation")
 SLOW = "not 200_seeds and not fig_1_runs_both"
 TIMEOUT_S = 120  # of CPU; a busy machine kills no mutant
-MEMORY = 2 * 2**30  # bytes; a mutant may allocate without end
+MEMORY = (
+    8 * 2**30
+)  # bytes of addresses, as threads reserve much; a mutant may allocate without end
 
 
 def module_path(module: str) -> Path:
@@ -84,15 +99,22 @@ def tests_of(module: str) -> tuple[str, ...]:
     """Files below test/ that import the module, the closest first; else those of its importers.
 
     Closest is a file of the same name, then one of the same room, then the one that imports least.
+    Stored runs come last. ValueError for a module that none of them reaches.
     """
-    if module in _CLOSEST:
-        return tuple(_CLOSEST[module])
+    runs = (_RUNS,) if module.startswith(_MOVING) else ()
+    found = (*(_CLOSEST.get(module) or _nearest(module)), *runs)
+    if not found:
+        raise ValueError(f"{module}: no test; name one in _CLOSEST")
+    return tuple(dict.fromkeys(found))
+
+
+def _nearest(module: str) -> list[str]:
     level, known, found = [module], {module}, list[str]()
     while level and not found:
         found = [test for name in level for test in _importing_tests(name)]
         level = [name for one in level for name in _importers(one) if name not in known]
         known.update(level)
-    return tuple(dict.fromkeys(found))[:_MOST_FILES]
+    return list(dict.fromkeys(found))[:_MOST_FILES]
 
 
 def _importing_tests(module: str) -> list[str]:
