@@ -3,21 +3,45 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 import shown_commands
 from project import ROOT
 from shown_commands import PAGES, reduced
 
-FUZZ, MUTATION = shown_commands.commands(PAGES["docs/trust.md"])
+FUZZ, *SOAKS, MUTATION = shown_commands.commands(PAGES["docs/trust.md"])
 
 
 def test_fuzzing_prints_counts(tmp_path: Path) -> None:
     lines = shown_commands.script(reduced(FUZZ), tmp_path).splitlines()
     assert [line.partition(" cases")[0] for line in lines] == ["scenario: 10", "parameters: 10"]
     assert "failed" not in "".join(lines)
+
+
+@pytest.mark.parametrize("command", SOAKS, ids=lambda words: words[2])
+def test_a_soak_reads_its_processes_and_counts_ticks(command: list[str], tmp_path: Path) -> None:
+    """Whether memory is flat is not known after some seconds."""
+    words = reduced(command)
+    done = subprocess.run(
+        [sys.executable, ROOT / words[1], *words[2:]],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    nodes = ["all nodes"]
+    if words[2] == "disturbed":
+        nodes = ["recorder", "world_sim", "virtual_sensor"]
+    for name in nodes:
+        assert re.search(rf"^{name} +\d+ readings +[+-][\d.]+ MB", done.stdout, re.M), done.stderr
+    (last,) = re.findall(r"^/odom: ticks 1 to (\d+), 0 missing", done.stdout, re.M)
+    assert int(last) >= 350
+    assert done.returncode == int("flat and whole" not in done.stdout)
 
 
 def test_a_mutation_test_is_kept_and_resumed(tmp_path: Path) -> None:

@@ -62,6 +62,12 @@ REDUCED = {
     "python bench/mutation.py --sample 150 --budget 1300 --jobs 1 --out runs/sample.jsonl": (
         "python bench/mutation.py swarm/search_region --sample 3 --jobs 1 --out sample.jsonl"
     ),
+    "python bench/soak.py in-process --ticks 1000000": (
+        "python bench/soak.py in-process --ticks 2000"
+    ),
+    "python bench/soak.py disturbed --hours 8 --speed 20": (
+        "python bench/soak.py disturbed --hours 0.01 --speed 20 --every 0.3"
+    ),
     "python bench/robots.py": "python bench/robots.py --worlds 1 --only sectors",
     "python bench/kidnapped.py --graph 5": "python bench/kidnapped.py --graph 1 --count 1",
     "python bench/tracking.py --seeds 30": (

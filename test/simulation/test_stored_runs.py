@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,7 @@ RUNS: dict[str, Callable[[], Episode]] = {
     ),
     "without velocities": lambda: swept(NoVelocities, suite("random-10").world(9), "lidar", 30),
     **{
-        name: lambda name=name: swept(find_factory(name), suite("random-20").world(6), "lidar", 40)
+        name: partial(swept, find_factory(name), suite("random-20").world(6), "lidar", 40)
         for name in ("dwa", "orca", "vfh", "apf")
     },
     "fleet": lambda: fleet(80),
