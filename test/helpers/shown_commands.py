@@ -128,12 +128,12 @@ def reduced(command: list[str]) -> list[str]:
     return shlex.split(REDUCED.get(" ".join(command), " ".join(map(shlex.quote, command))))
 
 
-def script(command: list[str], cwd: Path, *, code: int = 0) -> str:
-    """Run `python bench/...` in cwd; return its stdout."""
+def script(command: list[str], cwd: Path, *paths: Path, code: int = 0) -> str:
+    """Run `python bench/...` in cwd, with more paths to import from; return its stdout."""
     done = subprocess.run(
         [sys.executable, ROOT / command[1], *command[2:]],
         cwd=cwd,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (*paths, ROOT)))},
         capture_output=True,
         text=True,
         timeout=600,
