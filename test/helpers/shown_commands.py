@@ -24,6 +24,20 @@ _ONE_SUITE = "--worlds 2 --first 10184"
 REDUCED = {
     ".venv/bin/mfba sim case2 --seeds 100": ".venv/bin/mfba sim case2 --seeds 3",
     "mfba sim walled --seeds 100": ("mfba sim walled --seeds 3"),
+    ".venv/bin/mfba sim hall.yaml --seeds 20": ".venv/bin/mfba sim hall.yaml --seeds 2",
+    ".venv/bin/mfba sim crossing.yaml --seeds 20": ".venv/bin/mfba sim crossing.yaml --seeds 2",
+    # Ten robots with a lidar each; the page also simulates and runs three of them.
+    ".venv/bin/mfba sim swap --seeds 3": ".venv/bin/mfba sim swap --seeds 2 --planner paper",
+    ".venv/bin/mfba run swap --seed 3 --out runs/swap": (
+        ".venv/bin/mfba run swap --seed 3 --planner paper --out runs/swap"
+    ),
+    # cli/test_cli_animate.py makes one of the default size.
+    ".venv/bin/mfba animate runs/watched runs/watched.webp": (
+        ".venv/bin/mfba animate runs/watched runs/watched.webp --fps 4 --width 320"
+    ),
+    ".venv/bin/mfba animate runs/case2 runs/case2.webp": (
+        ".venv/bin/mfba animate runs/case2 runs/case2.webp --fps 4 --width 320"
+    ),
     "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 100": (
         "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 4 --workers 1"
     ),
