@@ -31,6 +31,31 @@ REDUCED = {
     ".venv/bin/mfba run swap --seed 3 --out runs/swap": (
         ".venv/bin/mfba run swap --seed 3 --planner paper --out runs/swap"
     ),
+    # Starting two workers and the processes in which they run planners takes longer than the work.
+    ".venv/bin/mfba sweep random-10 --planner paper --planner predictive --worlds 6 "
+    "--out runs/sweep": (
+        ".venv/bin/mfba sweep random-10 --planner paper --planner predictive --worlds 4 "
+        "--workers 1 --out runs/sweep"
+    ),
+    ".venv/bin/mfba sweep random-10 --planner paper --planner predictive --worlds 4 "
+    "--out runs/few": (
+        ".venv/bin/mfba sweep random-10 --planner paper --planner predictive --worlds 4 "
+        "--workers 1 --out runs/few"
+    ),
+    ".venv/bin/mfba compare paper F5 --quick --worlds 6 --budget 25": (
+        ".venv/bin/mfba compare paper F5 --quick --worlds 6 --budget 25 --workers 1"
+    ),
+    ".venv/bin/mfba sensitivity --quick": ".venv/bin/mfba sensitivity --quick --workers 1",
+    ".venv/bin/mfba sweep worlds --planner predictive --planner paper --planner orca "
+    "--planner dwa --set planner.speed_mps=1 --out runs/barn": (
+        ".venv/bin/mfba sweep worlds --planner predictive --planner paper --planner orca "
+        "--planner dwa --set planner.speed_mps=1 --workers 1 --out runs/barn"
+    ),
+    ".venv/bin/mfba sweep crossings --planner predictive --planner orca "
+    "--set planner.speed_mps=1 --out runs/people": (
+        ".venv/bin/mfba sweep crossings --planner predictive --planner orca "
+        "--set planner.speed_mps=1 --workers 1 --out runs/people"
+    ),
     # cli/test_cli_animate.py makes one of the default size.
     ".venv/bin/mfba animate runs/watched runs/watched.webp": (
         ".venv/bin/mfba animate runs/watched runs/watched.webp --fps 4 --width 320"

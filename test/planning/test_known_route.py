@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -40,6 +41,7 @@ def place(goal: Point, walls: tuple[Segment, ...]) -> Scenario:
     )  # fmt: skip
 
 
+@cache
 def driven(scenario: Scenario, *, known: bool) -> Episode:
     params = replace(PARAMS, known_map=known)
     return simulate(scenario, planner=params, sensor=SensorParams(), seed=0)
