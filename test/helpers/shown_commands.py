@@ -7,10 +7,11 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
+import forked_commands
 from project import ROOT
 
-MFBA = Path(sys.executable).parent / "mfba"
 # README and docs, except the generated pages (docs/reference).
 PAGES = {
     str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
@@ -189,17 +190,11 @@ def mfba_arguments(command: list[str]) -> list[str] | None:
 
 def mfba(arguments: list[str], cwd: Path, *, code: int = 0) -> str:
     """Run `mfba` in cwd; return stdout and stderr."""
-    done = subprocess.run(
-        [MFBA, *arguments],
-        cwd=cwd,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=180,
-        check=False,
-    )
-    assert done.returncode == code, f"mfba {arguments}\n{done.stdout}"
-    return done.stdout
+    with NamedTemporaryFile() as output:
+        found = forked_commands.mfba(arguments, cwd, Path(output.name), 180.0)
+        printed = output.read().decode()
+    assert found == code, f"mfba {arguments}\n{printed}"
+    return printed
 
 
 def python(code: str, cwd: Path) -> str:
