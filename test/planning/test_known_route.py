@@ -105,6 +105,7 @@ def test_a_wall_that_is_gone_is_driven_through() -> None:
     assert abs(next(t.pose.y for t in episode.ticks if t.pose.x > 5.0)) < 3.0
 
 
+@pytest.mark.no_cover
 def test_a_wall_that_is_not_in_the_map_is_not_touched() -> None:
     scenario = place((10.0, 0.0), LONG_WALL)
     params = scenario.planner_params(PARAMS)
