@@ -10,7 +10,7 @@ from dataclasses import replace
 from mfba_planner.evaluation.suites.named_suites import Suite
 from mfba_planner.simulation.scenario import Scenario
 
-LENGTH_M, LIMIT_S = 1.5, 6.0
+LENGTH_M, LIMIT_S = 1.0, 3.0
 
 _whole = Suite.world
 
