@@ -29,8 +29,7 @@ from mfba_planner.planning.planner_registry import make
 COUNTS = (1, 3, 10, 30, 100, 300, 1000)
 STEPWISE = "dwa, step by step"
 NAMES = ("predictive", "orca", "dwa", STEPWISE)
-ARRANGEMENTS = 20
-FEWEST = 3 * ARRANGEMENTS  # rounds; in the first third every planner meets its arrangement
+ARRANGEMENTS = 20  # fewer for fewer than three rounds of each
 PATIENCE_S = 3600.0
 RATE_SUITE, RATE_ROUNDS = "random-10", 3
 
@@ -87,18 +86,20 @@ def measure_costs(rounds: int) -> Costs:
 def _measure(rounds: int, _: None) -> Costs:
     """CPU times, all in turn: a machine whose speed drifts slows all alike."""
     median_us: dict[str, list[float]] = {name: [] for name in NAMES}
+    different = min(ARRANGEMENTS, max(1, rounds // 3))
+    fewest = 3 * different  # in the first third every planner meets its arrangement
     for count in COUNTS:
-        subjects = {name: _deciding(name, count) for name in NAMES}
+        subjects = {name: _deciding(name, count, different) for name in NAMES}
         taken: dict[str, list[int]] = {name: [] for name in NAMES}
-        for k in range(max(FEWEST, min(rounds, 20 * rounds // count))):
+        for k in range(max(fewest, min(rounds, 20 * rounds // count))):
             for name, once in subjects.items():
                 taken[name].append(_taken(once, k))
         for name in NAMES:
-            median_us[name].append(statistics.median(taken[name][ARRANGEMENTS:]) / 1e3)
-    again, repeated_ns = _deciding(NAMES[0], 10), []
-    for k in range(max(FEWEST, 20 * rounds)):
+            median_us[name].append(statistics.median(taken[name][different:]) / 1e3)
+    again, repeated_ns = _deciding(NAMES[0], 10, different), []
+    for k in range(max(fewest, 20 * rounds)):
         repeated_ns.append(_taken(again, k))
-    return Costs(COUNTS, median_us, rounds, statistics.median(repeated_ns[ARRANGEMENTS:]) / 1e3)
+    return Costs(COUNTS, median_us, rounds, statistics.median(repeated_ns[different:]) / 1e3)
 
 
 def _taken(once: Callable[[int], object], k: int) -> int:
@@ -108,15 +109,15 @@ def _taken(once: Callable[[int], object], k: int) -> int:
     return time.process_time_ns() - start_ns
 
 
-def _deciding(name: str, count: int) -> Callable[[int], object]:
+def _deciding(name: str, count: int, different: int) -> Callable[[int], object]:
     """Decisions of as many planners as there are arrangements, the same ones for every name."""
     rng = np.random.default_rng(count)
-    crowds = [arrangement(count, rng) for _ in range(ARRANGEMENTS)]
+    crowds = [arrangement(count, rng) for _ in range(different)]
     planners = [_planner(name) for _ in crowds]
     calls = iter(range(10**9))
 
     def once(stamp: int) -> object:
-        number = next(calls) % ARRANGEMENTS
+        number = next(calls) % different
         return planners[number].plan(
             Observation(
                 stamp_ns=stamp, now_ns=stamp, pose=Pose2D(1.0, 2.0), ranges_m=(), goal=(9.0, 9.0),

@@ -2,6 +2,7 @@
 """Fixtures that isolate tests from each other and from any other ROS graph."""
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,11 +10,31 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from project import ROOT
 from waiting import claim_domain
 
 # A busy machine is not a failure: no property has a time limit of its own.
 settings.register_profile("mfba", deadline=None)
 settings.load_profile("mfba")
+
+# Tests of the rooms that `make test` measures (pyproject.toml), and of bags read again.
+MEASURED = {
+    "verification",
+    *re.findall(r'"mfba_planner\.(\w+)"', (ROOT / "pyproject.toml").read_text("utf-8")),
+}
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Measure coverage of MEASURED tests only; of all for `make coverage`.
+
+    Lines that only tests of commands and of the graph run have no test of their own, and
+    measuring costs up to twice the time.
+    """
+    if config.getoption("cov_config", None) != ".coveragerc":
+        return
+    for item in items:
+        if item.path.relative_to(ROOT / "test").parts[0] not in MEASURED:
+            item.add_marker("no_cover")
 
 
 @pytest.fixture(scope="session", autouse=True)

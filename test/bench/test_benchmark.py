@@ -271,10 +271,12 @@ def test_bad_scales_and_pages_are_refused_before_any_work(tmp_path: Path) -> Non
 
 
 def test_all_suites_are_made_by_the_command_shown_but_for_its_numbers(tmp_path: Path) -> None:
+    """And for the lengths of its trips, here and in the processes of its workers."""
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "benchmark.md").write_text(PAGE, encoding="utf-8")
     assert shown_commands.reduced(WHOLE) != WHOLE
-    shown_commands.script(shown_commands.reduced(WHOLE), tmp_path)
+    short = ROOT / "test" / "helpers" / "short_trips"
+    shown_commands.script(shown_commands.reduced(WHOLE), tmp_path, short)
     page = (tmp_path / "docs" / "benchmark.md").read_text(encoding="utf-8")
     for suite in IN_THE_OPEN:
         labels = lines(page, f"### {suite}")  # of suites with cases: "case 1: orca"

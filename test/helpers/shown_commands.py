@@ -7,10 +7,11 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
+import forked_commands
 from project import ROOT
 
-MFBA = Path(sys.executable).parent / "mfba"
 # README and docs, except the generated pages (docs/reference).
 PAGES = {
     str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
@@ -24,6 +25,45 @@ _ONE_SUITE = "--worlds 2 --first 10184"
 REDUCED = {
     ".venv/bin/mfba sim case2 --seeds 100": ".venv/bin/mfba sim case2 --seeds 3",
     "mfba sim walled --seeds 100": ("mfba sim walled --seeds 3"),
+    ".venv/bin/mfba sim hall.yaml --seeds 20": ".venv/bin/mfba sim hall.yaml --seeds 2",
+    ".venv/bin/mfba sim crossing.yaml --seeds 20": ".venv/bin/mfba sim crossing.yaml --seeds 2",
+    # Ten robots with a lidar each; the page also simulates and runs three of them.
+    ".venv/bin/mfba sim swap --seeds 3": ".venv/bin/mfba sim swap --seeds 2 --planner paper",
+    ".venv/bin/mfba run swap --seed 3 --out runs/swap": (
+        ".venv/bin/mfba run swap --seed 3 --planner paper --out runs/swap"
+    ),
+    # Starting two workers and the processes in which they run planners takes longer than the work.
+    ".venv/bin/mfba sweep random-10 --planner paper --planner predictive --worlds 6 "
+    "--out runs/sweep": (
+        ".venv/bin/mfba sweep random-10 --planner paper --planner predictive --worlds 4 "
+        "--workers 1 --out runs/sweep"
+    ),
+    ".venv/bin/mfba sweep random-10 --planner paper --planner predictive --worlds 4 "
+    "--out runs/few": (
+        ".venv/bin/mfba sweep random-10 --planner paper --planner predictive --worlds 4 "
+        "--workers 1 --out runs/few"
+    ),
+    ".venv/bin/mfba compare paper F5 --quick --worlds 6 --budget 25": (
+        ".venv/bin/mfba compare paper F5 --quick --worlds 6 --budget 25 --workers 1"
+    ),
+    ".venv/bin/mfba sensitivity --quick": ".venv/bin/mfba sensitivity --quick --workers 1",
+    ".venv/bin/mfba sweep worlds --planner predictive --planner paper --planner orca "
+    "--planner dwa --set planner.speed_mps=1 --out runs/barn": (
+        ".venv/bin/mfba sweep worlds --planner predictive --planner paper --planner orca "
+        "--planner dwa --set planner.speed_mps=1 --workers 1 --out runs/barn"
+    ),
+    ".venv/bin/mfba sweep crossings --planner predictive --planner orca "
+    "--set planner.speed_mps=1 --out runs/people": (
+        ".venv/bin/mfba sweep crossings --planner predictive --planner orca "
+        "--set planner.speed_mps=1 --workers 1 --out runs/people"
+    ),
+    # cli/test_cli_animate.py makes one of the default size.
+    ".venv/bin/mfba animate runs/watched runs/watched.webp": (
+        ".venv/bin/mfba animate runs/watched runs/watched.webp --fps 4 --width 320"
+    ),
+    ".venv/bin/mfba animate runs/case2 runs/case2.webp": (
+        ".venv/bin/mfba animate runs/case2 runs/case2.webp --fps 4 --width 320"
+    ),
     "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 100": (
         "mfba sweep random-10 --planner skirt:Skirt --planner paper --worlds 4 --workers 1"
     ),
@@ -134,12 +174,12 @@ def reduced(command: list[str]) -> list[str]:
     return shlex.split(REDUCED.get(" ".join(command), " ".join(map(shlex.quote, command))))
 
 
-def script(command: list[str], cwd: Path, *, code: int = 0) -> str:
-    """Run `python bench/...` in cwd; return its stdout."""
+def script(command: list[str], cwd: Path, *paths: Path, code: int = 0) -> str:
+    """Run `python bench/...` in cwd, with more paths to import from; return its stdout."""
     done = subprocess.run(
         [sys.executable, ROOT / command[1], *command[2:]],
         cwd=cwd,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (*paths, ROOT)))},
         capture_output=True,
         text=True,
         timeout=600,
@@ -156,17 +196,11 @@ def mfba_arguments(command: list[str]) -> list[str] | None:
 
 def mfba(arguments: list[str], cwd: Path, *, code: int = 0) -> str:
     """Run `mfba` in cwd; return stdout and stderr."""
-    done = subprocess.run(
-        [MFBA, *arguments],
-        cwd=cwd,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=180,
-        check=False,
-    )
-    assert done.returncode == code, f"mfba {arguments}\n{done.stdout}"
-    return done.stdout
+    with NamedTemporaryFile() as output:
+        found = forked_commands.mfba(arguments, cwd, Path(output.name), 180.0)
+        printed = output.read().decode()
+    assert found == code, f"mfba {arguments}\n{printed}"
+    return printed
 
 
 def python(code: str, cwd: Path) -> str:

@@ -2,6 +2,10 @@
 """Adapters of libraries conform and minimize; skipped where a library is not installed."""
 
 import math
+import os
+import subprocess
+import sys
+from functools import cache
 from importlib import import_module
 from statistics import median
 
@@ -10,6 +14,7 @@ import pytest
 from numpy.random import PCG64, Generator
 
 from mfba_planner.core.errors import ConfigError, OptimizerError
+from mfba_planner.evaluation import optimizer_check
 from mfba_planner.evaluation.optimizer_check import check
 from mfba_planner.optimizers.registry import find_optimizer, optimize, require_optimizer
 from mfba_planner.swarm.bat_swarm import BatParams, Box, Disc
@@ -46,18 +51,52 @@ def of_installed(name: str) -> str:
     return name
 
 
+def conforming(library: str) -> list[str]:
+    return [name for name in CONFORMING if name.startswith(f"{library}:")]
+
+
+@cache
+def digests_elsewhere(library: str) -> list[list[str]]:
+    """Two digests for each conforming name of a library, with PYTHONHASHSEED 0 and 1.
+
+    As the check makes them, but in two processes for all names: importing mealpy takes seconds.
+    """
+    program = (
+        "import sys; from mfba_planner.evaluation.optimizer_check import print_digest\n"
+        "for name in sys.argv[1:]: print_digest(name)"
+    )
+    lines = [
+        subprocess.run(
+            [sys.executable, "-c", program, *conforming(library)],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=120,
+        ).stdout.splitlines()
+        for seed in "01"
+    ]
+    return [list(pair) for pair in zip(*lines, strict=True)]
+
+
 @pytest.mark.parametrize("name", CONFORMING)
-def test_an_adapter_has_every_property(name: str) -> None:
-    found = list(check(of_installed(name), 30.0))
+def test_an_adapter_has_every_property(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    library = of_installed(name).partition(":")[0]
+    same = conforming(library)
+    if len(same) > 1:
+        pair = digests_elsewhere(library)[same.index(name)]
+        monkeypatch.setattr(optimizer_check, "_digests_elsewhere", lambda *_: (pair, ""))
+    found = list(check(name, 30.0))
     assert len(found) == 10
     assert all(one.ok for one in found), [str(one) for one in found if not one.ok]
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_an_algorithm_that_does_not_conform_is_refused_with_the_reason(name: str) -> None:
-    faults = {one.name: one.text for one in check(of_installed(name), 30.0) if not one.ok}
     expected, text = REFUSED[name]
-    assert text in faults[expected]
+    found = next(one for one in check(of_installed(name), 30.0) if one.name == expected)
+    assert not found.ok
+    assert text in found.text
 
 
 @pytest.mark.parametrize("name", CONFORMING)

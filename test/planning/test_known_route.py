@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -40,6 +41,7 @@ def place(goal: Point, walls: tuple[Segment, ...]) -> Scenario:
     )  # fmt: skip
 
 
+@cache
 def driven(scenario: Scenario, *, known: bool) -> Episode:
     params = replace(PARAMS, known_map=known)
     return simulate(scenario, planner=params, sensor=SensorParams(), seed=0)
@@ -103,6 +105,7 @@ def test_a_wall_that_is_gone_is_driven_through() -> None:
     assert abs(next(t.pose.y for t in episode.ticks if t.pose.x > 5.0)) < 3.0
 
 
+@pytest.mark.no_cover
 def test_a_wall_that_is_not_in_the_map_is_not_touched() -> None:
     scenario = place((10.0, 0.0), LONG_WALL)
     params = scenario.planner_params(PARAMS)

@@ -45,6 +45,7 @@ def digest_of(method: str, optimizer: str, scenario: str = "case1", seed: int = 
     return digest(episode.ticks)
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("method", ["paper", "predictive"])
 def test_each_optimizer_arrives_and_decides_differently(method: str) -> None:
     found = {name: digest_of(method, name) for name in ("bats", "ba", *OTHERS)}
@@ -64,6 +65,7 @@ def test_the_optimizer_refines_in_the_open_and_through_the_map() -> None:
         assert len(set(found.values())) == 3, scenario
 
 
+@pytest.mark.no_cover
 def test_none_is_the_ablation_without_bats() -> None:
     world, planner = with_perception(load_scenario("rooms"), params("predictive", "none"))
     plain = replace(planner, optimizer="bats")

@@ -52,6 +52,7 @@ def test_a_goal_behind_the_robot_is_reached(reverse: bool) -> None:
     assert evaluate(episode).success
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize("radius_m", [0.22, 0.3])
 def test_a_narrow_pocket_is_left_backwards(reverse: bool, radius_m: float) -> None:

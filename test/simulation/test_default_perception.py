@@ -28,6 +28,7 @@ def simulated(scenario: Scenario, planner: PlannerParams, seed: int = 0) -> Epis
     return simulate(scenario, planner=planner, sensor=SensorParams(), seed=seed)
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("drive", Drive)
 @pytest.mark.parametrize("radius_m", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("obstacle_m", [0.05, 0.3, 1.0])
@@ -57,6 +58,7 @@ def test_every_decision_says_what_it_perceived_by() -> None:
         assert ticks[-1].mode is Mode.ARRIVED
 
 
+@pytest.mark.no_cover
 def test_case_2_by_default_is_within_a_hundredth_of_the_optimum() -> None:
     optimum_m = 17.0  # by the oracle, rounded up: see docs/reproduction.md
     lengths = [
