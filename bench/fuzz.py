@@ -5,7 +5,8 @@
     .venv/bin/python bench/fuzz.py scenario --first 4711 --cases 1    # that case again
 
 A case is a number: with the door's name it is the seed of its random changes. A failure is any
-exception but an MfbaError, a line break in its message, or more CPU than 2 s. Exit code 1 then.
+exception but an MfbaError, a RuntimeWarning, a line break in its message, or more CPU than 2 s.
+Exit code 1 then. Ctrl-C or SIGTERM end a door early, and its counts are printed.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 import zlib
 from collections import Counter
 from collections.abc import Sequence
@@ -80,6 +82,8 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--budget", type=float, default=1e9, help="s per door; no case after")
     options = parser.parse_args(argv)
     signal.signal(signal.SIGALRM, _on_alarm)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    warnings.simplefilter("error", RuntimeWarning)
     set_logger_level("", LoggingSeverity.FATAL)
     failed = 0
     for name in options.doors:
@@ -87,9 +91,12 @@ def main(argv: Sequence[str]) -> int:
         with tempfile.TemporaryDirectory(prefix="mfba_fuzz_") as directory:
             door = DOORS[name](Path(directory))
             for number in range(options.first, options.first + options.cases):
-                found = run_case(name, door, number)
+                try:
+                    found = run_case(name, door, number)
+                except KeyboardInterrupt:
+                    break
                 counts[found if found in ("accepted", "refused") else "failed"] += 1
-                if number == options.first + options.cases // 10:
+                if number - options.first <= min(options.cases // 10, 1000):
                     early_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
                 if found not in ("accepted", "refused"):
                     print(f"{name} {number}: {found}", flush=True)

@@ -223,7 +223,7 @@ def laser_scan(message: Any, frame: str = "", no_return: NoReturn = NoReturn.INF
         angle_min_rad=first,
         angle_increment_rad=increment,
         range_min_m=message.range_min,
-        range_max_m=message.range_max,
+        range_max_m=min(message.range_max, FARTHEST_M),  # a return from beyond tells nothing
         time_increment_s=time_s,
     )
 

@@ -29,6 +29,7 @@ from mfba_planner.core.errors import InputError
 from mfba_planner.core.geometry import Pose2D, rotated, wrap_angle
 from mfba_planner.core.planner_types import Decision, Mode
 from mfba_planner.perception.scan_beams import BeamReader
+from mfba_planner.perception.scan_coverage import usable_beams
 from mfba_planner.perception.sensory_vector import SensorParams, sensory_vector
 from mfba_planner.recording import from_messages
 from mfba_planner.ros.interface import to_messages
@@ -404,6 +405,15 @@ def test_a_range_finder_of_one_beam_is_accepted() -> None:
     for limits in ((0.3, 0.3, 0.0), (0.3, 0.3, 0.1), (0.0, 0.0, 0.0), (0.0, 0.1, 0.1)):
         values = dict(zip(("angle_min", "angle_max", "angle_increment"), limits))
         assert from_messages.laser_scan(a_scan(1, **values)).ranges_m.tolist() == [1.0]
+
+
+@pytest.mark.parametrize("range_max", [math.inf, 3e38, 1e8])
+def test_a_return_from_farther_than_any_place_tells_nothing(range_max: float) -> None:
+    """Cells of a map are counted in integers, which such a distance overflowed."""
+    message = a_scan(4, range_max=range_max)
+    message.ranges = [3e38, 2e7, 9e6, math.inf]
+    scan = from_messages.laser_scan(message)
+    assert usable_beams(scan).tolist() == [False, False, True, True]
 
 
 @pytest.mark.parametrize("count", [1, 4, 50])
