@@ -139,6 +139,7 @@ def test_the_newest_scan_that_is_old_enough_is_compared() -> None:
     assert free.appeared(*beyond, 0.0).tolist() == [True]  # too young, but there is no other
     free.pass_time(0.3)
     free.add(surface, AT_REST, 0.0)
+    assert free.appeared(*beyond, 0.0).tolist() == [True]  # both too young: the oldest
     free.pass_time(0.4)
     assert free.appeared(*beyond, 0.0).tolist() == [True]  # of 0.7 s and 0.4 s
     free.pass_time(0.2)

@@ -28,8 +28,8 @@ def surfaces_of(ranges: np.ndarray) -> Surfaces | None:
 def wall(bearing: float, away_m: float, half: float) -> np.ndarray:
     """Ranges of a straight wall around a bearing; nothing elsewhere."""
     off = np.remainder(np.arange(BEAMS) * STEP - bearing + math.pi, 2.0 * math.pi) - math.pi
-    seen = np.abs(off) < half
-    return np.where(seen, away_m / np.where(seen, np.cos(off), 1.0), np.inf)
+    observed = np.abs(off) < half
+    return np.where(observed, away_m / np.where(observed, np.cos(off), 1.0), np.inf)
 
 
 @settings(max_examples=40, deadline=None)
