@@ -136,11 +136,18 @@ def _importing_tests(module: str) -> list[str]:
 def _importers(module: str) -> list[str]:
     """The modules of the package that import this one."""
     name = module.rpartition("/")[2]
-    named = re.compile(rf"^from [\w.]*\.{name} import|^from \.[\w.]* import .*\b{name}\b", re.M)
+    named = rf"^ *from [\w.]*\.{name} import|^ *from \.[\w.]* import .*\b{name}\b"
+    # Planners and readers of bags are loaded by the name in a string.
+    return _that_hold(named) or _that_hold(rf"\"(?:[\w.]*\.)?{name}[:\"]")
+
+
+def _that_hold(expression: str) -> list[str]:
+    """The modules of the package with a match of a regular expression."""
+    pattern = re.compile(expression, re.MULTILINE)
     return [
         str(path.relative_to(PACKAGE).with_suffix(""))
         for path in sorted(PACKAGE.rglob("*.py"))
-        if named.search(path.read_text(encoding="utf-8"))
+        if pattern.search(path.read_text(encoding="utf-8"))
     ]
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 
 from mfba_planner.perception.bilinear_grid import BilinearGrid
-from mfba_planner.perception.distance_field import distance_field
+from mfba_planner.perception.distance_field import DistanceField, distance_field
 
 ORIGIN, CELL_M, CAP_M = (-1.0, 2.0), 0.25, 1.0
 
@@ -54,3 +54,15 @@ def test_distances_in_a_rectangle_are_those_to_the_nearest_point(
     true = np.sqrt((at_x[..., None] - x) ** 2 + (at_y[..., None] - y) ** 2).min(axis=-1)
     assert field.distance_m == pytest.approx(np.minimum(true, CAP_M), abs=1.42 * cell_m)
     assert (field.distance_m >= np.minimum(true, CAP_M) - 1e-5).all()
+
+
+def test_a_field_is_bilinear_between_the_middles_and_the_cap_beyond_them() -> None:
+    """The last middles are outside: there is no cell beyond them."""
+    values = np.array([[0.0, 0.25, 0.5], [0.5, 0.0, 0.75]])
+    field = DistanceField((0.0, 0.0), 1.0, values, CAP_M)
+    x = np.array([0.5, 1.0, 1.0, 2.25, 0.49, 1.0, 2.5, 1.0, 1.0])
+    y = np.array([0.5, 0.5, 1.0, 0.5, 0.75, 0.49, 1.0, 1.5, 1.6])
+    expected = [0.0, 0.125, 0.1875, 0.4375, *(CAP_M,) * 5]
+    assert field.at(x, y) == pytest.approx(expected)
+    for one_x, one_y, one in zip(x, y, expected):  # inside alone, and outside alone
+        assert field.at(np.array([one_x]), np.array([one_y])) == pytest.approx([one])

@@ -2,6 +2,7 @@
 """Circle fits against circles whose returns and tangents are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -64,4 +65,57 @@ def test_two_tangents_and_the_nearest_point_give_the_start() -> None:
     start = start_of(np.zeros((2, 1)), np.full(1, d), right, left, sure, np.full(1, 9.0))
     r = d * math.sin(half) / (1.0 - math.sin(half))
     expected = [(d + r) * math.cos(bearing), (d + r) * math.sin(bearing), r]
+    assert start[:, 0].tolist() == pytest.approx(expected)
+
+
+def test_the_rms_is_that_of_the_distances_from_the_circle() -> None:
+    """Returns 0.01 m off in turn, inside and outside, around a circle that stays as it is."""
+    exact = returns_of(2.0, 1.0, 0.3, edges=False)
+    off = 0.01 * (-1.0) ** np.arange(12)
+    xy = np.array([[2.0], [1.0]]) + (exact.xy - [[2.0], [1.0]]) * (1.0 + off / 0.3)
+    z = np.array([[2.0], [1.0], [0.3]])
+    # A sure prior: range_variance is so large that the returns do not move the circle.
+    found = fit(replace(exact, xy=xy), z, np.full(1, 0.3), np.full(1, 1e-12), 1e9, 1)
+    assert np.allclose(found.z, z, atol=1e-6)
+    assert found.rms_m[0] == pytest.approx(0.01, rel=1e-4)
+
+
+def test_each_group_has_its_own_circle() -> None:
+    """Two at once give what each gives alone."""
+    circles = ((2.0, 1.0, 0.3), (3.0, -2.0, 0.6))
+    one, other = (returns_of(*circle, edges=True) for circle in circles)
+    both = Returns(
+        xy=np.hstack((one.xy, other.xy)),
+        group=np.concatenate((one.group, other.group + 1)),
+        edge_xy=np.hstack((one.edge_xy, other.edge_xy)),
+        normal=np.hstack((one.normal, other.normal)),
+        edge_gap_m=np.concatenate((one.edge_gap_m, other.edge_gap_m)),
+        edge_group=np.concatenate((one.edge_group, other.edge_group + 1)),
+        count=np.concatenate((one.count, other.count)),
+    )
+    start = np.array(circles).T + 0.02
+    prior, variance = np.array([0.25, 0.5]), np.array([0.0625, 0.1])
+    found = fit(both, start, prior, variance, 1e-4, 3)
+    for k, returns in enumerate((one, other)):
+        alone = fit(returns, start[:, k : k + 1], prior[k : k + 1], variance[k : k + 1], 1e-4, 3)
+        assert np.allclose(found.z[:, k], alone.z[:, 0])
+        assert np.allclose(found.covariance[:, :, k], alone.covariance[:, :, 0])
+        assert found.rms_m[k] == pytest.approx(alone.rms_m[0])
+
+
+def test_without_information_prior_and_start_hold() -> None:
+    returns = returns_of(2.0, 1.0, 0.3, edges=False)
+    start = np.array([[2.1], [0.8], [0.5]])
+    found = fit(returns, start, np.full(1, 0.4), np.full(1, 0.05), 1e12, 2)
+    assert found.z[:, 0].tolist() == pytest.approx([2.1, 0.8, 0.4])
+    assert np.allclose(found.covariance[:, :, 0], np.diag([0.3**2, 0.3**2, 0.05]))
+
+
+@pytest.mark.parametrize("half", [0.05, 0.4, 1.2])
+def test_a_start_without_sure_edges_has_the_radius_that_is_given(half: float) -> None:
+    """In the direction of the middle, behind the nearest return, from any origin."""
+    right, left = (np.array([[math.cos(a)], [math.sin(a)]]) for a in (0.7 - half, 0.7 + half))
+    origin = np.array([[1.0], [-3.0]])
+    start = start_of(origin, np.full(1, 2.0), right, left, np.full(1, False), np.full(1, 0.4))
+    expected = [1.0 + 2.4 * math.cos(0.7), -3.0 + 2.4 * math.sin(0.7), 0.4]
     assert start[:, 0].tolist() == pytest.approx(expected)

@@ -72,3 +72,13 @@ def test_noise_left_is_that_of_a_rigid_motion() -> None:
     noise = PoseError.noise(np.array([[3.0], [4.0]]), upper, ORIGIN)
     assert np.allclose(noise[:2, :2, 0], J @ left @ J.T)
     assert not noise[2, :, 0].any()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
+def test_the_share_that_is_followed_is_taken_off_the_error(share: float) -> None:
+    error = PoseError()
+    error.error = (0.2, -0.4, 0.08)
+    taken = error.follow(share)
+    assert taken == pytest.approx((0.2 * share, -0.4 * share, 0.08 * share))
+    left = [before - off for before, off in zip((0.2, -0.4, 0.08), taken)]
+    assert error.error == pytest.approx(left)

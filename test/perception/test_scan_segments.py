@@ -124,3 +124,41 @@ def test_a_point_in_free_space_has_appeared_and_a_surface_has_not() -> None:
     assert free.appeared(x, y, 1.0).tolist() == [False, False, False]
     far = np.array([9.0]), np.array([0.0])  # here the beams are too far apart to judge
     assert free.appeared(*far, 0.0).tolist() == [False]
+
+
+def test_the_newest_scan_that_is_old_enough_is_compared() -> None:
+    """First a free room, then a surface at 2 m: beyond it only the first tells free space."""
+    lag_s = 0.6
+    free = FreeSpace((lag_s,))
+    room, surface = (
+        BeamReader().read(ORIGIN, AT_REST, scan_of(discs)) for discs in ([], [(2.5, 0.0, 0.5)])
+    )
+    beyond = np.array([4.0]), np.zeros(1)
+    assert free.appeared(*beyond, 0.0).tolist() == [False]  # without any scan
+    free.add(room, AT_REST, 0.0)
+    assert free.appeared(*beyond, 0.0).tolist() == [True]  # too young, but there is no other
+    free.pass_time(0.3)
+    free.add(surface, AT_REST, 0.0)
+    assert free.appeared(*beyond, 0.0).tolist() == [True]  # both too young: the oldest
+    free.pass_time(0.4)
+    assert free.appeared(*beyond, 0.0).tolist() == [True]  # of 0.7 s and 0.4 s
+    free.pass_time(0.2)
+    assert free.appeared(*beyond, 0.0).tolist() == [False]  # of 0.9 s and 0.6 s
+    free.clear()
+    assert free.appeared(*beyond, 0.0).tolist() == [False]
+
+
+def test_no_scan_is_kept_so_soon_after_another() -> None:
+    free = FreeSpace((0.01,))
+    room, surface = (
+        BeamReader().read(ORIGIN, AT_REST, scan_of(discs)) for discs in ([], [(2.5, 0.0, 0.5)])
+    )
+    beyond = np.array([4.0]), np.zeros(1)
+    free.add(room, AT_REST, 0.0)
+    free.pass_time(0.05)
+    free.add(surface, AT_REST, 0.0)
+    assert free.appeared(*beyond, 0.0).tolist() == [True]
+    free.pass_time(0.05)
+    free.add(surface, AT_REST, 0.0)
+    free.pass_time(0.1)
+    assert free.appeared(*beyond, 0.0).tolist() == [False]

@@ -86,3 +86,21 @@ def test_kept_tracks_keep_all_that_is_known_of_them() -> None:
     assert all(getattr(bank, name).shape[-1] == 1 for name in TrackBank._ARRAYS)
     # The sums of small_matrices are added in order only then.
     assert all(getattr(bank, name).flags.c_contiguous for name in TrackBank._ARRAYS)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_what_rests_is_expected_where_it_was_before_the_prediction(moving: bool) -> None:
+    """At rest the state goes back by B = (1, -dt), and its covariance with it."""
+    bank, dt = bank_of_one(), 0.2
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(5, 5))
+    bank.covariance[:, :, 0] = P = A @ A.T
+    bank.state[3:, 0] = (0.4, -0.7)
+    bank.predicted_s[:] = dt
+    bank.moving[:] = moving
+    B = np.eye(2, 5) if moving else np.hstack((np.eye(2), np.zeros((2, 1)), -dt * np.eye(2)))
+    creep = 0.0 if moving else 0.005**2
+    state, covariance = bank.state[:, 0].copy(), P.copy()
+    center, found = bank.expected(np.array([0]))
+    assert center[:, 0] == pytest.approx(B @ state)
+    assert np.allclose(found[:, :, 0], B @ covariance @ B.T + creep * np.eye(2))
