@@ -23,4 +23,4 @@ def _begun(suite: Suite, k: int, speed_mps: float | None = None) -> Scenario:
     return replace(whole, goal_m=(x, y), time_limit_s=LIMIT_S)
 
 
-Suite.world = _begun  # type: ignore[method-assign, assignment]
+Suite.world = _begun  # type: ignore[assignment, method-assign]
