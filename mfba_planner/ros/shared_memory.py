@@ -24,6 +24,8 @@ SHARED_MEMORY = Path("/dev/shm")
 _NEEDED_BYTES = 2**16
 # A file is made before it is locked, in some microseconds.
 _LEAST_AGE_S = 10.0
+# Anybody may make a FIFO or a link in this directory.
+_NEITHER_WAITS_NOR_FOLLOWS = os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
 _LOCK = re.compile(r"(fastrtps_(?:[0-9a-f]{16}|port\d+))_(?:el|sl)")
 
 
@@ -66,7 +68,7 @@ def _remove(memory: Path) -> bool:
     held: list[int] = []
     try:
         for path in locks:
-            held.append(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
+            held.append(os.open(path, _NEITHER_WAITS_NOR_FOLLOWS))
             fcntl.flock(held[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
             status = os.fstat(held[-1])
             if (

@@ -147,6 +147,21 @@ def test_what_another_user_has_stays(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert all(path.exists() for path in made)
 
 
+def test_a_link_is_not_followed_and_a_fifo_not_waited_for(tmp_path: Path) -> None:
+    """Either would be a node that does not start, or a file elsewhere that is locked."""
+    memory = tmp_path / SEGMENT
+    of_age(memory)
+    elsewhere = of_age(tmp_path / "elsewhere")
+    lock = tmp_path / f"{SEGMENT}_el"
+    lock.symlink_to(elsewhere)
+    assert remove_abandoned(tmp_path) == 0
+    assert memory.exists()
+    lock.unlink()
+    os.mkfifo(lock)
+    remove_abandoned(tmp_path)
+    assert elsewhere.exists()
+
+
 def test_files_of_other_programs_stay(tmp_path: Path) -> None:
     """Also the mutex of a port, for which another process may wait."""
     names = (
