@@ -37,8 +37,13 @@ SEGMENT = "fastrtps_0123456789abcdef"
 
 
 def locks_in(text: str) -> list[Path]:
-    """The lock files of shared memory among the open files of a process."""
-    return [Path(name) for name in re.findall(rf"{SHARED_MEMORY}/fastrtps_\w+_(?:el|sl)\b", text)]
+    """The lock files of segments among the open files of a process.
+
+    Ports come again: other nodes take their numbers, or still send to them.
+    """
+    return [
+        Path(name) for name in re.findall(rf"{SHARED_MEMORY}/fastrtps_[0-9a-f]{{16}}_el", text)
+    ]
 
 
 def memory_with(lock: Path) -> Path:
@@ -73,8 +78,8 @@ def test_a_node_removes_what_a_killed_one_left_and_not_what_a_live_one_has(tmp_p
     )
     left = locks_in(done.stdout)
     try:
-        assert len(left) >= 2, done.stdout + done.stderr
-        assert len(live) >= 2
+        assert left, done.stdout + done.stderr
+        assert live
         for path in (*left, *live):
             of_age(path)
         with Program("virtual_sensor", cwd=tmp_path):

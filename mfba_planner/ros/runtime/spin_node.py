@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import signal
 import time
+import warnings
 from collections.abc import Callable
 
 import rclpy
@@ -70,6 +71,8 @@ def spin_node(make_node: Callable[..., GraphNode], args: list[str]) -> int:
     own, args = split_ros_args(args)
     options = {"start_parameter_services": False} if NO_PARAMETER_SERVICES in own else {}
     remove_abandoned()
+    # A client that is not discovered yet, or no longer there, asks again or is not missed.
+    warnings.filterwarnings("ignore", "failed to send response", RuntimeWarning)
     with interrupts_held():  # by the middleware's threads, for ever
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node: GraphNode | None = None
