@@ -124,7 +124,7 @@ def importing(rng: Rng, directory: Path) -> None:
 
 
 _PLANNER = flatten(PlannerParams())
-_SENSOR = flatten(SensorParams())
+_OPTIONS = _PLANNER | {f"sensor:{key}": value for key, value in flatten(SensorParams()).items()}
 
 
 def parameters(rng: Rng, _: Path) -> None:
@@ -132,10 +132,10 @@ def parameters(rng: Rng, _: Path) -> None:
     planner, sensor = PlannerParams(), SensorParams()
     changes: dict[str, Any] = {}
     for _k in range(int(rng.integers(1, 4))):
-        name = pick(rng, [*_PLANNER, *(f"sensor:{key}" for key in _SENSOR)])
+        name = pick(rng, list(_OPTIONS))
         value: Any = pick(rng, VALUES)
         kind = rng.integers(6)
-        default = (_PLANNER | {f"sensor:{key}": known for key, known in _SENSOR.items()})[name]
+        default = _OPTIONS[name]
         if kind == 0:
             value = float(rng.normal()) * 10.0 ** int(rng.integers(-9, 10))
         elif kind > 1 and isinstance(default, float):  # most often one that may be good

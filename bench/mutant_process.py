@@ -66,12 +66,7 @@ _CLOSEST = {
         f"recording/{name}": ["recording/test_bag_formats"]
         for name in ("library_file", "ros1_file", "rosbags_definitions", "sqlite_file")
     },
-    "recording/read_perceived": ["verification/test_redecide", "recording/test_run_bag"],
     "recording/params_file": ["cli/test_cli_decide"],
-    "planning/peers/vfh": ["planning/test_peers"],
-    "planning/peers/dwa": ["planning/test_peers"],
-    "planning/peers/orca": ["planning/test_peers"],
-    "planning/peers/apf": ["planning/test_peers"],
 }  # fmt: skip
 # Without processes and DDS, so that a test is a matter of seconds.
 _FAST = (

@@ -47,6 +47,7 @@ from mfba_planner.launcher.ros_domain import private_domain
 from mfba_planner.planning.planner_params import PlannerParams
 from mfba_planner.planning.predictive_planner import preset
 from mfba_planner.ros.interface import topics
+from mfba_planner.ros.interface.serialized_message import header_stamp_ns
 from mfba_planner.ros.shared_memory import SHARED_MEMORY
 from mfba_planner.scenarios.run_config import Driver, RunConfig, with_perception
 from mfba_planner.scenarios.scenario_files import load_scenario
@@ -70,10 +71,10 @@ class Readings:
     def take(self, pids: dict[str, int], progress: str) -> None:
         """Read all, and print a line."""
         for name, pid in pids.items():
-            if self.shared_mb and pid not in self.known:
-                self.known.add(pid)
-                continue  # it still loads what it needs
+            is_young = bool(self.shared_mb) and pid not in self.known
             self.known.add(pid)
+            if is_young:
+                continue  # it still loads what it needs
             reading = resident_mb(pid), len(os.listdir(f"/proc/{pid}/fd"))
             self.processes.setdefault((name, pid), []).append(reading)
         sizes = [_size(path) for path in SHARED_MEMORY.glob("fastrtps_*")]
@@ -109,28 +110,23 @@ def _size(path: Path) -> int:
         return 0
 
 
-def missing_ticks(bag: Path, tick_ns: int) -> list[str]:
-    """A line per topic of the world that lacks ticks in a bag; also where the bag has no index."""
+def lacks_ticks(bag: Path, tick_ns: int) -> bool:
+    """Whether a bag lacks odometry of a tick, or an index; prints its topics."""
     (path,) = bag.glob("*.mcap")
-    found: list[str] = []
     with path.open("rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
         if summary is None or summary.statistics is None:
-            return ["no summary"]
+            return True
         counts = summary.statistics.channel_message_counts
         for channel in summary.channels.values():
             print(f"{channel.topic:30} {counts.get(channel.id, 0):9} messages")
         stamps: set[int] = set()
         for _, _, message in reader.iter_messages(topics=["/odom"]):
-            # After the CDR header of four bytes, as any message that begins with a Header.
-            sec, nanosec = (int.from_bytes(message.data[i : i + 4], "little") for i in (4, 8))
-            stamps.add((sec * 10**9 + nanosec) // tick_ns)
+            stamps.add(header_stamp_ns(message.data) // tick_ns)
     lacking = sorted(set(range(min(stamps), max(stamps) + 1)) - stamps)
     print(f"/odom: ticks {min(stamps)} to {max(stamps)}, {len(lacking)} missing {lacking[:5]}")
-    if lacking:
-        found.append("/odom")
-    return found
+    return bool(lacking)
 
 
 def in_process(ticks: int, root: Path) -> bool:
@@ -158,7 +154,7 @@ def in_process(ticks: int, root: Path) -> bool:
             config, root / "bag", domain_id=domain, timeout_s=1e6, on_turn=on_turn
         )
     print(f"{took_s:.0f} s")
-    return readings.growth() | bool(missing_ticks(root / "bag", params.tick_ns))
+    return readings.growth() | lacks_ticks(root / "bag", params.tick_ns)
 
 
 def _free_place(scenario: Scenario, at_s: float) -> Kidnapping:
@@ -266,7 +262,7 @@ def disturbed(hours: float, speed: float, every_s: float, seed: int, root: Path)
             disturber.disturb()
         run.wait(1.0)
     print(f"{tick} ticks in {time.monotonic() - begun:.0f} s; {dict(disturber.counts)}")
-    return readings.growth() | bool(missing_ticks(root / "bag", params.tick_ns))
+    return readings.growth() | lacks_ticks(root / "bag", params.tick_ns)
 
 
 def main() -> int:

@@ -38,16 +38,21 @@ EVERY = 5  # ticks
 WITHIN_M = 1e-4
 
 
+def first(ticks: int) -> Callable[[object], bool]:
+    """Whether a run goes on after a decision: so many times."""
+    left = iter(range(ticks - 1))
+    return lambda _: next(left, None) is not None
+
+
 def sim(scenario: Scenario, ticks: int, params: PlannerParams = PREDICTIVE) -> Episode:
     """The first ticks of a run by `mfba sim`."""
     scenario, params = with_perception(scenario, params)
-    left = iter(range(ticks - 1))
     return simulate(
         scenario,
         planner=params,
         sensor=SensorParams(),
         seed=0,
-        go_on=lambda _: next(left, None) is not None,
+        go_on=first(ticks),
     )
 
 
@@ -55,28 +60,26 @@ def swept(factory: Any, world: Scenario, perception: str, ticks: int) -> Episode
     """The first ticks of a run of any planner from its lidar, as a sweep does it."""
     world = with_lidar(world, perception)
     params = world.planner_params(PREDICTIVE)
-    left = iter(range(ticks - 1))
     return run(
         world,
         planner=params,
         seed=0,
         path_planner=factory(params, SensorParams(), 0),
         observe=LidarPerception(perception),
-        go_on=lambda _: next(left, None) is not None,
+        go_on=first(ticks),
     )
 
 
 def fleet(ticks: int) -> Episode:
     """The first robot of some that swap places."""
     scenario, params = with_perception(load_scenario("swap"), PREDICTIVE)
-    left = iter(range(ticks - 1))
     scenario = replace(scenario, robots=scenario.robots[:4])
     return simulate_fleet(
         scenario,
         planner=params,
         sensor=SensorParams(),
         seed=0,
-        go_on=lambda _: next(left, None) is not None,
+        go_on=first(ticks),
     )[0]
 
 

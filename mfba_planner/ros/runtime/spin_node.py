@@ -72,7 +72,10 @@ def spin_node(make_node: Callable[..., GraphNode], args: list[str]) -> int:
     options = {"start_parameter_services": False} if NO_PARAMETER_SERVICES in own else {}
     remove_abandoned()
     # A client that is not discovered yet, or no longer there, asks again or is not missed.
-    warnings.filterwarnings("ignore", "failed to send response", RuntimeWarning)
+    # That the last response was lost is told by response_sender.py.
+    warnings.filterwarnings(
+        "ignore", "failed to send response", RuntimeWarning, module=r"rclpy\.service"
+    )
     with interrupts_held():  # by the middleware's threads, for ever
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node: GraphNode | None = None
