@@ -27,6 +27,7 @@ from mfba_planner.ros.nodes.virtual_sensor import VirtualSensor
 from mfba_planner.ros.runtime.spin_node import make_executor
 
 BEAMS = 90
+QUIET_S, ANSWER_S = 0.003, 2.0
 _FLOATS = [
     math.nan, math.inf, -math.inf, 0.0, -0.0, 1e-30, -1.0, 1e-3, 1.0, 3.5, 1e6, 9.9e6, 3e38, -3e38,
     math.pi, -math.pi, 2.0 * math.pi,
@@ -56,7 +57,11 @@ class Nodes:
         values: dict[str, Any] = {"input_timeout_s": 5.0}
         for kind, more in ((VirtualSensor, {"source": "scan"}), (PlannerNode, {"method": method})):
             given = [Parameter(name, value=value) for name, value in {**values, **more}.items()]
-            node = kind(context=self._context, namespace=method, parameter_overrides=given)
+            # Without services, of which each would cost time in each wait.
+            node = kind(
+                context=self._context, namespace=method, parameter_overrides=given,
+                start_parameter_services=False,
+            )  # fmt: skip
             self._executor.add_node(node)
             self._nodes.append(node)
         odom, scan = (
@@ -83,14 +88,22 @@ class Nodes:
         self._lock.close()
 
     def _settle(self) -> None:
-        for _ in range(40):
-            self._executor.spin_once(timeout_sec=0.0)
+        """Spin until nothing came in four waits; a single one may be long on a busy machine."""
+        quiet = 0
+        while quiet < 4:
+            start_s = time.monotonic()
+            self._executor.spin_once(timeout_sec=QUIET_S)
+            quiet = quiet + 1 if time.monotonic() - start_s >= QUIET_S else 0
 
     def __call__(self, rng: Rng, _: Path) -> None:
         """Good odometry and scan, then one of them changed; a bad one must stop the robot."""
         odom, scan, commands = pick(rng, self._pairs)
+        commands.clear()
         odom.publish(_odometry())
         scan.publish(_scan())
+        end_s = time.monotonic() + ANSWER_S
+        while not commands and time.monotonic() < end_s:
+            self._executor.spin_once(timeout_sec=QUIET_S)
         self._settle()
         commands.clear()
         unusable = False
